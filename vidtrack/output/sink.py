@@ -1,0 +1,39 @@
+"""What a sink gets: everything known about one frame, once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from vidtrack.scan import Scan, Tracks
+from vidtrack.video.foreground import Foreground
+from vidtrack.video.frame import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One frame through the whole pipeline.
+
+    index       frame number from 0
+    frame, foreground   None for stored detections, which have no picture
+    stage_s     seconds spent in each stage
+    """
+
+    index: int
+    time_s: float
+    scan: Scan
+    tracks: Tracks
+    frame: Frame | None
+    foreground: Foreground | None
+    stage_s: Mapping[str, float]
+
+
+class Sink(Protocol):
+    """Something that reads steps: a table, a video, a recording."""
+
+    def step(self, step: Step) -> None:
+        """Take one frame's results."""
+
+    def close(self) -> None:
+        """Write what is left; results stay valid if it is never called."""

@@ -1,0 +1,209 @@
+"""The words all parts share: Scan (sensor to tracker), Decision (associator to estimator), Tracks (tracker to all)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vidtrack.errors import ScanError
+
+if TYPE_CHECKING:
+    from vidtrack.estimate.sensor import Sensor
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Status(IntEnum):
+    """Where a track is in its life."""
+
+    TENTATIVE = 0
+    CONFIRMED = 1
+    COASTING = 2
+    MERGED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What a sensor saw at one time.
+
+    t          time [s]
+    z          (M, m) measurements, pixels or metres (radians for angles)
+    R          (M, m, m) their covariances; (m, m) is taken for all of them
+    sensor     the measurement model; None is "z is the position"
+    box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre)
+    amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class
+    run        (M,) Monte Carlo run of each measurement; pairs form within equal runs only
+
+    Raises ScanError for wrong shapes, NaN or infinite numbers, and covariances that are not
+    symmetric positive definite.
+    """
+
+    t: float
+    z: Floats
+    R: Floats
+    sensor: Sensor | None = None
+    box: Floats | None = None
+    amplitude: Floats | None = None
+    score: Floats | None = None
+    label: Ints | None = None
+    run: Ints | None = None
+
+    def __post_init__(self) -> None:
+        z = np.ascontiguousarray(self.z, dtype=float)
+        if z.ndim != 2:
+            raise ScanError(f"z must be (M, m), not {z.shape}; a single measurement is z[None]")
+        count, dim = z.shape
+        R = np.asarray(self.R, dtype=float)
+        if R.shape == (dim, dim):
+            R = np.broadcast_to(R, (count, dim, dim))
+        if R.shape != (count, dim, dim):
+            raise ScanError(f"R must be ({count}, {dim}, {dim}) or ({dim}, {dim}) to match z, not {R.shape}")
+        if not np.isfinite(self.t):
+            raise ScanError(f"the scan's time is {self.t}; it must be a finite number of seconds")
+        _refuse_bad_measurements(z, R)
+        object.__setattr__(self, "t", float(self.t))
+        object.__setattr__(self, "z", z)
+        object.__setattr__(self, "R", np.ascontiguousarray(R))
+        for name, shape, kind in (
+            ("box", (count, 4), float),
+            ("amplitude", (count,), float),
+            ("score", (count,), float),
+            ("label", (count,), np.int64),
+            ("run", (count,), np.int64),
+        ):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = np.ascontiguousarray(value, dtype=kind)
+            if value.shape != shape:
+                raise ScanError(f"{name} must be {shape} to match z, not {value.shape}")
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.z)
+
+
+def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
+    """Raise ScanError naming the first measurement that no filter could use."""
+    finite = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ScanError(f"measurement {i} is not finite: z={z[i]}, R={R[i].tolist()}; drop it before the scan is made")
+    scale = np.abs(R).max(axis=(1, 2), initial=0.0)
+    symmetric = np.abs(R - np.swapaxes(R, 1, 2)).max(axis=(1, 2), initial=0.0) <= 1e-9 * scale
+    if not symmetric.all():
+        i = int(np.argmin(symmetric))
+        raise ScanError(f"R of measurement {i} is not symmetric: {R[i].tolist()}")
+    if z.shape[1] == 2:  # the common case without a decomposition
+        determinant = R[:, 0, 0] * R[:, 1, 1] - R[:, 0, 1] * R[:, 1, 0]
+        positive = (R[:, 0, 0] > 0) & (determinant > 1e-14 * scale**2)
+    else:
+        smallest = np.linalg.eigvalsh(R)[:, 0] if len(R) else np.empty(0)
+        positive = smallest > 1e-14 * scale
+    if not positive.all():
+        i = int(np.argmin(positive))
+        raise ScanError(f"R of measurement {i} is not positive definite: {R[i].tolist()}; give it a variance above zero")
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What an associator decided: how K successor rows come from T rows and M measurements.
+
+    parent     (K,) the row each successor continues; 0..T-1 for one-scan methods
+    row, measurement, beta   (B,) sparse weights over (successor, measurement)
+    beta0      (K,) weight of "not detected"; with the betas of its row it sums to one
+    inflation  (K,) coefficient of K S K' added on the missed branch (PDA, PSNF)
+    spread     whether the update adds the spread of the weighted innovations
+    """
+
+    parent: Ints
+    row: Ints
+    measurement: Ints
+    beta: Floats
+    beta0: Floats
+    inflation: Floats
+    spread: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A change in a track's life, with its reason in words."""
+
+    t: float
+    track_id: int
+    kind: str  # "birth", "confirmed", "merge", "split", "delete"
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """What was decided for each track of a scan, for `--decisions`. All (T,); -1 and NaN where there is none."""
+
+    track_id: Ints
+    measurement: Ints
+    weight: Floats
+    d2: Floats
+    gate: Floats
+    runner_up: Ints
+    runner_up_d2: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """A snapshot of all tracks at time t; rows are tracks.
+
+    t              time [s]
+    id             (T,) never reused
+    status         (T,) values of Status
+    x, P           (T, n), (T, n, n) state mean and covariance
+    box            (T, 4) left, top, width, height, absolute; NaN where the sensor has no boxes
+    group          (T,) tracks that share one blob have the same number >= 0; -1 alone
+    group_since_s  (T,) time the group was formed; NaN alone
+    age_s          (T,) seconds since the track's first measurement
+    existence      (T,) probability that the track is a target
+    measurement    (T,) index of the heaviest measurement of this scan; -1 for none
+    nis            (T,) normalised innovation squared of this update; NaN for none
+    position, velocity   columns of x, one per axis
+    """
+
+    t: float
+    id: Ints
+    status: NDArray[np.int8]
+    x: Floats
+    P: Floats
+    box: Floats
+    group: Ints
+    group_since_s: Floats
+    age_s: Floats
+    existence: Floats
+    measurement: Ints
+    nis: Floats
+    position: tuple[int, ...] = (0, 2)
+    velocity: tuple[int, ...] = (1, 3)
+    run: Ints | None = None
+    events: tuple[Event, ...] = field(default=())
+    choices: Choices | None = None
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    @property
+    def xy(self) -> Floats:
+        """(T, d) positions."""
+        return self.x[:, list(self.position)]
+
+    @property
+    def v(self) -> Floats:
+        """(T, d) velocities per second."""
+        return self.x[:, list(self.velocity)]
+
+    @property
+    def xy_cov(self) -> Floats:
+        """(T, d, d) position covariances."""
+        index = list(self.position)
+        return self.P[:, index][:, :, index]

@@ -1,0 +1,48 @@
+"""One picture of a video, as the decoder left it: luminance and half-size chroma planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A picture and its time.
+
+    index   number of the frame in its source, from 0
+    time_s  seconds since the source's first frame, never decreasing
+    y       (H, W) luminance
+    u, v    ((H+1)//2, (W+1)//2) chroma planes (Cb, Cr), None for a grey source
+    full_range  luminance spans 0..255 (JPEG) and not 16..235 (video)
+    """
+
+    index: int
+    time_s: float
+    y: Image
+    u: Image | None = None
+    v: Image | None = None
+    full_range: bool = False
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W)."""
+        return self.y.shape[0], self.y.shape[1]
+
+    def bgr(self) -> Image:
+        """(H, W, 3) picture in OpenCV's channel order."""
+        luma = self.y if self.full_range else cv2.convertScaleAbs(self.y, alpha=255 / 219, beta=-16 * 255 / 219)
+        if self.u is None or self.v is None:
+            return np.asarray(cv2.cvtColor(luma, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+        size = (self.y.shape[1], self.y.shape[0])
+        gain = 1.0 if self.full_range else 255 / 224
+        chroma = [
+            cv2.convertScaleAbs(cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR), alpha=gain, beta=128 - 128 * gain)
+            for plane in (self.v, self.u)
+        ]
+        return np.asarray(cv2.cvtColor(cv2.merge([luma, *chroma]), cv2.COLOR_YCrCb2BGR), dtype=np.uint8)
