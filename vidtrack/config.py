@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from vidtrack.errors import ConfigError
 
@@ -35,7 +35,49 @@ class SourceSettings(_Group):
 
 
 class DisturbanceSettings(_Group):
-    """Placeholder until the detector defines its settings."""
+    """The robust map; lengths are pixels of the processed picture (see source.scale), levels are 0..255."""
+
+    luma_threshold: float = Field(15.0, gt=0, le=255)
+    """grey levels; a smaller difference of luminance alone is never a disturbance"""
+    noise_factor: float = Field(4.0, ge=0, le=20)
+    """the threshold is at least this many times the pixel's measured mean deviation; 0: noise is not used"""
+    chroma: bool = True
+    """use colour where the source has it"""
+    chroma_threshold: float = Field(10.0, gt=0, le=255)
+    """grey levels; a difference of Cb or Cr alone that is a disturbance"""
+    majority_px: int = Field(7, ge=1, le=15)
+    """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
+    shadow: bool = True
+    """the scene darker by one factor, in luminance, colour and texture, is shadow and not foreground"""
+    exposure: bool = True
+    """follow the camera's gain at once"""
+    learn_s: float = Field(2.0, gt=0)
+    """s; time constant of the scene's average"""
+    noise_s: float = Field(4.0, gt=0)
+    """s; time constant of the noise's average"""
+    selective: bool = True
+    """foreground is not learnt; false: it is, and leaves a tail"""
+    guard_px: int = Field(3, ge=0, le=30)
+    """nor is anything this close to foreground"""
+    holes: bool = True
+    """foreground that encloses background is filled"""
+    ghosts: bool = True
+    """what was in the first frames, or stood long, and has left is recognised by the edges it left in the scene"""
+    ghost_s: float = Field(1.0, ge=0)
+    """s; cover of a region before it can be called a ghost"""
+    absorb_s: float = Field(60.0, gt=0)
+    """s; what stands longer, and is not a tracked vehicle, becomes scene"""
+    relearn_share: float = Field(0.6, gt=0, le=1)
+    """share of the picture; more foreground than that is no traffic but a change of light or view"""
+    relearn_s: float = Field(1.0, ge=0)
+    """s; a change of the whole picture that lasts longer starts the scene anew; until then nothing is reported"""
+
+    @field_validator("majority_px")
+    @classmethod
+    def _odd(cls, value: int) -> int:
+        if value % 2 == 0:
+            raise ValueError("a window has a middle: take an odd number")
+        return value
 
 
 class PaperSettings(_Group):
@@ -55,7 +97,14 @@ class DetectorSettings(_Group):
 
 
 class BlobSettings(_Group):
-    """Placeholder until the blob stage defines its settings."""
+    min_area_share: float = Field(1e-4, ge=0, le=1)
+    """share of the picture's area; smaller blobs are left out"""
+    join_overlap: float = Field(0.7, gt=0, le=1)
+    """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
+    jitter_px: float = Field(0.5, gt=0)
+    """pixels of the processed picture; standard deviation of a small blob's centroid"""
+    jitter_share: float = Field(0.05, ge=0, le=1)
+    """standard deviation of the centroid per standard deviation of the blob's extent, in its direction"""
 
 
 class TrackerSettings(_Group):
@@ -63,7 +112,16 @@ class TrackerSettings(_Group):
 
 
 class OutputSettings(_Group):
-    """Placeholder until the outputs define their settings."""
+    lines: tuple[str, ...] = ()
+    """counting lines, each NAME:x1,y1,x2,y2 in source pixels"""
+    trail_s: float = Field(2.0, ge=0, le=60)
+    """s; how far back the trail behind a vehicle reaches in the annotated video and in rerun"""
+    video_crf: int = Field(23, ge=0, le=51)
+    """constant rate factor of the annotated H.264 video; smaller is sharper and larger"""
+    jpeg_quality: int = Field(75, ge=1, le=100)
+    """quality of the pictures in a rerun recording; larger is sharper and larger"""
+    rerun_picture_s: float = Field(0.0, ge=0)
+    """s; least time between the pictures of a rerun recording, for long runs; 0: every frame"""
 
 
 class Settings(_Group):

@@ -115,10 +115,8 @@ class Decision:
     """What an associator decided: how K successor rows come from T rows and M measurements.
 
     parent     (K,) the row each successor continues; 0..T-1 for one-scan methods
-    row, measurement, beta   (B,) sparse weights over (successor, measurement)
+    row, measurement, beta   (B,) sparse weights over (successor, measurement), sorted by row
     beta0      (K,) weight of "not detected"; with the betas of its row it sums to one
-    inflation  (K,) coefficient of K S K' added on the missed branch (PDA, PSNF)
-    spread     whether the update adds the spread of the weighted innovations
     """
 
     parent: Ints
@@ -126,8 +124,24 @@ class Decision:
     measurement: Ints
     beta: Floats
     beta0: Floats
-    inflation: Floats
-    spread: bool = True
+
+    def without(self, rows: NDArray[np.bool_]) -> Decision:
+        """The same decision with these rows (K,) missed."""
+        stay = ~rows[self.row]
+        beta0 = np.where(rows, 1.0, self.beta0)
+        return Decision(self.parent, self.row[stay], self.measurement[stay], self.beta[stay], beta0)
+
+    def joined(self, other: Decision) -> Decision:
+        """Both decisions about disjoint sets of rows as one."""
+        row = np.concatenate([self.row, other.row])
+        order = np.argsort(row, kind="stable")
+        return Decision(
+            self.parent,
+            row[order],
+            np.concatenate([self.measurement, other.measurement])[order],
+            np.concatenate([self.beta, other.beta])[order],
+            self.beta0 + other.beta0 - 1.0,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,37 @@
+"""Clusters: tracks and measurements that share no gated pair are separate problems."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vidtrack.scan import Ints
+
+
+@njit(cache=True, nogil=True)
+def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
+    """(rows,) smallest row of each row's connected component in the gate graph; union-find with path halving."""
+    root = np.arange(rows)
+    owner = np.full(measurements, -1)
+    for k in range(len(row)):
+        other = owner[measurement[k]]
+        if other < 0:
+            owner[measurement[k]] = row[k]
+            continue
+        a, b = find(root, row[k]), find(root, other)
+        if a < b:
+            root[b] = a
+        elif b < a:
+            root[a] = b
+    for t in range(rows):
+        root[t] = find(root, t)
+    return root
+
+
+@njit(cache=True, nogil=True)
+def find(root: Ints, t: int) -> int:
+    """Representative of t."""
+    while root[t] != t:
+        root[t] = root[root[t]]
+        t = root[t]
+    return t

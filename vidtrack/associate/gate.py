@@ -1,0 +1,215 @@
+"""The gate: which measurement could belong to which track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numba import njit
+from scipy.stats import chi2
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Floats, Ints, Scan
+
+Distance = Literal["mahalanobis", "decoupled", "euclidean"]
+_MODES = {"mahalanobis": 0, "decoupled": 1, "euclidean": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Gated (track, measurement) pairs, sorted by track.
+
+    row, measurement (N,)
+    d2     (N,) squared distance the gate compares: v' S^-1 v, eq. (8), or |v|^2
+    log_s  (N,) ln|S| of the pair (zero for euclidean), so that d2 + log_s ranks pairs of different tracks
+    limit  (T,) the gate: largest d2 admitted in each row
+    start  (T + 1,) pairs of row t are start[t]..start[t+1]
+    """
+
+    row: Ints
+    measurement: Ints
+    d2: Floats
+    log_s: Floats
+    limit: Floats
+    start: Ints
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def only(self, mask: np.ndarray) -> Pairs:
+        """The pairs of a mask (N,)."""
+        row = self.row[mask]
+        start = np.searchsorted(row, np.arange(len(self.limit) + 1))
+        return Pairs(row, self.measurement[mask], self.d2[mask], self.log_s[mask], self.limit, start)
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """The confidence region of each predicted measurement (paper 004, section III).
+
+    probability  share of true measurements inside; the limit on d2 is its chi-square quantile
+    distance     mahalanobis: v' S^-1 v with the full S; decoupled: per-axis variances only, eq. (8) with
+                 the innovation variance; euclidean: |v|^2, the baseline that ignores the confidence region
+    radius       px or m, gate of the euclidean distance
+    """
+
+    probability: float = 0.999
+    distance: Distance = "mahalanobis"
+    radius: float = 50.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.probability <= 1:
+            raise ConfigError(f"gate probability is {self.probability}; it must lie in 0..1")
+        if self.distance not in _MODES:
+            raise ConfigError(f"distance is {self.distance!r}; choose from {', '.join(_MODES)}")
+        if not self.radius > 0:
+            raise ConfigError(f"gate radius is {self.radius}; it must be above zero")
+
+    def limit(self, dim: int) -> float:
+        """Largest admitted squared distance in `dim` dimensions."""
+        if self.distance == "euclidean":
+            return self.radius**2
+        return float(chi2.ppf(self.probability, dim))
+
+    def pairs(self, zhat: Floats, cov: Floats, scan: Scan, run: Ints | None = None) -> Pairs:
+        """All pairs inside the gate; those of different Monte Carlo runs never meet.
+
+        zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each
+        measurement's own R. Candidates come from a grid over the first two axes, so the cost follows
+        the number of pairs and not T times M.
+        """
+        limit = np.full(len(zhat), self.limit(zhat.shape[1]))
+        mode = _MODES[self.distance]
+        runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
+        own = np.zeros(len(zhat), np.int64) if run is None else run
+        reach = _reach(cov, scan.R, limit, mode)
+        grid = Grid.over(scan.z[:, :2], runs, reach)
+        row, measurement, d2, log_s = _gated(
+            zhat, cov, own, reach, limit, mode,
+            scan.z, scan.R, grid.order, grid.key, grid.origin, grid.cell, grid.shape,
+        )  # fmt: skip
+        start = np.searchsorted(row, np.arange(len(zhat) + 1))
+        return Pairs(row, measurement, d2, log_s, limit, start)
+
+
+def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
+    """(T, 2) half sides of the box around each gate, on the first two axes."""
+    if mode == 2:
+        return np.repeat(np.sqrt(limit)[:, None], 2, axis=1)
+    axes = min(2, cov.shape[1])
+    variance = np.diagonal(cov, axis1=1, axis2=2)[:, :axes]
+    widest = np.diagonal(R, axis1=1, axis2=2)[:, :axes].max(axis=0, initial=0.0)
+    with np.errstate(invalid="ignore"):  # a gate of one is infinite; of zero, empty
+        reach = np.sqrt(limit[:, None] * (variance + widest))
+    return np.broadcast_to(reach, (len(cov), 2)) if axes == 1 else reach
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Points sorted by (run, row of cells, column): the points of a row's cell range are contiguous."""
+
+    order: Ints
+    key: Ints
+    origin: Floats
+    cell: Floats
+    shape: Ints
+
+    @classmethod
+    def over(cls, z: Floats, run: Ints, reach: Floats) -> Grid:
+        """z (M, 1 or 2) points; the cell follows the median gate, bounded to about one point a cell."""
+        z = z if z.shape[1] == 2 else np.column_stack([z[:, 0], np.zeros(len(z))])
+        origin = z.min(axis=0, initial=np.inf) if len(z) else np.zeros(2)
+        extent = z.max(axis=0) - origin if len(z) else np.zeros(2)
+        finite = reach[np.isfinite(reach).all(axis=1)]
+        cell = np.median(finite, axis=0) if len(finite) else np.ones(2)
+        most = max(1.0, np.ceil(np.sqrt(len(z))) * 2)
+        cell = np.maximum(np.maximum(cell, extent / most), 1e-9)
+        shape = (extent // cell).astype(np.int64) + 1
+        column = ((z - origin) // cell).astype(np.int64)
+        key = (run * shape[1] + column[:, 1]) * shape[0] + column[:, 0]
+        order = np.argsort(key, kind="stable")
+        return cls(order, key[order], origin, cell, shape)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gated(
+    zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats, mode: int,
+    z: Floats, R: Floats, order: Ints, key: Ints, origin: Floats, cell: Floats, shape: Ints,
+) -> tuple[Ints, Ints, Floats, Floats]:  # fmt: skip
+    """Pairs inside the gate, found cell row by cell row, each track's measurements in ascending order."""
+    rows, m = zhat.shape
+    size = 4 * rows + 16
+    row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
+    d2, log_s = np.empty(size), np.empty(size)
+    n = 0
+    L, v = np.empty((m, m)), np.empty(m)
+    for t in range(rows):
+        first = n
+        low, high = np.empty(2, np.int64), np.empty(2, np.int64)
+        outside = False
+        for a in range(2):
+            at = zhat[t, a] if a < m else 0.0
+            below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
+            above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
+            outside |= not (below < shape[a] and above >= 0)
+            low[a] = max(0.0, min(below, shape[a] - 1.0))
+            high[a] = max(0.0, min(above, shape[a] - 1.0))
+        if outside or len(key) == 0:
+            continue
+        for line in range(low[1], high[1] + 1):
+            base = (own[t] * shape[1] + line) * shape[0]
+            at = np.searchsorted(key, base + low[0])
+            while at < len(key) and key[at] <= base + high[0]:
+                j = order[at]
+                at += 1
+                for a in range(m):
+                    v[a] = z[j, a] - zhat[t, a]
+                distance, log_det = _distance(v, cov[t], R[j], L, mode)
+                if not distance <= limit[t] or limit[t] == 0.0:
+                    continue
+                if n == size:
+                    size *= 2
+                    row, measurement = _grown(row, size), _grown(measurement, size)
+                    d2, log_s = _grown(d2, size), _grown(log_s, size)
+                row[n], measurement[n], d2[n], log_s[n] = t, j, distance, log_det
+                n += 1
+        if n - first > 1:  # the grid's order depends on the cell size; results must not
+            index = np.argsort(measurement[first:n])
+            measurement[first:n] = measurement[first:n][index]
+            d2[first:n] = d2[first:n][index]
+            log_s[first:n] = log_s[first:n][index]
+    return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), log_s[:n].copy()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _distance(v: Floats, cov: Floats, R: Floats, L: Floats, mode: int) -> tuple[float, float]:
+    """Squared distance of an innovation and ln|S|, S = cov + R, by Cholesky; v is overwritten."""
+    m = len(v)
+    total, log_det = 0.0, 0.0
+    if mode == 2:
+        for a in range(m):
+            total += v[a] * v[a]
+        return total, 0.0
+    for a in range(m):
+        for b in range(a + 1):
+            entry = cov[a, b] + R[a, b]
+            if mode == 1 and a != b:
+                entry = 0.0
+            for c in range(b):
+                entry -= L[a, c] * L[b, c]
+            L[a, b] = np.sqrt(entry) if a == b else entry / L[b, b]
+        for c in range(a):
+            v[a] -= L[a, c] * v[c]
+        v[a] /= L[a, a]
+        total += v[a] * v[a]
+        log_det += 2.0 * np.log(L[a, a])
+    return total, log_det
+
+
+@njit(cache=True, nogil=True)
+def _grown(array: np.ndarray, size: int) -> np.ndarray:
+    """The same numbers with room for more."""
+    wider = np.empty(size, array.dtype)
+    wider[: len(array)] = array
+    return wider

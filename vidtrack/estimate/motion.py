@@ -1,0 +1,107 @@
+"""Motion models: how a state moves and how uncertain it grows while nobody looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Floats
+
+Settled = np.ndarray  # (T,) bool: rows whose heading may shape the process noise
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantVelocity:
+    """Nearly constant velocity, state [x, vx, y, vy, ...].
+
+    accel    standard deviation of the acceleration along the heading, per s^2
+    cross    the same across the heading; None: equal to accel (isotropic)
+    speed    standard deviation of a new track's unknown velocity, per s
+    hold_s   correlation time of the acceleration [s]: the noise then grows with time alone, whatever
+             the scan rate (continuous white noise of intensity accel^2 hold_s). None: the acceleration
+             is constant over each step, Q = accel^2 G G', G = [dt^2/2, dt] (the papers' model)
+    warmup   updates during which the noise stays isotropic, because the heading is not yet known;
+             an ellipse along a wrong heading makes the filter overconfident (paper 004, SPEC trap)
+    per_size accel, cross and speed are in object sizes instead of pixels or metres
+    """
+
+    dim: int = 2
+    accel: float = 1.0
+    cross: float | None = None
+    speed: float = 10.0
+    hold_s: float | None = None
+    warmup: int = 6
+    per_size: bool = False
+
+    def __post_init__(self) -> None:
+        if self.dim not in (1, 2, 3):
+            raise ConfigError(f"ConstantVelocity: dim is {self.dim}; it must be 1, 2 or 3")
+        for name in ("accel", "cross", "speed", "hold_s"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise ConfigError(f"ConstantVelocity: {name} is {value}; it must be above zero")
+
+    @property
+    def position(self) -> tuple[int, ...]:
+        """Columns of the state that are positions."""
+        return tuple(range(0, 2 * self.dim, 2))
+
+    @property
+    def velocity(self) -> tuple[int, ...]:
+        """Columns of the state that are velocities."""
+        return tuple(range(1, 2 * self.dim, 2))
+
+    def transition(self, dt: float) -> Floats:
+        """F (n, n) over dt seconds."""
+        F = np.eye(2 * self.dim)
+        F[self.position, self.velocity] = dt
+        return F
+
+    def process_noise(self, dt: float, x: Floats, scale: Floats, settled: Settled) -> Floats:
+        """Q (T, n, n) over dt seconds: accelerations stretched along the heading of `settled` rows.
+
+        x (T, n), scale (T,) multiplies the standard deviations. The acceleration covariance is
+        A = cross^2 I + (accel^2 - cross^2) u u', u the unit velocity (SPEC 004).
+        """
+        A = self._acceleration(x, settled) * (scale * scale)[:, None, None]
+        if self.hold_s is None:
+            time = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+        else:
+            time = self.hold_s * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+        n = 2 * self.dim
+        return (A[:, :, None, :, None] * time[None, None, :, None, :]).reshape(len(x), n, n)
+
+    def _acceleration(self, x: Floats, settled: Settled) -> Floats:
+        """A (T, d, d) at scale one."""
+        A = np.broadcast_to(self.accel**2 * np.eye(self.dim), (len(x), self.dim, self.dim)).copy()
+        if self.cross is None or not settled.any():
+            return A
+        v = x[settled][:, self.velocity]
+        u = v / np.linalg.norm(v, axis=1, keepdims=True)
+        stretch = (self.accel**2 - self.cross**2) * u[:, :, None] * u[:, None, :]
+        A[settled] = self.cross**2 * np.eye(self.dim) + stretch
+        return A
+
+    def settled(self, x: Floats, P: Floats, hits: np.ndarray) -> Settled:
+        """(T,) rows whose heading is known: enough updates, and a speed above three sigma of itself."""
+        if self.cross is None:
+            return np.zeros(len(x), bool)
+        v = x[:, self.velocity]
+        variance = P[:, self.velocity, self.velocity].max(axis=1)
+        return (hits > self.warmup) & ((v * v).sum(axis=1) > 9 * variance)
+
+    def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
+        """State and covariance of new rows from one located measurement each.
+
+        position (B, d), cov (B, d, d), scale (B,) -> x (B, n), P (B, n, n). The velocity is zero with
+        the prior's variance: the second measurement then gives the two-point estimate.
+        """
+        n = 2 * self.dim
+        x = np.zeros((len(position), n))
+        P = np.zeros((len(position), n, n))
+        x[:, self.position] = position
+        P[:, 0::2, 0::2] = cov
+        P[:, self.velocity, self.velocity] = ((self.speed * scale) ** 2)[:, None]
+        return x, P

@@ -1,0 +1,45 @@
+"""Measurement models: what a sensor would see of a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from vidtrack.scan import Floats
+
+
+class Sensor(Protocol):
+    """A measurement model z = h(x) + noise."""
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, m) expected measurements of states x (T, n) whose positions are in columns `position`."""
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(T, m, n) or (1, m, n) Jacobians of h."""
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """Positions (M, d) and covariances (M, d, d) that single measurements give."""
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """The measurement is the position itself, in the state's own coordinates."""
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, d) the positions."""
+        return np.ascontiguousarray(x[:, position])
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(1, d, n): picks the position columns, the same for all rows."""
+        H = np.zeros((1, len(position), x.shape[1]))
+        H[0, range(len(position)), position] = 1.0
+        return H
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """The measurements as they are."""
+        return z, R
+
+
+POSITION = Position()

@@ -1,0 +1,72 @@
+"""Rows of tracks that turn out to be real: scans wait until each tentative track in them is confirmed or gone."""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vidtrack.output.sink import Sink, Step
+from vidtrack.scan import Status, Tracks
+
+
+@dataclass(slots=True)
+class _Held:
+    step: Step
+    undecided: set[int]
+    proven: set[int] = field(default_factory=set)
+
+
+class Confirmed:
+    """Passes steps on to `sinks`, without pictures and with confirmed tracks only, from their first measurement.
+
+    Steps arrive late but in order. A track that is still tentative after `hold_s` loses its earlier rows:
+    memory stays bounded whatever the tracker does.
+    """
+
+    def __init__(self, *sinks: Sink, hold_s: float = 10.0) -> None:
+        self._sinks = sinks
+        self._hold_s = hold_s
+        self._held: deque[_Held] = deque()
+        self._undecided: set[int] = set()
+
+    def step(self, step: Step) -> None:
+        """Take a frame's results; pass on those that are decided."""
+        tentative = step.tracks.status == Status.TENTATIVE
+        undecided = set(step.tracks.id[tentative].tolist())
+        decided = self._undecided - undecided
+        if decided:
+            proven = decided.intersection(step.tracks.id.tolist())
+            for held in self._held:
+                held.proven |= held.undecided & proven
+                held.undecided -= decided
+        self._undecided = undecided
+        self._held.append(_Held(replace(step, frame=None, foreground=None), set(undecided)))
+        while self._held and (not self._held[0].undecided or step.time_s - self._held[0].step.time_s > self._hold_s):
+            self._release(self._held.popleft())
+
+    def close(self) -> None:
+        """Pass on what waits, without the tracks that nobody confirmed."""
+        with ExitStack() as closing:
+            for sink in self._sinks:
+                closing.callback(sink.close)
+            while self._held:
+                self._release(self._held.popleft())
+
+    def _release(self, held: _Held) -> None:
+        tracks = held.step.tracks
+        keep = tracks.status != Status.TENTATIVE
+        if not keep.all():
+            keep |= np.isin(tracks.id, list(held.proven))
+            held.step = replace(held.step, tracks=_rows(tracks, keep))
+        for sink in self._sinks:
+            sink.step(held.step)
+
+
+def _rows(tracks: Tracks, keep: NDArray[np.bool_]) -> Tracks:
+    """The tracks with keep (T,) True."""
+    columns = {f.name: getattr(tracks, f.name) for f in fields(tracks)}
+    return replace(tracks, **{name: v[keep] for name, v in columns.items() if isinstance(v, np.ndarray)})

@@ -1,0 +1,62 @@
+"""decisions.csv: why each track did what it did."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vidtrack.output.linefile import LineFile
+from vidtrack.output.sink import Step
+from vidtrack.scan import Choices, Event
+
+HEADER = "frame,time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,reason\n"
+
+
+class DecisionLog:
+    """Sink that writes one row per track and scan (event "update" or "miss") and one per event of a track's life.
+
+    Tentative tracks are included: the reasons for their deaths are what one looks for.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = LineFile(path, HEADER)
+
+    def step(self, step: Step) -> None:
+        """Write what was decided in one scan."""
+        start = f"{step.index},{step.time_s:.6f}"
+        choices = () if step.tracks.choices is None else _choice_rows(step.tracks.choices)
+        rows = [*choices, *map(_event_row, step.tracks.events)]
+        self._file.add("".join(f"{start},{row}\n" for row in rows))
+
+    def close(self) -> None:
+        """Write what waits."""
+        self._file.close()
+
+
+def _choice_rows(choices: Choices) -> list[str]:
+    columns = (
+        choices.track_id,
+        choices.measurement,
+        choices.weight,
+        choices.d2,
+        choices.gate,
+        choices.runner_up,
+        choices.runner_up_d2,
+    )
+    return [
+        f"{track},{'miss' if chosen < 0 else 'update'},{_index(chosen)},{_real(weight)},{_real(d2)},{_real(gate)},"
+        f"{_index(second)},{_real(second_d2)},"
+        for track, chosen, weight, d2, gate, second, second_d2 in zip(*(c.tolist() for c in columns), strict=True)
+    ]
+
+
+def _event_row(event: Event) -> str:
+    reason = event.reason.replace('"', "'")
+    return f'{event.track_id},{event.kind},,,,,,,"{reason}"'
+
+
+def _index(value: int) -> str:
+    return "" if value < 0 else str(value)
+
+
+def _real(value: float) -> str:
+    return "" if value != value else f"{value:.4g}"

@@ -1,0 +1,113 @@
+"""Tracks drawn on pictures: one colour for an identity, dashes where nothing was measured."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vidtrack.scan import Floats, Status, Tracks
+from vidtrack.traffic.lines import Line
+from vidtrack.video.frame import Image
+
+Colour = tuple[int, int, int]
+WHITE: Colour = (255, 255, 255)
+GREY: Colour = (170, 170, 170)
+LINE: Colour = (0, 220, 255)
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+@cache
+def _hue(step: int) -> Colour:
+    red, green, blue = colorsys.hsv_to_rgb(step * 0.618034 % 1.0, 0.75 if step % 2 else 0.95, 1.0)
+    return round(255 * blue), round(255 * green), round(255 * red)
+
+
+def colour(track_id: int) -> Colour:
+    """Blue, green, red of an identity; neighbouring numbers are far apart in hue."""
+    return _hue(track_id % 256)
+
+
+class Pen:
+    """Draws on one picture, with strokes and letters in proportion to it."""
+
+    def __init__(self, picture: Image) -> None:
+        self.picture = picture
+        height = min(picture.shape[:2])
+        self.width = max(1, round(height / 450))
+        self.text_scale = max(0.35, height / 1400)
+
+    def path(self, points: ArrayLike, ink: Colour, width: int = 1) -> None:
+        """A polyline through (n, 2) points."""
+        corners = np.round(np.asarray(points, dtype=float) * 8).astype(np.int32)
+        cv2.polylines(self.picture, [corners], False, ink, width * self.width, cv2.LINE_AA, shift=3)
+
+    def box(self, box: Floats, ink: Colour, dashed: bool = False) -> None:
+        """A rectangle left, top, width, height."""
+        left, top, width, height = box
+        corners = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]]) + (left, top)
+        if not dashed:
+            self.path(corners, ink)
+            return
+        dash = 5.0 * self.width
+        for a, b in zip(corners[:-1], corners[1:], strict=True):
+            ends = np.linspace(0, 1, 2 * max(1, round(np.hypot(*(b - a)) / dash / 2)) + 1)[:, None] * (b - a) + a
+            for i in range(0, len(ends) - 1, 2):
+                self.path(ends[i : i + 2], ink)
+
+    def size(self, text: str) -> tuple[int, int]:
+        """Width and height of a label in pixels."""
+        (width, height), _ = cv2.getTextSize(text, _FONT, self.text_scale, self.width)
+        return width + 4, height + 5
+
+    def label(self, text: str, left: float, bottom: float, ink: Colour) -> None:
+        """Black text on a patch of colour, kept inside the picture."""
+        width, height = self.size(text)
+        x = int(np.clip(left, 0, max(0, self.picture.shape[1] - width)))
+        y = int(np.clip(bottom, height, self.picture.shape[0]))
+        cv2.rectangle(self.picture, (x, y - height), (x + width, y), ink, -1)
+        cv2.putText(self.picture, text, (x + 2, y - 3), _FONT, self.text_scale, (0, 0, 0), self.width, cv2.LINE_AA)
+
+
+def draw_trails(pen: Pen, paths: Mapping[int, Floats]) -> None:
+    """The recent way of each track."""
+    for track_id, path in paths.items():
+        pen.path(path, colour(track_id))
+
+
+def draw_tracks(pen: Pen, tracks: Tracks) -> None:
+    """Boxes and numbers: thin grey tentative, dashed coasting, one common label for tracks that share a blob."""
+    boxes = np.where(np.isnan(tracks.box), np.hstack([tracks.xy[:, :2] - 3, np.full((len(tracks), 2), 6)]), tracks.box)
+    for track_id, status, box, group in zip(tracks.id.tolist(), tracks.status, boxes, tracks.group, strict=True):
+        if status == Status.TENTATIVE:
+            pen.box(box, GREY)
+            continue
+        pen.box(box, colour(track_id), dashed=status == Status.COASTING)
+        if group < 0:
+            pen.label(str(track_id), box[0], box[1], colour(track_id))
+    for group in np.unique(tracks.group[tracks.group >= 0]):
+        members = tracks.group == group
+        low = boxes[members, :2].min(axis=0) - 2
+        high = (boxes[members, :2] + boxes[members, 2:]).max(axis=0) + 2
+        pen.box(np.concatenate([low, high - low]), WHITE)
+        pen.label("+".join(map(str, np.sort(tracks.id[members]))), low[0], low[1], WHITE)
+
+
+def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str, int]] | None = None) -> None:
+    """Counting lines with their names and, given totals, their counts."""
+    for line in lines:
+        pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE, width=2)
+        counts = "".join(f" {way} {n}" for way, n in (totals or {}).get(line.name, {}).items())
+        width, height = pen.size(line.name + counts)
+        middle = np.array([line.x1 + line.x2 - width, line.y1 + line.y2 + height]) / 2
+        pen.label(line.name + counts, *middle, LINE)
+
+
+def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:
+    """Time of the picture and other facts in its lower left corner."""
+    minutes, seconds = divmod(time_s, 60)
+    pen.label("  ".join([f"{int(minutes)}:{seconds:06.3f}", *facts]), 0, pen.picture.shape[0], GREY)

@@ -1,0 +1,87 @@
+"""The folder of one run: made before anything is computed, so that a wrong place costs no time."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+
+from vidtrack.errors import OutputError, StoppedEarly
+
+RESULTS = (
+    "tracks.csv",
+    "tracks.parquet",
+    "tracks.parquet.parts",
+    "mot.txt",
+    "counts.csv",
+    "summary.json",
+    "tracks.png",
+    "decisions.csv",
+)
+"""Everything a run writes into its folder; `--force` replaces these and leaves other files alone."""
+
+
+def open_run(path: Path | None, source_name: str, force: bool) -> Path:
+    """The folder for a run's results, empty of earlier results.
+
+    path         the folder asked for; None: `runs/<source_name>`, then `runs/<source_name>-2`, ...
+    force        results of an earlier run in `path` are deleted
+
+    Raises OutputError when the folder cannot be made or written, or `path` is not empty and `force` is off.
+    """
+    folder = _next_free(source_name) if path is None else _asked_for(path, force)
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise OutputError(f"cannot write into {folder}: {error.strerror}; choose another folder with -o") from None
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn a failing disk into StoppedEarly, naming the file: full, unplugged, deleted meanwhile."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise StoppedEarly(f"stopped: cannot write {path}: {reason}; what was written before is valid") from None
+
+
+def _next_free(source_name: str) -> Path:
+    name = re.sub(r"[^\w.-]+", "_", source_name).strip("._") or "run"
+    for n in count(1):
+        folder = Path("runs", name if n == 1 else f"{name}-{n}")
+        try:
+            folder.mkdir(parents=True)
+            return folder
+        except FileExistsError:
+            if not folder.parent.is_dir():
+                raise OutputError("cannot make a folder in runs: it is a file; choose a folder with -o") from None
+        except OSError as error:
+            raise OutputError(f"cannot make {folder}: {error.strerror}; choose another folder with -o") from None
+    raise AssertionError("count() never ends")
+
+
+def _asked_for(folder: Path, force: bool) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if force:
+            _remove_results(folder)
+        elif any(folder.iterdir()):
+            raise OutputError(f"{folder} is not empty; choose another folder with -o, or add --force to replace it")
+    except OSError as error:
+        raise OutputError(f"cannot use {folder} for results: {error.strerror}; choose another with -o") from None
+    return folder
+
+
+def _remove_results(folder: Path) -> None:
+    for name in RESULTS:
+        old = folder / name
+        if old.is_dir():
+            shutil.rmtree(old)
+        else:
+            old.unlink(missing_ok=True)

@@ -1,0 +1,92 @@
+"""Text files that stay readable whatever happens: whole lines only, on disk about every second."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+from vidtrack.output.folder import writing
+
+
+class Every:
+    """True once per `seconds` of the monotonic clock."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._next = time.monotonic() + seconds
+
+    def __call__(self) -> bool:
+        now = time.monotonic()
+        if now < self._next:
+            return False
+        self._next = now + self._seconds
+        return True
+
+
+class LineFile:
+    """A growing text file. Raises StoppedEarly when the disk refuses, cut back to its last whole line."""
+
+    def __init__(self, path: Path, header: str = "") -> None:
+        self.path = path
+        self._due = Every(1.0)
+        self._waiting: list[str] = []
+        self._size = 0
+        with writing(path):
+            # Unbuffered: what a failed write left in a buffer would fail again on closing.
+            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
+        self._waiting.append(header)
+        self.flush()
+
+    def add(self, lines: str) -> None:
+        """Take whole lines; call it for every scan, also with none, so that earlier ones reach the disk in time."""
+        self._waiting.append(lines)
+        if self._due():
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        block = "".join(self._waiting).encode()
+        self._waiting.clear()
+        with writing(self.path):
+            try:
+                rest = memoryview(block)
+                while rest:
+                    rest = rest[self._file.write(rest) :]
+            except OSError:
+                self._file.truncate(self._size)
+                self._file.seek(self._size)
+                raise
+        self._size += len(block)
+
+    def close(self) -> None:
+        """Write what waits."""
+        try:
+            self.flush()
+        finally:
+            self._file.close()
+
+
+def drop_partial_line(path: Path) -> None:
+    """Cut a line that was being written when the process was killed."""
+    with writing(path), open(path, "r+b") as file:
+        content = file.read()
+        file.truncate(content.rfind(b"\n") + 1)
+
+
+def sort_rows(path: Path, columns: int, header: bool) -> None:
+    """Sort a table of numbers by its first `columns` columns; equal rows keep their order."""
+    with writing(path):
+        lines = path.read_text().splitlines(keepends=True)
+        first = lines[:1] if header else []
+        rows = lines[len(first) :]
+        rows.sort(key=lambda row: [float(cell) for cell in row.split(",", columns)[:columns]])
+        replace_text(path, "".join(first + rows))
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a whole file so that a reader sees the old or the new one, never half of it."""
+    with writing(path):
+        new = path.with_name(path.name + ".new")
+        new.write_text(text)
+        os.replace(new, path)

@@ -1,0 +1,35 @@
+"""One 0/255 picture a frame: what the detector took for traffic."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+
+from vidtrack.errors import ConfigError, OutputError
+from vidtrack.output.folder import writing
+from vidtrack.output.sink import Step
+
+
+class MaskFolder:
+    """Sink that writes `%06d.png` at source size, the frame number from 0. Raises OutputError if it cannot be made."""
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot make {folder}: {error.strerror}; give --save-masks another folder") from None
+        self._folder = folder
+
+    def step(self, step: Step) -> None:
+        """Write the mask of one frame."""
+        if step.frame is None or step.foreground is None:
+            raise ConfigError("stored detections have no masks; leave --save-masks out")
+        mask = step.foreground.full_size(step.frame.shape)
+        path = self._folder / f"{step.index:06d}.png"
+        with writing(path):
+            # Encoded here and written by Python: cv2.imwrite would not say why it failed.
+            path.write_bytes(cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_BILEVEL, 1])[1].tobytes())
+
+    def close(self) -> None:
+        """Nothing waits."""

@@ -1,0 +1,71 @@
+"""Parquet in closed parts: a file without its footer is lost, so each part gets its own until the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from vidtrack.output.folder import writing
+from vidtrack.output.linefile import Every
+
+_PART_ROWS = 100_000
+_PART_S = 60.0
+
+
+class ParquetParts:
+    """Writes `NAME.parts/000000.parquet`, ...; on closing they become the one file NAME.
+
+    A killed run leaves the parts, each readable (`pyarrow.parquet.read_table` takes the folder).
+    """
+
+    def __init__(self, path: Path, schema: pa.Schema) -> None:
+        self._path = path
+        self._schema = schema
+        self._folder = parts_folder(path)
+        self._waiting: list[pa.Table] = []
+        self._count = 0
+        self._due = Every(_PART_S)
+
+    def add(self, rows: pa.Table) -> None:
+        """Take rows; close a part when it is large or old enough."""
+        self._waiting.append(rows)
+        if self._due() or sum(len(table) for table in self._waiting) >= _PART_ROWS:
+            self._close_part()
+
+    def close(self) -> None:
+        """Join all parts to one file."""
+        parts = (pq.read_table(self._part(i)) for i in range(self._count))
+        with writing(self._path):
+            write_parquet(self._path, self._schema, [*parts, *self._waiting])
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _close_part(self) -> None:
+        table = pa.concat_tables(self._waiting)
+        self._waiting.clear()
+        path = self._part(self._count)
+        with writing(path):
+            self._folder.mkdir(exist_ok=True)
+            write_parquet(path, self._schema, [table])
+        self._count += 1
+
+    def _part(self, number: int) -> Path:
+        return self._folder / f"{number:06d}.parquet"
+
+
+def parts_folder(path: Path) -> Path:
+    """Where the parts of a Parquet file are while it is being written."""
+    return path.with_name(path.name + ".parts")
+
+
+def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
+    """Write the tables one after the other; the file appears when it is complete."""
+    new = path.with_name(path.name + ".new")
+    with pq.ParquetWriter(new, schema) as writer:
+        for table in tables:
+            writer.write_table(table)
+    os.replace(new, path)

@@ -1,0 +1,90 @@
+"""tracks.png: where the traffic went, over the scene without traffic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from vidtrack.output.draw import Pen, colour, draw_lines
+from vidtrack.output.folder import writing
+from vidtrack.output.sink import Step
+from vidtrack.scan import Floats, Status
+from vidtrack.traffic.lines import Line
+from vidtrack.video.frame import Image
+
+_SIDE = 960
+"""Pixels; smaller pictures are enlarged to about this, or their numbers could not be read."""
+
+_NUMBERED = 150
+"""Tracks that get their number; in a longer run the last ones do."""
+
+
+class TrajectoryPlot:
+    """Sink that draws each confirmed track as it moves, so memory does not grow with the run.
+
+    shape  (H, W) of the source
+    scene  gives the (H, W, 3) background when the run ends; None: plain grey
+    """
+
+    def __init__(
+        self, path: Path, shape: tuple[int, int], scene: Callable[[], Image] | None = None, lines: Sequence[Line] = ()
+    ) -> None:
+        self._path = path
+        self._scene = scene
+        self._lines = lines
+        self._shape = shape
+        self._zoom = max(1, round(_SIDE / max(shape)))
+        # Colour times opacity, and opacity: anti-aliased strokes then blend exactly.
+        self._layer = np.zeros((shape[0] * self._zoom, shape[1] * self._zoom, 4), np.uint8)
+        self._pen = Pen(self._layer)
+        self._last: dict[int, Floats] = {}
+        self._ends: dict[int, Floats] = {}
+
+    def step(self, step: Step) -> None:
+        """Extend the trajectories of one frame's confirmed tracks; a coasted gap becomes a straight line."""
+        tracks = step.tracks
+        seen = (tracks.status != Status.COASTING) & (tracks.status != Status.TENTATIVE) | (tracks.measurement >= 0)
+        alive = set(tracks.id.tolist())
+        for track_id in self._last.keys() - alive:
+            self._ends[track_id] = self._last.pop(track_id)
+        while len(self._ends) > _NUMBERED:
+            del self._ends[next(iter(self._ends))]
+        for track_id, xy in zip(tracks.id[seen].tolist(), tracks.xy[seen], strict=True):
+            before = self._last.setdefault(track_id, xy)
+            if np.abs(xy - before).max() * self._zoom >= 1.0:
+                self._pen.path(np.stack([before, xy]) * self._zoom, (*colour(track_id), 255), width=2)
+                self._last[track_id] = xy
+
+    def close(self) -> None:
+        """Write the picture."""
+        size = (self._layer.shape[1], self._layer.shape[0])
+        scene = np.full((*self._shape, 3), 60, np.uint8) if self._scene is None else self._scene()
+        scene = cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC)
+        clear = 1.0 - self._layer[:, :, 3:] / np.float32(255)
+        picture = (scene * clear + self._layer[:, :, :3]).clip(0, 255).astype(np.uint8)
+        pen = Pen(picture)
+        zoom = self._zoom
+        draw_lines(pen, [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines])
+        self._number(pen)
+        with writing(self._path):
+            self._path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+
+    def _number(self, pen: Pen) -> None:
+        """Each track's number at its end, moved down while it would cover another."""
+        taken: list[tuple[float, float, float, float]] = []
+        for track_id, xy in sorted((self._ends | self._last).items()):
+            width, height = pen.size(str(track_id))
+            x, y = xy * self._zoom
+            x = float(np.clip(x, 0, pen.picture.shape[1] - width))
+            y = float(np.clip(y, height, pen.picture.shape[0]))
+            for _ in range(20):
+                if not any(
+                    abs(x - a) < (width + w) / 2 + 1 and abs(y - b) < (height + h) / 2 + 1 for a, b, w, h in taken
+                ):
+                    break
+                y = y + height + 1 if y + height + 1 < pen.picture.shape[0] else y - 10 * height
+            taken.append((x, y, width, height))
+            pen.label(str(track_id), x, y, colour(track_id))

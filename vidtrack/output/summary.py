@@ -1,0 +1,91 @@
+"""summary.json: one run in one object, valid at every moment."""
+
+from __future__ import annotations
+
+import json
+import platform
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+
+from vidtrack.config import Settings
+from vidtrack.output.linefile import Every, replace_text
+from vidtrack.output.sink import Step
+from vidtrack.scan import Status
+from vidtrack.traffic.lines import LineCounter
+
+_PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
+
+
+class Summary:
+    """Sink that writes summary.json at the start, every second and at the end.
+
+    source   the input's name, without any password
+    reading  the source's own account when asked: fps, width, height, frames_read, frames_dropped,
+             decode_errors, reconnects, stalls, truncated
+    counter  the counted lines, None without any
+
+    `interrupted` is True in the file until `close`, so a killed run says so; set `interrupted` before
+    closing a run that was stopped.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        source: str,
+        settings: Settings,
+        reading: Callable[[], Mapping[str, object]],
+        counter: LineCounter | None = None,
+    ) -> None:
+        self.interrupted = False
+        self._path = path
+        self._source = source
+        self._settings = settings.model_dump(mode="json")
+        self._versions = {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES}
+        self._reading = reading
+        self._counter = counter
+        self._start = time.monotonic()
+        self._frames = 0
+        self._media_s = 0.0
+        self._tracks = 0
+        self._alive: set[int] = set()
+        self._stage_s: Counter[str] = Counter()
+        self._due = Every(1.0)
+        self._write(interrupted=True)
+
+    def step(self, step: Step) -> None:
+        """Count."""
+        confirmed = set(step.tracks.id[step.tracks.status != Status.TENTATIVE].tolist())
+        self._tracks += len(confirmed - self._alive)
+        self._alive = confirmed
+        self._frames += 1
+        self._media_s = step.time_s
+        for stage, seconds in step.stage_s.items():
+            self._stage_s[stage] += seconds
+        if self._due():
+            self._write(interrupted=True)
+
+    def close(self) -> None:
+        """Write the final object."""
+        self._write(self.interrupted)
+
+    def as_dict(self, interrupted: bool) -> dict[str, object]:
+        """What the file holds. `seconds`: time the run took; `media_s`: time of the last frame; stages in seconds."""
+        return {
+            "source": self._source,
+            **self._reading(),
+            "frames": self._frames,
+            "media_s": round(self._media_s, 6),
+            "tracks": self._tracks,
+            "counts": {} if self._counter is None else self._counter.totals(),
+            "seconds": round(time.monotonic() - self._start, 3),
+            "stages": {stage: round(seconds, 4) for stage, seconds in self._stage_s.items()},
+            "settings": self._settings,
+            "versions": self._versions,
+            "interrupted": interrupted,
+        }
+
+    def _write(self, interrupted: bool) -> None:
+        replace_text(self._path, json.dumps(self.as_dict(interrupted), indent=2) + "\n")

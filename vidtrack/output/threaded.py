@@ -1,0 +1,36 @@
+"""Runs a slow sink beside the pipeline, so that a second core encodes while the first one tracks."""
+
+from __future__ import annotations
+
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+
+from vidtrack.output.sink import Sink, Step
+
+
+class Threaded:
+    """Sink that hands each step to `sink` in one thread of its own, at most `depth` steps behind.
+
+    What the sink raises reaches the pipeline with a later `step`, at the latest with `close`.
+    """
+
+    def __init__(self, sink: Sink, depth: int = 8) -> None:
+        self._sink = sink
+        self._depth = depth
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix=type(sink).__name__)
+        self._pending: deque[Future[None]] = deque()
+
+    def step(self, step: Step) -> None:
+        """Queue a step; wait when the sink is too far behind."""
+        if len(self._pending) >= self._depth:
+            self._pending.popleft().result()
+        self._pending.append(self._pool.submit(self._sink.step, step))
+
+    def close(self) -> None:
+        """Finish all steps, then close the sink."""
+        try:
+            while self._pending:
+                self._pending.popleft().result()
+        finally:
+            self._pool.shutdown(cancel_futures=True)
+            self._sink.close()

@@ -1,0 +1,36 @@
+"""Where each track was in the last seconds."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from vidtrack.scan import Floats, Ints, Status, Tracks
+
+
+class Trails:
+    """The last `seconds` of all tracks that are not tentative."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._scans: deque[tuple[float, Ints, Floats]] = deque()
+
+    def step(self, tracks: Tracks) -> None:
+        """Add a scan, forget what is too old."""
+        shown = tracks.status != Status.TENTATIVE
+        self._scans.append((tracks.t, tracks.id[shown], tracks.xy[shown, :2]))
+        while tracks.t - self._scans[0][0] > self._seconds:
+            self._scans.popleft()
+
+    def paths(self) -> dict[int, Floats]:
+        """(n, 2) positions in order of time for each track of the last scan."""
+        if not self._scans:
+            return {}
+        alive = self._scans[-1][1]
+        ids = np.concatenate([scan[1] for scan in self._scans])
+        xy = np.concatenate([scan[2] for scan in self._scans])
+        order = np.argsort(ids, kind="stable")
+        ids, xy = ids[order], xy[order]
+        first, last = np.searchsorted(ids, alive), np.searchsorted(ids, alive, side="right")
+        return {int(i): xy[a:b] for i, a, b in zip(alive, first, last, strict=True)}

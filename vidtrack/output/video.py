@@ -1,0 +1,108 @@
+"""The annotated video: H.264 in fragmented MP4, which browsers play and a kill does not spoil."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+from av.container import OutputContainer
+from av.video.stream import VideoStream
+
+from vidtrack.config import OutputSettings
+from vidtrack.errors import ConfigError, OutputError
+from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails
+from vidtrack.output.folder import writing
+from vidtrack.output.sink import Step
+from vidtrack.output.trails import Trails
+from vidtrack.scan import Status
+from vidtrack.traffic.lines import Line, LineCounter
+from vidtrack.video.frame import Image
+
+_CLOCK = Fraction(1, 90_000)
+_FRAGMENT_S = 1
+
+
+class AnnotatedVideo:
+    """Sink that draws tracks on the pictures and encodes them with the times of the source.
+
+    fps   nominal rate, a hint for the encoder; the pictures keep their own times
+
+    Raises OutputError when the file cannot be opened, ConfigError for steps without pictures.
+    """
+
+    def __init__(self, path: Path, fps: float, settings: OutputSettings, lines: Sequence[Line] = ()) -> None:
+        self._path = path
+        self._fps = fps
+        self._settings = settings
+        self._counter = LineCounter(lines)
+        self._trails = Trails(settings.trail_s)
+        self._stream: VideoStream | None = None
+        self._pts = -1
+        try:
+            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror}; give --video another file") from None
+        self._container: OutputContainer = av.open(
+            self._file,
+            "w",
+            format="mp4",
+            options={
+                "movflags": "frag_keyframe+empty_moov+default_base_moof",
+                "frag_duration": str(_FRAGMENT_S * 1_000_000),
+                "flush_packets": "1",
+            },
+        )
+
+    def step(self, step: Step) -> None:
+        """Draw and encode one frame."""
+        if step.frame is None:
+            raise ConfigError("stored detections have no pictures to draw on; leave --video out")
+        self._encode(self._draw(step, step.frame.bgr()), step.time_s)
+
+    def close(self) -> None:
+        """Finish the file."""
+        with writing(self._path):
+            try:
+                if self._stream is not None:
+                    self._container.mux(self._stream.encode(None))
+            finally:
+                self._container.close()
+                self._file.close()
+
+    def _draw(self, step: Step, picture: Image) -> Image:
+        self._counter.step(step.index, step.tracks)
+        self._trails.step(step.tracks)
+        pen = Pen(picture)
+        draw_lines(pen, self._counter.lines, self._counter.totals())
+        draw_trails(pen, self._trails.paths())
+        draw_tracks(pen, step.tracks)
+        vehicles = int(np.count_nonzero(step.tracks.status != Status.TENTATIVE))
+        draw_clock(pen, step.time_s, [f"{vehicles} tracks"])
+        return picture
+
+    def _encode(self, picture: Image, time_s: float) -> None:
+        height, width = picture.shape[:2]
+        if self._stream is None:
+            self._stream = self._add_stream(width + width % 2, height + height % 2)
+        if (width, height) != (self._stream.width, self._stream.height):
+            # 4:2:0 chroma needs even sides.
+            picture = cv2.copyMakeBorder(
+                picture, 0, self._stream.height - height, 0, self._stream.width - width, cv2.BORDER_REPLICATE
+            )
+        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+        self._pts = frame.pts = max(self._pts + 1, round(time_s / _CLOCK))
+        frame.time_base = _CLOCK
+        with writing(self._path):
+            self._container.mux(self._stream.encode(frame))
+
+    def _add_stream(self, width: int, height: int) -> VideoStream:
+        stream = self._container.add_stream("libx264", rate=Fraction(self._fps).limit_denominator(1001))
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.time_base = stream.codec_context.time_base = _CLOCK
+        stream.codec_context.gop_size = max(1, round(2 * self._fps))
+        stream.options = {"crf": str(self._settings.video_crf), "preset": "veryfast"}
+        return stream

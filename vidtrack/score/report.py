@@ -1,0 +1,108 @@
+"""All scores of a result in one dictionary."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+
+from vidtrack.errors import ConfigError, FormatError
+from vidtrack.formats import Table
+from vidtrack.score.clear import clear, correspondences
+from vidtrack.score.consistency import consistency, nees
+from vidtrack.score.hota import hota
+from vidtrack.score.identity import identity
+from vidtrack.score.matching import Matchup, match_boxes, match_points
+from vidtrack.score.ospa import gospa, ospa
+
+MAX_DISTANCE = {"px": 20.0, "m": 100.0}
+POINT_THRESHOLD = 0.5  # the similarity of two points at the largest distance
+
+
+def evaluate(
+    result: Table,
+    truth: Table,
+    *,
+    iou: float = 0.5,
+    points: bool = False,
+    max_distance: float | None = None,
+    cutoff: float | None = None,
+    order: float = 2.0,
+    states: Table | None = None,
+) -> dict[str, float | int | str]:
+    """Every score of `result` against `truth`, by name; fractions, not percent.
+
+    Truth rows with conf 0 are ignored. Boxes match at an IoU of at least `iou`. Points are matched when
+    `points` is set or a table has no boxes, within `max_distance` (None: 20 px or 100 m).
+    OSPA and GOSPA use 1 - IoU or the distance, `cutoff` (None: 1 for boxes, max_distance for points)
+    and `order`; they are means over the frames in which truth or result has a row, and so are their parts.
+    NIS and NEES come from `states` (None: result) where it has the columns.
+    Raises FormatError for tables without identities or a truth without rows, ConfigError for bad options.
+    """
+    truth = truth.select(truth.conf != 0)
+    if not len(truth):
+        raise FormatError("the truth has no rows with conf above 0; there is nothing to score against")
+    for name, table in (("result", result), ("truth", truth)):
+        if (table.id < 0).any():
+            raise FormatError(f"the {name} has rows without identity (id -1); give tracks, not detections")
+
+    states = result if states is None else states
+    points = points or result.box is None or truth.box is None
+    if max_distance is None:
+        max_distance = MAX_DISTANCE[truth.unit]
+    if not 0 < iou <= 1:
+        raise ConfigError(f"iou is {iou}; it must be above 0 and at most 1")
+    if not max_distance > 0:
+        raise ConfigError(f"max_distance is {max_distance}; it must be above 0")
+    if cutoff is None:
+        cutoff = max_distance if points else 1.0
+
+    def match(table: Table) -> Matchup:
+        return match_points(table, truth, max_distance, cutoff) if points else match_boxes(table, truth)
+
+    matchup, threshold = match(result), POINT_THRESHOLD if points else iou
+    return {
+        "matched_by": f"distance up to {max_distance:g} {truth.unit}" if points else f"IoU from {iou:g}",
+        **_counts(matchup),
+        **asdict(clear(matchup, threshold)),
+        **asdict(identity(matchup, threshold)),
+        **asdict(hota(matchup)),
+        **_set_distances(matchup, cutoff, order),
+        **_consistency(states, truth, matchup if states is result else match(states), threshold),
+    }
+
+
+def _counts(matchup: Matchup) -> dict[str, int]:
+    return {
+        "frames": len(matchup.truth_count),
+        "truth_rows": len(matchup.truth_frame),
+        "truth_tracks": len(np.unique(matchup.truth_id)),
+        "rows": len(matchup.result_frame),
+        "tracks": len(np.unique(matchup.result_id)),
+    }
+
+
+def _set_distances(matchup: Matchup, cutoff: float, order: float) -> dict[str, float]:
+    """OSPA, GOSPA and their parts, averaged over frames."""
+    by_name = {"cutoff": cutoff, "order": order}
+    for name, metric in (("ospa", ospa), ("gospa", gospa)):
+        parts = asdict(metric(matchup, cutoff, order))
+        by_name[name] = float(parts.pop("distance").mean())
+        by_name |= {f"{name}_{part}": float(value.mean()) for part, value in parts.items()}
+    return by_name
+
+
+def _consistency(states: Table, truth: Table, matchup: Matchup, threshold: float) -> dict[str, float]:
+    """NIS and NEES with their bounds, under the names nis, nis_low, ..., where the table has the columns."""
+    matched = correspondences(matchup, threshold)
+    values = {"nees": nees(states, truth, matchup.result[matched], matchup.truth[matched])}
+    if states.nis is not None:
+        values["nis"] = states.nis
+    by_name = {}
+    for name, value in values.items():
+        found = consistency(value, dim=states.xy.shape[1])
+        if found is not None:
+            parts = asdict(found)
+            by_name[name] = parts.pop("mean")
+            by_name |= {f"{name}_{part}": number for part, number in parts.items()}
+    return by_name

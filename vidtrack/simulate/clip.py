@@ -1,0 +1,135 @@
+"""A simulated clip: frames drawn when asked for, truth known beforehand."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Floats
+from vidtrack.simulate import draw
+from vidtrack.simulate.camera import NOISE_MARGIN, Camera, camera
+from vidtrack.simulate.crossing import crossing, crossing_45
+from vidtrack.simulate.junction import junction
+from vidtrack.simulate.nine import nine
+from vidtrack.simulate.scene import Actor, Scene
+from vidtrack.simulate.truth import Truth, in_front, truth
+
+SCENARIOS: dict[str, Callable[[Generator], Scene]] = {
+    "crossing": crossing,
+    "crossing-45": crossing_45,
+    "nine": nine,
+    "junction": junction,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A scene seen by a camera. Iterating gives the frames, (H, W, 3) uint8 BGR, each drawn when asked for.
+
+    fps    frames/s
+    times  (K,) time of each frame [s]
+    seed   of the textures, which are drawn at the camera's scale
+    """
+
+    scene: Scene
+    camera: Camera
+    fps: float
+    times: Floats
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
+        return (self.frame(k) for k in range(len(self)))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) px."""
+        return self.camera.size
+
+    @cached_property
+    def truth(self) -> Truth:
+        """Boxes, visibilities and centres of all targets in all frames."""
+        return truth(self.scene, self.times, self.camera.scale, self.camera.shake)
+
+    def frame(self, k: int) -> NDArray[np.uint8]:
+        """Frame k, (H, W, 3) BGR."""
+        time, scale, shake = self.times[k], self.camera.scale, self.camera.shake[k]
+        picture = self._empty_street(shake)
+        if self.scene.sun is not None:
+            for actor in self.scene.targets:
+                draw.shade(picture, draw.shadow(actor, time, self.scene.sun) * scale + shake, float(scale.mean()))
+        for actor in in_front(self.scene.targets + self.scene.props, time):
+            corners = actor.outline(np.array([time]))[0] * scale + shake
+            draw.place(picture, self._sprites[actor], self._to_picture(actor, time, shake), corners)
+        if self.camera.gain[k] != 1:
+            picture = cv2.convertScaleAbs(picture, alpha=self.camera.gain[k])
+        row, col = self.camera.window[k]
+        noise = self.camera.noise[row : row + self.size[1], col : col + self.size[0]]
+        return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U))
+
+    def _to_picture(self, actor: Actor, time: float, shake: Floats) -> Floats:
+        """The affine map (2, 3) from the actor's own frame to the picture."""
+        zero, x, y = actor.place(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), np.array([time]))[0]
+        return np.stack([x - zero, y - zero, zero], axis=1) * self.camera.scale[:, None] + [[0, 0, d] for d in shake]
+
+    def _empty_street(self, shake: Floats) -> NDArray[np.uint8]:
+        margin, (width, height) = self._margin, self.size
+        if margin == 0:
+            return self._ground.copy()
+        shift = np.array([[1, 0, shake[0] - margin], [0, 1, shake[1] - margin]])
+        return np.asarray(cv2.warpAffine(self._ground, shift, (width, height), flags=cv2.INTER_LINEAR))
+
+    @cached_property
+    def _margin(self) -> int:
+        return int(np.ceil(np.abs(self.camera.shake).max()))
+
+    @cached_property
+    def _ground(self) -> NDArray[np.uint8]:
+        return draw.ground(self.scene, self.camera, self._margin, np.random.default_rng((self.seed, 1)))
+
+    @cached_property
+    def _sprites(self) -> dict[Actor, draw.Sprite]:
+        rng = np.random.default_rng((self.seed, 2))
+        density = draw.SUPERSAMPLING * float(self.camera.scale.max())
+        return {actor: draw.sprite(actor.look, density, rng) for actor in self.scene.targets + self.scene.props}
+
+
+def simulate(
+    name: str,
+    *,
+    seed: int = 0,
+    fps: float | None = None,
+    size: tuple[int, int] | None = None,
+    noise: float = 2.0,
+    shake: float = 0.0,
+    light_steps: int = 0,
+) -> Clip:
+    """A clip of the scenario `name`: crossing, crossing-45, nine or junction.
+
+    seed         of everything random; the same seed gives the same frames
+    fps          frames/s; None: the scenario's own. Motion per second stays the same
+    size         (width, height) px; None: the scenario's own. The scene is scaled, and the truth with it
+    noise        sensor noise, standard deviation in grey levels
+    shake        of the camera, standard deviation of the displacement in x and in y, px
+    light_steps  sudden changes of the exposure
+
+    Raises ConfigError for an unknown name or a value out of range.
+    """
+    _check(name, fps, size, noise, shake, light_steps)
+    scene_rng, camera_rng = np.random.default_rng(seed).spawn(2)
+    scene = SCENARIOS[name](scene_rng)
+    times = scene.times(fps)
+    view = camera(
+        scene.size, size or scene.size, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps
+    )
+    return Clip(scene, view, scene.fps if fps is None else fps, times, seed)

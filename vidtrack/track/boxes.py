@@ -1,0 +1,41 @@
+"""Box arithmetic: boxes are left, top, width, height."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vidtrack.scan import Floats, Ints
+
+
+def absolute(box: Floats, xy: Floats) -> Floats:
+    """(N, 4) boxes relative to their points (N, 2), placed in the picture."""
+    return np.column_stack([box[:, :2] + xy[:, :2], box[:, 2:]])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
+    """For each inner box (T, 4) the outer box (M, 4) that covers the largest share of it: index or -1, share.
+
+    The outer boxes are swept in the order of their left edges.
+    """
+    index, share = np.full(len(inner), -1), np.zeros(len(inner))
+    order = np.argsort(outer[:, 0])
+    left = outer[order, 0]
+    widest = 0.0
+    for j in range(len(outer)):
+        widest = max(widest, outer[j, 2])
+    for t in range(len(inner)):
+        area = inner[t, 2] * inner[t, 3]
+        if not area > 0:
+            continue
+        right, bottom = inner[t, 0] + inner[t, 2], inner[t, 1] + inner[t, 3]
+        for k in range(np.searchsorted(left, inner[t, 0] - widest), len(left)):
+            j = order[k]
+            if left[k] >= right:
+                break
+            wide = min(right, outer[j, 0] + outer[j, 2]) - max(inner[t, 0], outer[j, 0])
+            high = min(bottom, outer[j, 1] + outer[j, 3]) - max(inner[t, 1], outer[j, 1])
+            if wide > 0 and high > 0 and wide * high > share[t] * area:
+                index[t], share[t] = j, wide * high / area
+    return index, share

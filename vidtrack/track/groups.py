@@ -1,0 +1,103 @@
+"""Merged blobs: several tracks that share one measurement stay several tracks.
+
+A confirmed track that got no measurement of its own, but whose predicted box lies on a blob, lives on that
+blob together with whoever else is on it. The blob's centroid belongs to none of them; its edges do: the left
+edge is that of the leftmost member, and so on. Each member is updated by the edges it can claim and otherwise
+follows its own motion, so that it still knows who it is when the blob splits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Floats, Ints
+from vidtrack.track.boxes import best_cover
+
+UNKNOWN = 1e8
+"""Variance of a coordinate that no edge tells about."""
+
+
+@dataclass(frozen=True, slots=True)
+class Groups:
+    """How tracks share blobs.
+
+    cover  share of a track's predicted box that a blob must cover to carry it
+    edge   standard deviation of a blob's edge, as a share of the member's box side
+    gate   standard deviations within which an edge is accepted as the member's
+    """
+
+    cover: float = 0.5
+    edge: float = 0.1
+    gate: float = 3.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cover <= 1:
+            raise ConfigError(f"group cover is {self.cover}; it must lie in 0..1")
+
+    def blob_of(self, predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Floats) -> Ints:
+        """(T,) the blob each track shares or leans on by its edges; -1 for those updated by a centroid, or not at all.
+
+        predicted (T, 4) boxes, taken (T,) measurement of each track or -1, blobs (M, 4) boxes.
+        """
+        shared = np.full(len(predicted), -1)
+        orphans = np.flatnonzero(confirmed & (taken < 0))
+        if not len(orphans) or not len(blobs):
+            return shared
+        blob, share = best_cover(predicted[orphans], blobs)
+        blob[share < self.cover] = -1
+        shared[orphans] = blob
+        hosts = confirmed & (taken >= 0) & np.isin(taken, blob[blob >= 0])
+        shared[hosts] = taken[hosts]
+        return shared
+
+    def measure(self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats) -> tuple[Floats, Floats, Ints]:
+        """Position (G, 2), variances (G, 2) and count of own edges (G,) for tracks on blobs.
+
+        predicted (G, 4) boxes, box (G, 4) relative to the position, var (G, 2) predicted position variances,
+        blob (G,) index of each track's blob.
+        """
+        return _from_edges(predicted, box, var, blob, blobs, self.edge, self.gate)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _from_edges(
+    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, edge: float, gate: float
+) -> tuple[Floats, Floats, Ints]:
+    """Each member's position from the four edges of its blob.
+
+    A member stands at a known offset from the group's extreme edge (zero for the extreme member itself); the
+    farther inside, the less the edge says: sigma^2 = (edge * side)^2 + offset^2.
+    """
+    count = len(predicted)
+    z, R = np.zeros((count, 2)), np.full((count, 2), UNKNOWN)
+    own = np.zeros(count, np.int64)
+    for i in range(count):
+        for axis in range(2):
+            weight, total = 0.0, 0.0
+            noise = (edge * predicted[i, 2 + axis]) ** 2 + 1.0
+            for far in range(2):  # near: left or top, far: right or bottom
+                sign = 1.0 - 2.0 * far
+                mine = predicted[i, axis] + far * predicted[i, 2 + axis]
+                extreme, rival = mine, np.inf
+                for k in range(count):
+                    if blob[k] == blob[i] and k != i:
+                        other = predicted[k, axis] + far * predicted[k, 2 + axis]
+                        extreme = min(sign * extreme, sign * other) * sign
+                        rival = min(rival, sign * (other - mine))
+                seen = blobs[blob[i], axis] + far * blobs[blob[i], 2 + axis]
+                offset = mine - extreme
+                if abs(seen - extreme) > gate * np.sqrt(noise + var[i, axis]):
+                    continue
+                variance = noise + offset * offset
+                total += (seen + offset - far * box[i, 2 + axis] - box[i, axis]) / variance
+                weight += 1.0 / variance
+                own[i] += rival > np.sqrt(noise)
+            if weight > 0:
+                z[i, axis], R[i, axis] = total / weight, 1.0 / weight
+            else:
+                z[i, axis] = predicted[i, axis] - box[i, axis]
+    return z, R, own

@@ -1,0 +1,74 @@
+"""The life of a track: when it is believed, and when it is given up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Floats, Status
+from vidtrack.track.register import Register
+
+Mask = np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class LifeCycle:
+    """M-of-N confirmation and deletion by time.
+
+    confirm_hits, confirm_window   M hits within the last N scans confirm, the initiating hit counted
+                                   (the P(Bin(N-1, p) >= M-1) convention of SPEC 001); more than N - M
+                                   misses among them end a tentative track
+    confirm_s       s; a track is not confirmed before this age, so that a high scan rate does not confirm noise
+    confirm_travel  object sizes; nor before it has moved this far (swaying trees do not travel)
+    coast_s         s; a confirmed track is deleted this long after its last evidence; None: by misses only
+    coast_scans     or after this many scans in a row without evidence; None: by time only
+    """
+
+    confirm_hits: int = 3
+    confirm_window: int = 4
+    confirm_s: float = 0.0
+    confirm_travel: float = 0.0
+    coast_s: float | None = None
+    coast_scans: int | None = 5
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.confirm_hits <= self.confirm_window <= 63:
+            raise ConfigError(
+                f"M-of-N is {self.confirm_hits} of {self.confirm_window}; it needs 1 <= hits <= window <= 63"
+            )
+        if self.coast_s is None and self.coast_scans is None:
+            raise ConfigError("tracks would never be deleted: give coast_s or coast_scans")
+        if self.coast_scans is not None and not 0 <= self.coast_scans < 62:
+            raise ConfigError(f"coast_scans is {self.coast_scans}; it must lie in 0..61")
+
+    def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
+        """(T,) tentative rows that now deserve belief. xy (T, d) positions, size (T,) of the objects."""
+        enough = self._hits(register) >= self.confirm_hits
+        old = t - register.born_s >= self.confirm_s * (1 - 1e-9)
+        travelled = np.linalg.norm(xy - register.start, axis=1) >= self.confirm_travel * size
+        return (register.status == Status.TENTATIVE) & enough & old & travelled
+
+    def hopeless(self, register: Register) -> Mask:
+        """(T,) tentative rows with more misses in their window than M-of-N allows."""
+        scans = np.minimum(_bit_length(register.history), self.confirm_window)
+        misses = scans - self._hits(register)
+        return (register.status == Status.TENTATIVE) & (misses > self.confirm_window - self.confirm_hits)
+
+    def lost(self, register: Register, t: float) -> Mask:
+        """(T,) confirmed rows without evidence for too long."""
+        gone = np.zeros(len(register), bool)
+        if self.coast_s is not None:
+            gone |= t - register.updated_s > self.coast_s
+        if self.coast_scans is not None:
+            gone |= register.history & ((1 << (self.coast_scans + 1)) - 1) == 0
+        return (register.status != Status.TENTATIVE) & gone
+
+    def _hits(self, register: Register) -> np.ndarray:
+        return np.bitwise_count(register.history & ((1 << self.confirm_window) - 1)).astype(np.int64)
+
+
+def _bit_length(history: np.ndarray) -> np.ndarray:
+    """Scans since birth: the birth itself is the highest bit set."""
+    return np.frexp(history.astype(float))[1].astype(np.int64)

@@ -1,0 +1,196 @@
+"""Counting lines: a track counts once per line and direction, however it jitters on the line."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Floats, Ints, Status, Tracks
+
+_log = logging.getLogger(__name__)
+
+_MARGIN = 0.15
+"""Share of the vehicle's extent across the line that its position must pass the line by."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A named segment from (x1, y1) to (x2, y2) in source pixels."""
+
+    name: str
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+
+    @property
+    def directions(self) -> tuple[str, str]:
+        """Names of crossing against and along the normal (-dy, dx): the way in the picture that is nearest.
+
+        A line that lies flatter than 45 degrees is crossed "up" or "down", a steeper one "left" or "right",
+        whichever way it was drawn.
+        """
+        dx, dy = self.x2 - self.x1, self.y2 - self.y1
+        if abs(dx) > abs(dy):
+            return ("up", "down") if dx > 0 else ("down", "up")
+        return ("right", "left") if dy > 0 else ("left", "right")
+
+
+def parse_line(text: str) -> Line:
+    """A line from "NAME:x1,y1,x2,y2". Raises ConfigError."""
+    name, _, numbers = text.rpartition(":")
+    usage = f"line {text!r}: write it as NAME:x1,y1,x2,y2 in pixels, for example north:0,120,320,120"
+    try:
+        x1, y1, x2, y2 = (float(number) for number in numbers.split(","))
+    except ValueError:
+        raise ConfigError(usage) from None
+    if not name or "," in name or not np.isfinite([x1, y1, x2, y2]).all():
+        raise ConfigError(usage)
+    if (x1, y1) == (x2, y2):
+        raise ConfigError(f"line {text!r} has no length: its two ends are the same point")
+    return Line(name, x1, y1, x2, y2)
+
+
+def parse_lines(texts: Sequence[str], width: int, height: int) -> list[Line]:
+    """Lines from "NAME:x1,y1,x2,y2"; warns of those that no vehicle can cross in a width x height picture.
+
+    Raises ConfigError for a malformed line or a name that is used twice.
+    """
+    lines = [parse_line(text) for text in texts]
+    for name, uses in Counter(line.name for line in lines).items():
+        if uses > 1:
+            raise ConfigError(f"{uses} lines are called {name!r}; give each its own name")
+    for line in lines:
+        xs, ys = sorted((line.x1, line.x2)), sorted((line.y1, line.y2))
+        if xs[1] <= 0 or xs[0] >= width - 1 or ys[1] <= 0 or ys[0] >= height - 1:
+            _log.warning("line %s lies outside the %d x %d picture: nothing can cross it", line.name, width, height)
+    return lines
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """A counted crossing: interpolated time, first frame on the new side."""
+
+    time_s: float
+    frame: int
+    line: str
+    direction: str
+    track_id: int
+
+
+class _State:
+    """What is remembered of T tracks and L lines; (T,) and (T, L) arrays."""
+
+    def __init__(self, ids: Ints, xy: Floats, distance: Floats, t: float, frame: int) -> None:
+        shape = distance.shape
+        self.id = ids
+        self.xy = xy
+        self.confirmed = np.zeros(len(ids), bool)
+        self.distance = distance  # signed, from the line
+        self.side = distance >= 0  # where the track clearly was
+        self.counted = np.zeros((*shape, 2), bool)
+        self.seen = np.zeros(shape, bool)  # measured since the last change of sign
+        self.inside = np.zeros(shape, bool)  # that change was between the segment's ends
+        self.time_s = np.full(shape, t)
+        self.frame = np.full(shape, frame)
+
+    def replace(self, rows: Ints, old: _State, old_rows: Ints) -> None:
+        for name, values in vars(old).items():
+            getattr(self, name)[rows] = values[old_rows]
+
+
+class LineCounter:
+    """Counts tracks over lines by their position (the centroid, not a corner of the box).
+
+    The position must pass the line by a margin relative to the vehicle's extent, or be seen last beyond the
+    line (a line near the border). Tentative tracks count once confirmed, and a track that coasted over the
+    line once it is found again, both at the time they crossed, interpolated between the scans.
+    """
+
+    def __init__(self, lines: Sequence[Line]) -> None:
+        self.lines = list(lines)
+        self._start = np.array([[line.x1, line.y1] for line in lines]).reshape(-1, 2)
+        along = np.array([[line.x2, line.y2] for line in lines]).reshape(-1, 2) - self._start
+        self._length = np.linalg.norm(along, axis=1)
+        self._along = along / self._length[:, None]
+        self._normal = np.column_stack([-self._along[:, 1], self._along[:, 0]])
+        self._state = _State(np.empty(0, np.int64), np.empty((0, 2)), np.empty((0, len(lines))), 0.0, 0)
+        self._t = 0.0
+        self._totals: Counter[tuple[str, str]] = Counter()
+
+    def totals(self) -> dict[str, dict[str, int]]:
+        """Counts so far, by line and direction."""
+        return {line.name: {d: self._totals[line.name, d] for d in sorted(line.directions)} for line in self.lines}
+
+    def step(self, frame: int, tracks: Tracks) -> list[Crossing]:
+        """Crossings that this scan decided, in order of time."""
+        old = self._state
+        xy = tracks.xy
+        distance = (xy[:, None] - self._start).reshape(len(xy), -1, 2)
+        distance = np.einsum("tld,ld->tl", distance, self._normal)
+        now = _State(tracks.id, xy, distance, tracks.t, frame)
+        _, rows, old_rows = np.intersect1d(tracks.id, old.id, assume_unique=True, return_indices=True)
+        now.replace(rows, old, old_rows)
+        self._note_sign_changes(now, xy, distance, tracks.t, frame)
+        now.xy, now.distance = xy, distance
+        now.confirmed |= tracks.status != Status.TENTATIVE
+        now.seen |= ((tracks.measurement >= 0) | (tracks.status == Status.MERGED))[:, None]
+        extent = np.abs(self._normal) @ np.nan_to_num(tracks.box[:, 2:]).T
+        clear = np.abs(distance) > _MARGIN * extent.T
+        crossings = self._collect(now, clear) + self._collect_gone(old, tracks.id)
+        self._state, self._t = now, tracks.t
+        return sorted(crossings, key=lambda crossing: crossing.time_s)
+
+    def close(self) -> list[Crossing]:
+        """Crossings of tracks that were last seen beyond a line when the video ended."""
+        return self._collect_gone(self._state, np.empty(0, np.int64))
+
+    def _note_sign_changes(self, now: _State, xy: Floats, distance: Floats, t: float, frame: int) -> None:
+        changed = (distance >= 0) != (now.distance >= 0)
+        if not changed.any():
+            return
+        row, line = np.nonzero(changed)
+        before, after = now.distance[row, line], distance[row, line]
+        share = before / (before - after)
+        point = now.xy[row] + share[:, None] * (xy[row] - now.xy[row])
+        along = np.einsum("cd,cd->c", point - self._start[line], self._along[line])
+        now.inside[row, line] = (along >= 0) & (along <= self._length[line])
+        now.time_s[row, line] = self._t + share * (t - self._t)
+        now.frame[row, line] = frame
+        now.seen[row, line] = False
+
+    def _collect_gone(self, state: _State, alive: Ints) -> list[Crossing]:
+        gone = ~np.isin(state.id, alive)
+        if not gone.any():
+            return []
+        return self._collect(state, np.repeat(gone[:, None], len(self.lines), axis=1))
+
+    def _collect(self, state: _State, clear: NDArray[np.bool_]) -> list[Crossing]:
+        """Crossings among the (track, line) pairs whose side is clear."""
+        side = state.distance >= 0
+        crossed = clear & (side != state.side) & state.seen & state.confirmed[:, None]
+        crossings = []
+        for row, line in np.argwhere(crossed & state.inside):
+            along_normal = int(side[row, line])
+            if state.counted[row, line, along_normal]:
+                continue
+            state.counted[row, line, along_normal] = True
+            direction = self.lines[line].directions[along_normal]
+            self._totals[self.lines[line].name, direction] += 1
+            crossings.append(
+                Crossing(
+                    float(state.time_s[row, line]),
+                    int(state.frame[row, line]),
+                    self.lines[line].name,
+                    direction,
+                    int(state.id[row]),
+                )
+            )
+        state.side = np.where(crossed, side, state.side)
+        return crossings

@@ -1,0 +1,93 @@
+"""What the road looks like without traffic, and how it is learnt: luminance, its noise, and chroma."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from vidtrack.video.background.picture import Picture
+
+FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
+_SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
+_QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
+
+
+class Scene(NamedTuple):
+    """Running averages, float32: luma, noise (h, w); cb, cr at half size; seconds each pixel has been covered."""
+
+    luma: NDArray[np.float32]
+    cb: NDArray[np.float32]
+    cr: NDArray[np.float32]
+    noise: NDArray[np.float32]
+    covered_s: NDArray[np.float32]
+
+
+def start(picture: Picture) -> Scene:
+    """The first frame is the scene: averaging for seconds would smear the traffic into it."""
+    luma, cb, cr = (plane.astype(np.float32) for plane in picture)
+    return Scene(luma, cb, cr, np.full(luma.shape, FRESH_NOISE), np.zeros(luma.shape, np.float32))
+
+
+@numba.njit(cache=True, nogil=True)
+def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no-untyped-def]
+    """One step of the running averages where covered (h, w) uint8 is 0; elsewhere the seconds are counted.
+
+    luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
+    """
+    h, w = covered.shape
+    coloured = len(picture.cb) > 0
+    half = np.empty((w + 1) // 2, np.uint8)
+    for y in range(h):
+        _learn_noise(picture.luma[y], scene.luma[y], scene.noise[y], covered[y], noise_weight)
+        _learn_mean(picture.luma[y], scene.luma[y], covered[y], weight)
+        _count(covered[y], scene.covered_s[y], dt)
+        if coloured and y % 2 == 0:
+            _every_second(covered[y], half)
+            _learn_mean(picture.cb[y // 2], scene.cb[y // 2], half, weight)
+            _learn_mean(picture.cr[y // 2], scene.cr[y // 2], half, weight)
+
+
+@numba.njit(cache=True, nogil=True)
+def adopt(picture, scene, row, start, stop):  # type: ignore[no-untyped-def]
+    """Take the picture for the scene on the runs (row, start, stop), as if it had just begun there."""
+    coloured = len(picture.cb) > 0
+    for k in range(len(row)):
+        y = row[k]
+        for x in range(start[k], stop[k]):
+            scene.luma[y, x] = picture.luma[y, x]
+            scene.noise[y, x] = FRESH_NOISE
+            scene.covered_s[y, x] = np.float32(0)
+            if coloured:
+                scene.cb[y // 2, x // 2] = picture.cb[y // 2, x // 2]
+                scene.cr[y // 2, x // 2] = picture.cr[y // 2, x // 2]
+
+
+@numba.njit(cache=True, nogil=True)
+def _learn_noise(luma, scene, noise, covered, weight):  # type: ignore[no-untyped-def]
+    for x in range(len(noise)):
+        v = noise[x]
+        deviation = min(abs(np.float32(luma[x]) - scene[x]), _SURPRISE * max(v, _QUIET))
+        w = weight if covered[x] == 0 else np.float32(0)
+        noise[x] = v + w * (deviation - v)
+
+
+@numba.njit(cache=True, nogil=True)
+def _learn_mean(plane, scene, covered, weight):  # type: ignore[no-untyped-def]
+    for x in range(len(scene)):
+        w = weight if covered[x] == 0 else np.float32(0)
+        scene[x] += w * (np.float32(plane[x]) - scene[x])
+
+
+@numba.njit(cache=True, nogil=True)
+def _count(covered, seconds, dt):  # type: ignore[no-untyped-def]
+    for x in range(len(seconds)):
+        seconds[x] = seconds[x] + dt if covered[x] != 0 else np.float32(0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _every_second(row, half):  # type: ignore[no-untyped-def]
+    for x in range(len(half)):
+        half[x] = row[2 * x]

@@ -1,0 +1,98 @@
+"""Trustworthy time: stamps that always increase, and a rate that is not the header's word alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+
+FALLBACK_FPS = 25.0
+LOWEST_FPS, HIGHEST_FPS = 0.001, 480.0  # headers with 600, 1000 or 90000 state a time base, not a camera
+AGREEMENT = 0.1  # relative; a header's rate is kept within this of the measured one, because it is exact (30000/1001)
+LONGEST_WAIT = 8  # items held back for the next sane stamp: bounds memory where there are no stamps at all
+
+
+def stamp_rate(stamps_s: Sequence[float]) -> float | None:
+    """Typical rate [1/s] of timestamps in any order; None if they are all the same.
+
+    One over the mean of the intervals near the median: gaps do not count, and the rounding of a
+    container that stores milliseconds (33, 33, 34) averages out.
+    """
+    intervals = np.diff(np.unique(np.asarray(stamps_s, dtype=float)))
+    if intervals.size == 0:
+        return None
+    median = np.median(intervals)
+    return float(1 / intervals[np.abs(intervals - median) <= median / 2].mean())
+
+
+def is_plausible(fps: float) -> bool:
+    """Whether a camera may have this rate [1/s]."""
+    return LOWEST_FPS <= fps <= HIGHEST_FPS
+
+
+def nominal_rate(header: float, measured: float | None) -> float | None:
+    """The rate [1/s] to trust: the measured one, in the header's form where they agree; None if neither can be.
+
+    header     what the file states, 0 for nothing
+    measured   the rate of the timestamps, None if they do not tell
+    """
+    if measured is None or abs(header / measured - 1) <= AGREEMENT:
+        return header if is_plausible(header) else None
+    return measured if is_plausible(measured) else None
+
+
+def increasing_times(stamped: Iterable[tuple[float | None, T]], period_s: float) -> Iterator[tuple[float, T]]:
+    """Give every item a time [s], strictly above the one before; the first is 0.
+
+    stamped    (timestamp [s] or None, item) in the order of presentation
+    period_s   nominal time between two items
+
+    A stamp is sane if it lies above all before it. Of two such neighbours in the wrong order the first
+    is at fault: a lone jump ahead must not spoil what follows. Sane stamps are kept, and with them gaps
+    and variable rates. The items between two sane stamps follow the earlier one at the nominal period,
+    or evenly where there is less room. If no sane stamp comes for LONGEST_WAIT items, time goes on at
+    the nominal rate.
+    """
+    origin: float | None = None  # the stamp of time 0
+    last = -period_s
+    waiting: list[T] = []
+    for stamp, following, item in _with_following(stamped):
+        floor = -math.inf if origin is None else origin + last
+        if stamp is not None and _is_sane(stamp, following, floor):
+            if origin is None:
+                origin = stamp - last - period_s * (len(waiting) + 1)
+            now = stamp - origin
+            yield from _spaced(waiting, last, min(period_s, (now - last) / (len(waiting) + 1)))
+            yield now, item
+            last, waiting = now, []
+        else:
+            waiting.append(item)
+            if len(waiting) == LONGEST_WAIT:
+                yield from _spaced(waiting, last, period_s)
+                last, waiting = last + period_s * len(waiting), []
+    yield from _spaced(waiting, last, period_s)
+
+
+def _is_sane(stamp: float, following: float | None, floor: float) -> bool:
+    return stamp > floor and not (following is not None and floor < following < stamp)
+
+
+def _spaced(items: list[T], last: float, step: float) -> Iterator[tuple[float, T]]:
+    return ((last + step * count, item) for count, item in enumerate(items, 1))
+
+
+def _with_following(stamped: Iterable[tuple[float | None, T]]) -> Iterator[tuple[float | None, float | None, T]]:
+    """(stamp, the next item's stamp, item)."""
+    rest = iter(stamped)
+    for stamp, item in rest:
+        break
+    else:
+        return
+    for following, after in rest:
+        yield stamp, following, item
+        stamp, item = following, after
+    yield stamp, None, item

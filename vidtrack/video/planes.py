@@ -1,0 +1,54 @@
+"""Decoded pictures as luminance and half-size chroma planes, without a copy where the decoder's layout allows."""
+
+from __future__ import annotations
+
+import av
+import numpy as np
+
+from vidtrack.video.frame import Frame, Image
+
+_FULL, _LIMITED = 2, 1  # AVCOL_RANGE_JPEG and AVCOL_RANGE_MPEG
+_YUV = frozenset(f"yuv{letter}{ratio}p" for letter in ("", "j") for ratio in (420, 422, 440, 444))
+
+
+def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
+    """The planes of a decoded picture.
+
+    Planar 8-bit YUV and grey are read-only views of the decoder's memory whose rows may be padded; finer
+    chroma is thinned to half size by stride. Everything else (RGB, palettes, more than 8 bits, packed
+    layouts) is converted: RGB to full-range BT.601, which `Frame.bgr` undoes; YUV keeps its range.
+    """
+    if _is_grey(picture):
+        if picture.format.name != "gray":
+            picture = picture.reformat(format="gray")
+        return Frame(index, time_s, _plane(picture, 0), full_range=picture.color_range != _LIMITED)
+    if picture.format.name not in _YUV or any(plane.line_size < 0 for plane in picture.planes):
+        picture = _converted(picture)
+    height, width = (picture.height + 1) // 2, (picture.width + 1) // 2
+    u, v = (_thinned(_plane(picture, channel), height, width) for channel in (1, 2))
+    full_range = picture.color_range == _FULL or picture.format.name.startswith("yuvj")
+    return Frame(index, time_s, _plane(picture, 0), u, v, full_range)
+
+
+def _is_grey(picture: av.VideoFrame) -> bool:
+    kind = picture.format
+    return not (kind.is_rgb or kind.has_palette or any(part.is_chroma for part in kind.components))
+
+
+def _converted(picture: av.VideoFrame) -> av.VideoFrame:
+    if any(part.is_chroma for part in picture.format.components):
+        return picture.reformat(format="yuv420p")
+    return picture.reformat(format="yuv420p", dst_colorspace="ITU601", dst_color_range="JPEG")
+
+
+def _plane(picture: av.VideoFrame, channel: int) -> Image:
+    """(h, w) view of one plane; it keeps the decoder's memory alive."""
+    plane = picture.planes[channel]
+    rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
+    rows.flags.writeable = False  # the decoder predicts later pictures from this memory
+    return rows
+
+
+def _thinned(plane: Image, height: int, width: int) -> Image:
+    """Every second row or column where the plane has more than (height, width)."""
+    return plane[:: 2 if plane.shape[0] > height else 1, :: 2 if plane.shape[1] > width else 1]
