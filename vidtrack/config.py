@@ -101,6 +101,8 @@ class BlobSettings(_Group):
     """share of the picture's area; smaller blobs are left out"""
     join_overlap: float = Field(0.7, gt=0, le=1)
     """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
+    join_gap: float = Field(0.05, ge=0, le=1)
+    """share of that box's longer side; pieces farther apart are not joined"""
     jitter_px: float = Field(0.5, gt=0)
     """pixels of the processed picture; standard deviation of a small blob's centroid"""
     jitter_share: float = Field(0.05, ge=0, le=1)
@@ -108,7 +110,40 @@ class BlobSettings(_Group):
 
 
 class TrackerSettings(_Group):
-    """Placeholder until the tracker defines its settings."""
+    """Object size is the longer side of a vehicle's box."""
+
+    method: Literal["nn", "gnn"] = "gnn"
+    """association: nn takes each track's nearest measurement, gnn the best exclusive assignment"""
+    distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"
+    """confidence region with the full covariance, with the variances per axis only (eq. 8), or plain distance"""
+    gate_probability: float = Field(0.999, ge=0, le=1)
+    """share of a vehicle's own measurements that fall inside its gate"""
+    euclidean_radius_px: float = Field(50.0, gt=0)
+    """px; gate of the euclidean distance"""
+    accel: float = Field(2.0, gt=0)
+    """object sizes/s^2; standard deviation of the acceleration along the heading"""
+    cross: float = Field(0.7, gt=0)
+    """object sizes/s^2; the same across the heading"""
+    hold_s: float = Field(0.5, gt=0)
+    """s; correlation time of the acceleration"""
+    speed: float = Field(4.0, gt=0)
+    """object sizes/s; standard deviation of a new vehicle's unknown velocity"""
+    confirm_hits: int = Field(3, ge=1, le=63)
+    """M: hits within the window that confirm a track, the first one counted"""
+    confirm_window: int = Field(4, ge=1, le=63)
+    """N: scans of the window"""
+    confirm_s: float = Field(0.2, ge=0)
+    """s; no track is confirmed before this age"""
+    confirm_travel: float = Field(0.3, ge=0)
+    """object sizes; nor before it has moved this far from where it began"""
+    coast_s: float = Field(1.0, ge=0)
+    """s; a track is given up this long after its last evidence"""
+    merged_blobs: bool = True
+    """vehicles that share one blob stay several tracks"""
+    group_cover: float = Field(0.5, gt=0, le=1)
+    """share of a vehicle's predicted box that a blob must cover to carry it"""
+    box_s: float = Field(0.2, gt=0)
+    """s; time constant with which a track's box follows the blobs' boxes"""
 
 
 class OutputSettings(_Group):

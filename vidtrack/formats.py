@@ -83,7 +83,7 @@ def read(path: str | Path) -> Table:
     """
     path = Path(path)
     if path.is_dir():
-        return read(find_table(path, "mot.txt", "tracks.parquet", "tracks.csv"))
+        return read(_first_of(path, "mot.txt", "tracks.parquet", "tracks.csv"))
     if not path.is_file():
         raise SourceError(f"cannot open {path}: no such file or run folder")
     with path.open("rb") as file:
@@ -95,8 +95,12 @@ def read(path: str | Path) -> Table:
     return read_mot(path) if _is_number(start.replace(b",", b" ").split()[0]) else read_csv(path)
 
 
-def find_table(folder: Path, *names: str) -> Path:
-    """The first of the named files that a run folder holds. Raises SourceError when it holds none."""
+def read_states(folder: str | Path) -> Table:
+    """The table of a run folder that has covariances and NIS if any has: `read` in the opposite order."""
+    return read(_first_of(Path(folder), "tracks.parquet", "tracks.csv", "mot.txt"))
+
+
+def _first_of(folder: Path, *names: str) -> Path:
     for name in names:
         if (folder / name).is_file():
             return folder / name
@@ -131,7 +135,9 @@ def read_mot(path: str | Path) -> Table:
     frame = _whole("frame", values[:, 0], place)
     identity = _whole("id", values[:, 1], place)
     _refuse(frame < 1, "frame", frame, "MOT frames count from 1", place)
-    _refuse((values[:, 4:6] < 0).any(axis=1), "width, height", values[:, 4:6], "neither may be negative", place)
+    _refuse(
+        np.minimum(values[:, 4], values[:, 5]) < 0, "width, height", values[:, 4:6], "neither may be negative", place
+    )
     _refuse_repeated(frame, identity, place)
     return box_table(frame - 1, identity, values[:, 2:6], values[:, 6])
 
@@ -214,7 +220,7 @@ def _from_columns(columns: pa.Table, path: str, place: Place) -> Table:
         position, unit, xy = list(BOX_COLUMNS), "px", box[:, :2] + box[:, 2:] / 2
     else:
         raise FormatError(f"{path} has no positions: {_nearest('x_px', names)}; x_px,y_px or x_m,y_m or a box needed")
-    _refuse(~np.isfinite(xy).all(axis=1), ", ".join(position), xy, "must be finite", place)
+    _refuse(~np.isfinite(xy.sum(axis=1)), ", ".join(position), xy, "must be finite", place)
 
     sigma = SIGMA_COLUMNS[unit][: xy.shape[1]]
     cov = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import colorsys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -49,12 +50,12 @@ class Pen:
     def box(self, box: Floats, ink: Colour, dashed: bool = False) -> None:
         """A rectangle left, top, width, height."""
         left, top, width, height = box
-        corners = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]]) + (left, top)
+        corners = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]]) + np.array([left, top])
         if not dashed:
             self.path(corners, ink)
             return
         dash = 5.0 * self.width
-        for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for a, b in pairwise(corners):
             ends = np.linspace(0, 1, 2 * max(1, round(np.hypot(*(b - a)) / dash / 2)) + 1)[:, None] * (b - a) + a
             for i in range(0, len(ends) - 1, 2):
                 self.path(ends[i : i + 2], ink)

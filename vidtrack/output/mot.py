@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from vidtrack.output.linefile import Every, LineFile, sort_rows
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Ints, Status
 
-_ID, _SEEN, _FRAME = 1, 7, 0
+_FRAME, _ID, _SEEN = 0, 1, 7
 
 
 class MotFile:
@@ -76,5 +75,8 @@ def settle_gaps(rows: Floats, alive: Ints) -> tuple[Floats, Floats]:
     return rows[sure], rows[~sure & np.isin(rows[:, _ID], alive)]
 
 
-def _lines(rows: Floats) -> Sequence[str]:
-    return ["%d,%d,%.2f,%.2f,%.2f,%.2f,%.3f,-1,-1,-1\n" % tuple(row) for row in rows[:, :7].tolist()]
+def _lines(rows: Floats) -> list[str]:
+    return [
+        f"{frame:.0f},{track:.0f},{left:.2f},{top:.2f},{width:.2f},{height:.2f},{conf:.3f},-1,-1,-1\n"
+        for frame, track, left, top, width, height, conf in rows[:, :7].tolist()
+    ]

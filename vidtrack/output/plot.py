@@ -74,17 +74,12 @@ class TrajectoryPlot:
 
     def _number(self, pen: Pen) -> None:
         """Each track's number at its end, moved down while it would cover another."""
-        taken: list[tuple[float, float, float, float]] = []
+        free = np.ones(self._layer.shape[:2], bool)
         for track_id, xy in sorted((self._ends | self._last).items()):
             width, height = pen.size(str(track_id))
-            x, y = xy * self._zoom
-            x = float(np.clip(x, 0, pen.picture.shape[1] - width))
-            y = float(np.clip(y, height, pen.picture.shape[0]))
-            for _ in range(20):
-                if not any(
-                    abs(x - a) < (width + w) / 2 + 1 and abs(y - b) < (height + h) / 2 + 1 for a, b, w, h in taken
-                ):
-                    break
-                y = y + height + 1 if y + height + 1 < pen.picture.shape[0] else y - 10 * height
-            taken.append((x, y, width, height))
+            x = int(np.clip(xy[0] * self._zoom, 0, max(0, free.shape[1] - width)))
+            y = int(np.clip(xy[1] * self._zoom, height, free.shape[0]))
+            while y < free.shape[0] and not free[y - height : y, x : x + width].all():
+                y += 2
+            free[y - height : y, x : x + width] = False
             pen.label(str(track_id), x, y, colour(track_id))

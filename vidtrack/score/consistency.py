@@ -57,7 +57,7 @@ def nees(result: Table, truth: Table, result_rows: Ints, truth_rows: Ints) -> Fl
     axes = min(result.xy.shape[1], truth.xy.shape[1])
     error = result.xy[result_rows, :axes] - truth.xy[truth_rows, :axes]
     cov = result.cov[result_rows, :axes, :axes]
-    usable = np.isfinite(cov).all(axis=(1, 2))
+    usable = np.isfinite(cov.sum(axis=(1, 2)))
     usable[usable] = np.linalg.eigvalsh(cov[usable])[:, 0] > 0
     weighted = np.linalg.solve(cov[usable], error[usable][..., None])[..., 0]
     value[usable] = np.einsum("ki,ki->k", error[usable], weighted)

@@ -28,7 +28,7 @@ def identity(matchup: Matchup, threshold: float = 0.5) -> Identity:
     Rows are shared when their similarity is at least `threshold`.
     """
     truth_id, result_id, which = matchup.identity_pairs()
-    shared = np.bincount(which[matchup.similarity >= threshold], minlength=len(truth_id))
+    shared = np.bincount(which[matchup.similarity >= threshold], minlength=len(truth_id)).astype(float)
     some = shared > 0
     best = assign(np.zeros(some.sum(), np.int64), truth_id[some], result_id[some], shared[some])
     idtp = int(shared[some][best].sum())

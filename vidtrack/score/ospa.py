@@ -75,8 +75,6 @@ def _assigned(matchup: Matchup, cutoff: float, order: float) -> tuple[Floats, In
     near = matchup.distance < cutoff
     frame, power = matchup.pair_frame[near], matchup.distance[near] ** order
     chosen = assign(frame, matchup.truth[near], matchup.result[near], cutoff**order - power)
-    frames = len(matchup.truth_count)
-    return (
-        np.bincount(frame[chosen], power[chosen], minlength=frames),
-        np.bincount(frame[chosen], minlength=frames),
-    )
+    frame, frames = frame[chosen], len(matchup.truth_count)
+    pairs = np.bincount(frame, minlength=frames)
+    return np.bincount(frame, power[chosen], minlength=frames).astype(float), pairs.astype(np.int64)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ def pool(runs: Iterable[tuple[Table, Table]]) -> tuple[Table, Table]:
     The scores of the two are those of TrackEval's combined sequences: every object counts once,
     whatever the length of its sequence.
     """
-    results, truths = [], []
+    results: list[Table] = []
+    truths: list[Table] = []
     frame = identity = 0
     for pair in runs:
         for tables, table in zip((results, truths), pair, strict=True):
@@ -34,4 +36,5 @@ def _stack(tables: Sequence[Table]) -> Table:
         columns = [getattr(table, name) for table in tables]
         return None if any(values is None for values in columns) else np.concatenate(columns)
 
-    return replace(tables[0], **{name: column(name) for name in ("frame", "id", "xy", "box", "conf", "cov", "nis")})
+    columns: dict[str, Any] = {name: column(name) for name in ("frame", "id", "xy", "box", "conf", "cov", "nis")}
+    return replace(tables[0], **columns)

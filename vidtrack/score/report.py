@@ -46,23 +46,26 @@ def evaluate(
         if (table.id < 0).any():
             raise FormatError(f"the {name} has rows without identity (id -1); give tracks, not detections")
 
-    states = result if states is None else states
-    points = points or result.box is None or truth.box is None
-    if max_distance is None:
-        max_distance = MAX_DISTANCE[truth.unit]
     if not 0 < iou <= 1:
         raise ConfigError(f"iou is {iou}; it must be above 0 and at most 1")
+    if max_distance is None:
+        max_distance = MAX_DISTANCE[truth.unit]
     if not max_distance > 0:
         raise ConfigError(f"max_distance is {max_distance}; it must be above 0")
+
+    points = points or result.box is None or truth.box is None
     if cutoff is None:
         cutoff = max_distance if points else 1.0
+    matched_by = f"distance up to {max_distance:g} {truth.unit}" if points else f"IoU from {iou:g}"
+    threshold = POINT_THRESHOLD if points else iou
 
     def match(table: Table) -> Matchup:
         return match_points(table, truth, max_distance, cutoff) if points else match_boxes(table, truth)
 
-    matchup, threshold = match(result), POINT_THRESHOLD if points else iou
+    matchup = match(result)
+    states = result if states is None else states
     return {
-        "matched_by": f"distance up to {max_distance:g} {truth.unit}" if points else f"IoU from {iou:g}",
+        "matched_by": matched_by,
         **_counts(matchup),
         **asdict(clear(matchup, threshold)),
         **asdict(identity(matchup, threshold)),

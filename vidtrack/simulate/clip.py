@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats
 from vidtrack.simulate import draw
-from vidtrack.simulate.camera import NOISE_MARGIN, Camera, camera
+from vidtrack.simulate.camera import Camera, camera
 from vidtrack.simulate.crossing import crossing, crossing_45
 from vidtrack.simulate.junction import junction
 from vidtrack.simulate.nine import nine
@@ -133,3 +133,20 @@ def simulate(
         scene.size, size or scene.size, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps
     )
     return Clip(scene, view, scene.fps if fps is None else fps, times, seed)
+
+
+def _check(
+    name: str, fps: float | None, size: tuple[int, int] | None, noise: float, shake: float, light_steps: int
+) -> None:
+    if name not in SCENARIOS:
+        near = difflib.get_close_matches(name, SCENARIOS, n=1) or [", ".join(SCENARIOS)]
+        raise ConfigError(f"no scenario is called {name!r}; did you mean {near[0]}?")
+    if fps is not None and not 1 <= fps <= 1000:
+        raise ConfigError(f"fps is {fps}; it must be 1 to 1000 frames/s")
+    if size is not None and not (32 <= min(size) and max(size) <= 8192):
+        raise ConfigError(f"size is {size[0]}x{size[1]}; each side must be 32 to 8192 px")
+    for what, value in (("noise", noise), ("shake", shake)):
+        if not 0 <= value <= 50:
+            raise ConfigError(f"{what} is {value}; it must be 0 to 50")
+    if not 0 <= light_steps <= 100:
+        raise ConfigError(f"light_steps is {light_steps}; it must be 0 to 100")

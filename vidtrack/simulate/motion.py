@@ -48,16 +48,18 @@ def cruise(line: Floats, speed: float, s0: float, t0: float, duration_s: float, 
     return drive(line, t, s0 + travelled - np.interp(t0, t, travelled))
 
 
-def jerky(speed: float, duration_s: float, rng: Generator, rate: float = 15.0) -> tuple[Floats, Floats]:
+def jerky(
+    speed: float, duration_s: float, rng: Generator, share: float = 0.4, rate: float = 15.0
+) -> tuple[Floats, Floats]:
     """Times and travelled distance under random along-track accelerations, constant over each 1/rate s.
 
-    In units of 1/rate s: a ~ N(0, (0.4 speed)^2) + 0.2 (speed - v), as the multi-frame experiment on the
-    crossing of paper 004 has it (0.8 px at 2 px a frame); the vehicle never goes backwards.
+    In units of 1/rate s: a ~ N(0, (share speed)^2) + 0.2 (speed - v). A share of 0.4 is 0.8 px at 2 px a
+    frame, the multi-frame experiment on the crossing of paper 004. The vehicle never goes backwards.
     """
     steps = int(np.ceil(duration_s * rate)) + 1
     v = np.empty(steps + 1)
     v[0] = speed
-    for k, a in enumerate(rng.normal(0, 0.4 * speed, steps)):
+    for k, a in enumerate(rng.normal(0, share * speed, steps)):
         v[k + 1] = max(v[k] + a + 0.2 * (speed - v[k]), 0.1 * speed)
     knots = np.arange(steps + 1) / rate
     t = np.arange(0, duration_s + KNOT_S, KNOT_S)

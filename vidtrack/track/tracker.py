@@ -17,6 +17,8 @@ from vidtrack.track.lifecycle import LifeCycle
 from vidtrack.track.register import Register
 
 BIRTH_EXISTENCE = 0.5
+BORDER = 2.0
+"""px; a blob this close to the border is cut by it."""
 FRAGMENT = 0.6
 """A leftover blob starts no track where a vehicle already tracked covers this share of it."""
 
@@ -164,7 +166,7 @@ class Tracker:
         rows = np.flatnonzero(hit)
         new = np.isnan(self.register.box[rows, 0])
         follow = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / self.bank.hits[rows])
-        follow[new] = 1.0
+        follow[new | self._cut(absolute(scan.box, scan.z)[taken[rows]])] = 1.0
         old = np.where(new[:, None], 0.0, self.register.box[rows])
         self.register.box[rows] = old + follow[:, None] * (scan.box[taken[rows]] - old)
         if self.model.per_size:
@@ -246,6 +248,13 @@ class Tracker:
             return np.zeros(len(self.register), bool)
         xy = self.bank.x[:, self.model.position]
         return ((xy < 0) | (xy > np.array(self.bounds))).any(axis=1)
+
+    def _cut(self, box: Floats) -> np.ndarray:
+        """(N,) boxes that the picture's border cuts: their extent changes faster than any vehicle's."""
+        if self.bounds is None:
+            return np.zeros(len(box), bool)
+        far = np.array(self.bounds) - BORDER
+        return (box[:, :2] < BORDER).any(axis=1) | (box[:, :2] + box[:, 2:] > far).any(axis=1)
 
     def _register(self, scan: Scan, sensor: Sensor, decision: Decision, shared: Ints, events: list[Event]) -> Ints:
         """Start tentative tracks from measurements that belong to nobody; returns their indices."""

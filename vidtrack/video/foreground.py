@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.scan import Floats
@@ -24,12 +25,18 @@ class Foreground:
     strength: NDArray
     step: int
 
+    def full_size(self, shape: tuple[int, int]) -> Image:
+        """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""
+        mask = self.mask.repeat(self.step, axis=0).repeat(self.step, axis=1)
+        rows, columns = (max(0, size - found) for size, found in zip(shape, mask.shape, strict=True))
+        return np.pad(mask, ((0, rows), (0, columns)), mode="edge")[: shape[0], : shape[1]]
+
 
 class Background(Protocol):
     """A model of the scene without traffic."""
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; the scene is not learnt inside the `known` boxes.
+        """Foreground of `frame`; what covers a `known` box stays foreground however long it stands.
 
         known (K, 4): left, top, width, height [source px] of vehicles the tracker predicts here.
         """

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import av
+import cv2
 import numpy as np
 
 from vidtrack.video.frame import Frame, Image
@@ -52,3 +55,22 @@ def _plane(picture: av.VideoFrame, channel: int) -> Image:
 def _thinned(plane: Image, height: int, width: int) -> Image:
     """Every second row or column where the plane has more than (height, width)."""
     return plane[:: 2 if plane.shape[0] > height else 1, :: 2 if plane.shape[1] > width else 1]
+
+
+def matched(frame: Frame, first: Frame) -> Frame:
+    """The frame scaled to the first one's size, with chroma exactly if the first has some: cameras go grey at night."""
+    if frame.shape == first.shape and (frame.u is None) == (first.u is None):
+        return frame
+    y = _scaled(frame.y, first.y)
+    if first.u is None or first.v is None:
+        u = v = None
+    elif frame.u is None or frame.v is None:
+        u = v = np.full(first.u.shape, 128, np.uint8)
+    else:
+        u, v = _scaled(frame.u, first.u), _scaled(frame.v, first.v)
+    return replace(frame, y=y, u=u, v=v)
+
+
+def _scaled(plane: Image, like: Image) -> Image:
+    height, width = like.shape
+    return np.asarray(cv2.resize(plane, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)

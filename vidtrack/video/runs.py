@@ -50,7 +50,9 @@ def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
     parent = np.arange(n)
     above = 0  # first run of the row above that can still touch
     for k in range(n):
-        while above < k and (row[above] < row[k] - 1 or (row[above] == row[k] - 1 and stop[above] + diagonal <= start[k])):
+        while above < k and (
+            row[above] < row[k] - 1 or (row[above] == row[k] - 1 and stop[above] + diagonal <= start[k])
+        ):
             above += 1
         other = above
         while other < k and row[other] == row[k] - 1 and start[other] < stop[k] + diagonal:

@@ -47,4 +47,6 @@ class OpenCV:
         """(H, W, 3) the model's background in source size, blue-green-red."""
         if self._shape is None:
             raise Error("there is no scene before the first frame; call apply first")
-        return np.asarray(cv2.resize(self._model.getBackgroundImage(), self._shape[::-1], interpolation=cv2.INTER_LINEAR))
+        return np.asarray(
+            cv2.resize(self._model.getBackgroundImage(), self._shape[::-1], interpolation=cv2.INTER_LINEAR)
+        )

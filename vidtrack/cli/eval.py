@@ -1,0 +1,146 @@
+"""`vidtrack eval`: all scores of a result in one report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+SECTIONS = {
+    "counts": {
+        "frames": "frames with an object",
+        "truth_tracks": "objects in the truth",
+        "truth_rows": "their rows",
+        "tracks": "tracks in the result",
+        "rows": "their rows",
+    },
+    "CLEAR": {
+        "mota": "1 - misses, false, switches by truth rows",
+        "motp": "mean similarity of the matches",
+        "matches": "rows matched",
+        "misses": "truth rows without a match",
+        "false_positives": "result rows without a match",
+        "switches": "an object goes on in another track",
+        "fragmentations": "an object is found again after a gap",
+        "mostly_tracked": "objects found in over 80 % of rows",
+        "partially_tracked": "objects between the two",
+        "mostly_lost": "objects found in under 20 % of rows",
+    },
+    "identity": {
+        "idf1": "rows in each object's one best track",
+        "idp": "... share of the result's rows",
+        "idr": "... share of the truth's rows",
+    },
+    "HOTA": {
+        "hota": "detection and association in balance",
+        "deta": "detection accuracy",
+        "assa": "association accuracy",
+    },
+    "OSPA, GOSPA": {
+        "cutoff": "cost of an object without partner",
+        "order": "exponent of the means",
+        "ospa": "mean distance of the two sets",
+        "ospa_localisation": "its part from distances",
+        "ospa_cardinality": "its part from a wrong number",
+        "gospa": "summed distance of the two sets",
+        "gospa_localisation": "its part from distances",
+        "gospa_missed": "its part from missed objects",
+        "gospa_false": "its part from false tracks",
+    },
+    "consistency": {
+        "nis": "mean normalised innovation squared",
+        "nis_low": "... lower 95 % bound",
+        "nis_high": "... upper 95 % bound",
+        "nis_inside": "share below the 95 % quantile",
+        "nis_samples": "number of values",
+        "nees": "mean normalised position error squared",
+        "nees_low": "... lower 95 % bound",
+        "nees_high": "... upper 95 % bound",
+        "nees_inside": "share below the 95 % quantile",
+        "nees_samples": "number of values",
+    },
+}
+
+
+@click.command(
+    name="eval",
+    short_help="Score tracks against truth.",
+    epilog="""\b
+Examples:
+  vidtrack eval runs/junction samples/junction/gt.txt
+  vidtrack eval mot.txt gt.txt --iou 0.3 --json scores.json
+  vidtrack eval runs/radar truth.csv --max-distance 50 --cutoff 200 --json -""",
+)
+@click.argument("result", type=click.Path(path_type=Path))
+@click.argument("truth", type=click.Path(path_type=Path))
+@click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
+@click.option("--iou", default=0.5, show_default=True, help="Boxes match from this intersection over union.")
+@click.option("--points", is_flag=True, help="Match positions instead of boxes.")
+@click.option("--max-distance", type=float, help="Positions match up to this distance.  [default: 20 px or 100 m]")
+@click.option("--cutoff", type=float, help="OSPA, GOSPA cutoff.  [default: 1 for boxes (1 - IoU), else --max-distance]")
+@click.option("--order", default=2.0, show_default=True, help="OSPA, GOSPA order p.")
+def command(
+    result: Path,
+    truth: Path,
+    json_to: str | None,
+    iou: float,
+    points: bool,
+    max_distance: float | None,
+    cutoff: float | None,
+    order: float,
+) -> None:
+    """Score RESULT (MOT text, CSV, Parquet or a run folder) against TRUTH (MOT gt.txt or CSV).
+
+    Scores are fractions, not percent. Truth rows with conf 0 are ignored. Boxes are matched by
+    intersection over union, positions (radar) by distance. Of a run folder mot.txt is scored, and
+    the tracks table gives the consistency of the covariances (NIS, NEES).
+    """
+    from vidtrack import formats, score
+
+    found = formats.read(result)
+    states = formats.read_states(result) if result.is_dir() else None
+    scores = score.evaluate(
+        found,
+        formats.read(truth),
+        iou=iou,
+        points=points,
+        max_distance=max_distance,
+        cutoff=cutoff,
+        order=order,
+        states=states,
+    )
+    if json_to is not None:
+        _write_json(scores, json_to)
+    if json_to != "-":
+        _print_table(scores, f"{result.name} against {truth.name}")
+
+
+def _write_json(scores: dict[str, float | int | str], path: str) -> None:
+    import json
+
+    from vidtrack.errors import OutputError
+
+    text = json.dumps(scores, indent=2) + "\n"
+    if path == "-":
+        click.echo(text, nl=False)
+        return
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}; choose another file for --json") from None
+
+
+def _print_table(scores: dict[str, float | int | str], title: str) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("score", "value", "meaning", title=title, caption=f"matched by {scores['matched_by']}")
+    table.columns[1].justify = "right"
+    for section, names in SECTIONS.items():
+        rows = [(name, scores[name], meaning) for name, meaning in names.items() if name in scores]
+        if rows:
+            table.add_row(f"[bold]{section}[/bold]")
+        for name, value, meaning in rows:
+            table.add_row(f"  {name}", f"{value:.4f}" if isinstance(value, float) else str(value), meaning)
+        table.add_section()
+    Console().print(table)

@@ -1,0 +1,98 @@
+"""A finished run as steps again, so that any sink can show it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pyarrow as pa
+
+from vidtrack.config import Settings, parse
+from vidtrack.errors import FormatError
+from vidtrack.output.repair import read_tracks
+from vidtrack.output.sink import Step
+from vidtrack.scan import Scan, Status, Tracks
+from vidtrack.video.frame import Image
+
+_NO_BLOBS = (np.empty((0, 2)), np.eye(2))
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run folder's contents.
+
+    source    name of the input
+    shape     (H, W) of its pictures
+    table     tracks.csv
+    """
+
+    folder: Path
+    source: str
+    shape: tuple[int, int]
+    settings: Settings
+    table: pa.Table
+
+
+def read_run(folder: Path) -> Run:
+    """Read a run folder. Raises FormatError when it has no tracks.csv or summary.json, or a damaged one."""
+    table = read_tracks(folder / "tracks.csv")
+    path = folder / "summary.json"
+    try:
+        summary = json.loads(path.read_text())
+        shape = (int(summary["height"]), int(summary["width"]))
+        return Run(folder, summary["source"], shape, parse(summary["settings"]), table)
+    except FileNotFoundError:
+        raise FormatError(f"{folder} is not a run: it has no summary.json") from None
+    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        raise FormatError(f"{path} is damaged ({error}); vidtrack repair {folder} may help") from None
+
+
+def background(run: Run) -> Image:
+    """tracks.png in source size, grey without one."""
+    picture = cv2.imread(str(run.folder / "tracks.png"))
+    if picture is None:
+        return np.full((*run.shape, 3), 60, np.uint8)
+    return np.asarray(cv2.resize(picture, run.shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def steps(run: Run) -> Iterator[Step]:
+    """Every frame from the first row of the table to the last, also those without tracks, and no pictures."""
+    columns = {name: run.table[name].to_numpy() for name in run.table.column_names}
+    frames, first = np.unique(columns["frame"], return_index=True)
+    if not len(frames):
+        return
+    statuses = {status.name.lower(): status for status in Status}
+    columns["status"] = np.array([statuses[word] for word in columns["status"]], np.int8)
+    every = np.arange(frames[0], frames[-1] + 1)
+    times = np.interp(every, frames, columns["time_s"][first])
+    begin, end = np.searchsorted(columns["frame"], every), np.searchsorted(columns["frame"], every, side="right")
+    for frame, time_s, a, b in zip(every.tolist(), times.tolist(), begin, end, strict=True):
+        rows = {name: values[a:b] for name, values in columns.items()}
+        yield Step(frame, time_s, Scan(time_s, *_NO_BLOBS), _tracks(time_s, rows), None, None, {})
+
+
+def _tracks(t: float, rows: dict[str, np.ndarray]) -> Tracks:
+    """Tracks of one frame; what the table does not hold is NaN, and velocities have no covariance."""
+    count = len(rows["track_id"])
+    unknown = np.full(count, np.nan)
+    P = np.zeros((count, 4, 4))
+    P[:, 0, 0], P[:, 2, 2] = rows["sigma_x_px"] ** 2, rows["sigma_y_px"] ** 2
+    P[:, 0, 2] = P[:, 2, 0] = rows["corr_xy"] * rows["sigma_x_px"] * rows["sigma_y_px"]
+    return Tracks(
+        t=t,
+        id=rows["track_id"],
+        status=rows["status"],
+        x=np.column_stack([rows["x_px"], rows["vx_px_s"], rows["y_px"], rows["vy_px_s"]]),
+        P=P,
+        box=np.column_stack([rows["left_px"], rows["top_px"], rows["width_px"], rows["height_px"]]),
+        group=rows["group_id"],
+        group_since_s=unknown,
+        age_s=unknown,
+        existence=unknown,
+        measurement=np.full(count, -1),
+        nis=rows["nis"],
+    )

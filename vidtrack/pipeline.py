@@ -1,0 +1,110 @@
+"""From pictures or detections to tracks: source, detector, tracker, one frame at a time. The second page to read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from vidtrack.associate.gate import Gate
+from vidtrack.associate.hard import GNN, NN
+from vidtrack.config import Settings, TrackerSettings
+from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.output.sink import Step
+from vidtrack.scan import Floats, Scan, Status, Tracks
+from vidtrack.track.groups import Groups
+from vidtrack.track.lifecycle import LifeCycle
+from vidtrack.track.tracker import Tracker
+from vidtrack.video import background
+from vidtrack.video.blobs import find_blobs, join_fragments
+from vidtrack.video.foreground import Background
+from vidtrack.video.frame import Frame
+from vidtrack.video.source import open_source  # noqa
+
+METHODS = {"nn": NN, "gnn": GNN}
+
+
+def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
+    """Frames of a video (file, image folder or glob) with the tracks in each, lazily.
+
+    Raises SourceError when the input is missing or yields nothing.
+    """
+    settings = settings or Settings()
+    with open_source(str(path), settings.source) as source:
+        model = background.create(settings.detector, settings.source.scale)
+        tracker = build_tracker(settings.tracker, (source.width, source.height))
+        for step in video_steps(source, model, tracker, settings):
+            assert step.frame is not None
+            yield step.frame, step.tracks
+
+
+def build_tracker(
+    settings: TrackerSettings, bounds: tuple[float, float] | None = None, *, explain: bool = False
+) -> Tracker:
+    """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height)."""
+    return Tracker(
+        model=ConstantVelocity(
+            dim=2,
+            accel=settings.accel,
+            cross=settings.cross,
+            speed=settings.speed,
+            hold_s=settings.hold_s,
+            per_size=True,
+        ),
+        associate=METHODS[settings.method](),
+        gate=Gate(settings.gate_probability, settings.distance, settings.euclidean_radius_px),
+        life=LifeCycle(
+            confirm_hits=settings.confirm_hits,
+            confirm_window=settings.confirm_window,
+            confirm_s=settings.confirm_s,
+            confirm_travel=settings.confirm_travel,
+            coast_s=settings.coast_s,
+            coast_scans=None,
+        ),
+        groups=Groups(cover=settings.group_cover) if settings.merged_blobs else None,
+        bounds=bounds,
+        box_s=settings.box_s,
+        explain=explain,
+    )
+
+
+def video_steps(
+    frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings
+) -> Iterator[Step]:
+    """Each frame through detector and tracker.
+
+    What the tracker expects in a frame reaches the detector before the frame is looked at: fragments are
+    joined inside a predicted box, and known vehicles are kept out of the scene.
+    """
+    ended = perf_counter()
+    for frame in frames:
+        clock = [ended, perf_counter()]
+        known = expected_boxes(tracker, frame.time_s)
+        foreground = detector.apply(frame, known)
+        clock.append(perf_counter())
+        blobs = join_fragments(find_blobs(foreground, settings.blobs), known)
+        scan = blobs.scan(frame.time_s)
+        clock.append(perf_counter())
+        tracks = tracker.step(scan)
+        clock.append(perf_counter())
+        seconds = dict(zip(("read", "detect", "blobs", "track"), np.diff(clock).tolist(), strict=True))
+        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds)
+        ended = perf_counter()
+
+
+def detection_steps(detections: Iterable[tuple[int, float, Scan]], tracker: Tracker) -> Iterator[Step]:
+    """Stored detections through the tracker."""
+    ended = perf_counter()
+    for index, time_s, scan in detections:
+        began = perf_counter()
+        tracks = tracker.step(scan)
+        yield Step(index, time_s, scan, tracks, None, None, {"read": began - ended, "track": perf_counter() - began})
+        ended = perf_counter()
+
+
+def expected_boxes(tracker: Tracker, time_s: float) -> Floats:
+    """(K, 4) boxes of the confirmed tracks as predicted for `time_s`."""
+    expected = tracker.predict(time_s)
+    return expected.box[(expected.status != Status.TENTATIVE) & np.isfinite(expected.box).all(axis=1)]

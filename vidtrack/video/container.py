@@ -1,0 +1,163 @@
+"""Video files through FFmpeg: every picture that can be decoded, with a time that can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+import av
+
+from vidtrack.config import SourceSettings
+from vidtrack.errors import SourceError
+from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
+from vidtrack.video.header import avi_period_s, missing_bytes
+from vidtrack.video.stats import SourceStats
+
+_TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
+_RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K video reaches the second bound first
+
+
+class VideoFile:
+    """The pictures of a video file in order of presentation; iterate once.
+
+    name, fps, frames as for Source. Damage is counted in `stats` and reading goes on with the next picture
+    that can be decoded. Raises SourceError for what is not a readable video.
+    """
+
+    def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats) -> None:
+        self._path = path
+        self._stats = stats
+        self._container = _open(path)
+        self._stream = _video_stream(self._container, path)
+        self._stream.thread_type = "AUTO"
+        # AVI stores no presentation times, only the order of decoding: FFmpeg's guess at them jumps to and fro.
+        self._is_avi = self._container.format.name == "avi"
+        self._packets = self._demuxed()
+        self._opening = self._first_packets()
+        self.name = path.stem
+        self.fps, self._tick_s = self._rate(settings)
+        self.frames = self._stream.frames or self._frames_by_duration()
+        if (missing := missing_bytes(path)) > 0:
+            stats.mark_truncated(f"{path} is cut short: {missing} bytes are missing at its end")
+
+    def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
+        stamps = ((self._stamp(picture), picture) for picture in self._decoded())
+        stamped = ((None if stamp is None else stamp * self._tick_s, picture) for stamp, picture in stamps)
+        for index, (time_s, picture) in enumerate(increasing_times(stamped, 1 / self.fps)):
+            yield index, time_s, picture
+
+    def close(self) -> None:
+        """Close the file; not while another thread iterates."""
+        self._container.close()
+
+    def _demuxed(self) -> Iterator[av.Packet | None]:
+        """Packets, over unreadable stretches; None at the end, where the decoder gives what it holds back."""
+        stuck = False
+        while True:
+            try:
+                for packet in self._container.demux(self._stream):
+                    if packet.size:
+                        stuck = False
+                        yield packet
+                break
+            except av.FFmpegError as error:
+                self._stats.count_error(f"{self._path} is damaged: {error.strerror}")
+                if stuck:
+                    self._stats.mark_truncated(f"{self._path} cannot be read to its end: {error.strerror}")
+                    break
+                stuck = True
+        yield None
+
+    def _decoded(self) -> Iterator[av.VideoFrame]:
+        """Pictures as the decoder gives them, damaged ones too where it could patch them."""
+        damaged = partial = False
+        for packet in chain(self._opening, self._packets):
+            if packet is not None:
+                partial = packet.is_corrupt
+            try:
+                pictures = self._stream.codec_context.decode(packet)
+            except av.FFmpegError as error:
+                pictures, damaged = [], True
+                self._stats.count_error(f"a picture of {self._path} cannot be decoded: {error.strerror}")
+            for picture in pictures:
+                damaged = picture.is_corrupt
+                if damaged:
+                    self._stats.count_error(f"a picture of {self._path} is damaged")
+                yield picture
+        if damaged or partial:
+            self._stats.mark_truncated(f"the end of {self._path} cannot be decoded")
+
+    def _first_packets(self) -> list[av.Packet | None]:
+        """Enough packets to measure the rate; they are decoded afterwards like the others."""
+        packets: list[av.Packet | None] = []
+        size = 0
+        for packet in self._packets:
+            packets.append(packet)
+            size += packet.size if packet else 0
+            if len(packets) == _RATE_PACKETS or size > _RATE_BYTES:
+                break
+        return packets
+
+    def _rate(self, settings: SourceSettings) -> tuple[float, float]:
+        """Nominal frames/s, and the seconds per tick of the timestamps.
+
+        Where the user states the rate, or the stamps' own is none that a camera has, the ticks are
+        stretched to fit: gaps stay gaps.
+        """
+        tick_s = float(self._stream.time_base)
+        header = float(self._stream.average_rate or 0)
+        measured = stamp_rate([tick_s * stamp for packet in self._opening if (stamp := self._stamp(packet)) is not None])
+        fps = settings.fps or nominal_rate(header, measured) or self._rate_by_main_header()
+        if measured is not None and (settings.fps is not None or not is_plausible(measured)):
+            tick_s *= measured / fps
+        return fps, tick_s
+
+    def _rate_by_main_header(self) -> float:
+        """AVI states its rate twice; the second statement, or an assumption with a warning."""
+        period_s = avi_period_s(self._path)
+        if period_s is not None and is_plausible(1 / period_s):
+            return 1 / period_s
+        self._stats.warn(
+            f"{self._path} states no rate a camera can have; {FALLBACK_FPS:g} frames/s assumed, "
+            "state the true rate with --fps"
+        )
+        return FALLBACK_FPS
+
+    def _stamp(self, coded: av.Packet | av.VideoFrame | None) -> int | None:
+        if coded is None:
+            return None
+        return coded.dts if self._is_avi else coded.pts
+
+    def _frames_by_duration(self) -> int | None:
+        duration = self._container.duration
+        return round(duration / av.time_base * self.fps) if duration else None
+
+
+def _open(path: Path) -> av.container.InputContainer:
+    if not path.is_file():
+        raise SourceError(f"cannot open {path}: it is neither a file nor a folder")
+    if path.stat().st_size == 0:
+        raise SourceError(f"cannot open {path}: the file is empty (0 bytes)")
+    try:
+        # "file:" keeps a colon in the name from being taken for a protocol; old recorders write names in any encoding
+        return av.open(f"file:{path}", metadata_errors="ignore")
+    except OSError:
+        raise
+    except av.FFmpegError as error:
+        missing = missing_bytes(path)
+        cut = f"; it is cut short, {missing} bytes are missing at its end" if missing else ""
+        raise SourceError(f"cannot open {path}: not a video that can be read ({error.strerror}){cut}") from None
+
+
+def _video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:
+    """The first stream of moving pictures: the cover of an audio file is none."""
+    streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
+    if not streams:
+        kinds = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
+        raise SourceError(f"no video in {path}: it holds only {kinds}")
+    if streams[0].codec_context is None:
+        raise SourceError(f"cannot decode {path}: its codec is unknown to FFmpeg {streams[0]}; convert it to H.264")
+    if streams[0].codec_context.name in _TEXT_CODECS:
+        raise SourceError(f"cannot open {path}: it is a text file, not a video")
+    return streams[0]

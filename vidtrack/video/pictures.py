@@ -1,0 +1,99 @@
+"""Image folders and globs as a sequence of pictures."""
+
+from __future__ import annotations
+
+import glob
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import av
+
+from vidtrack.config import SourceSettings
+from vidtrack.errors import SourceError
+from vidtrack.video.sequence import read_sequence_info, untimed_rate
+from vidtrack.video.stats import SourceStats
+
+SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
+_DECODERS = {
+    b"\xff\xd8": "mjpeg",
+    b"\x89PNG": "png",
+    b"BM": "bmp",
+    b"II*\0": "tiff",
+    b"MM\0*": "tiff",
+    b"RIFF": "webp",
+    b"P5": "pgm",
+    b"P6": "ppm",
+}
+
+
+class ImageSequence:
+    """Pictures in files of their own, in natural order (img2 before img10), at a rate they do not know.
+
+    name, fps, frames as for Source. An image that cannot be read is counted and skipped; its number and
+    its time stay empty, so that the others keep theirs.
+    """
+
+    def __init__(self, paths: Iterable[Path], settings: SourceSettings, stats: SourceStats) -> None:
+        self._paths = sorted(paths, key=_natural)
+        self._stats = stats
+        folder = self._paths[0].parent
+        info = read_sequence_info(folder)
+        self.name = info.name or folder.resolve().name
+        self.fps = untimed_rate(info, settings, stats)
+        self.frames = len(self._paths)
+
+    def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
+        for index, path in enumerate(self._paths):
+            try:
+                picture = _read(path)
+            except SourceError as error:
+                self._stats.count_error(str(error))
+                continue
+            yield index, index / self.fps, picture
+
+    def close(self) -> None:
+        """Nothing stays open between images."""
+
+
+def images_in(folder: Path) -> list[Path]:
+    """The images of a folder. Raises SourceError if there are none, naming a sub-folder that has some."""
+    images = [path for path in folder.iterdir() if _is_image(path)]
+    if not images:
+        below = sorted(path.parent for path in folder.glob("*/*") if _is_image(path))
+        hint = f"did you mean {below[0]}?" if below else f"they should end in {' '.join(sorted(SUFFIXES))}"
+        raise SourceError(f"no images in folder {folder}; {hint}")
+    return images
+
+
+def images_like(pattern: str) -> list[Path]:
+    """The images that match a glob pattern. Raises SourceError if there are none."""
+    matches = [Path(match) for match in glob.glob(pattern, recursive=True)]
+    images = [path for path in matches if _is_image(path)]
+    if not images:
+        found = f"{len(matches)} other files, such as {min(matches)}" if matches else "nothing"
+        raise SourceError(f"no images match {pattern}; it finds {found}")
+    return images
+
+
+def _is_image(path: Path) -> bool:
+    return path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
+
+
+def _natural(path: Path) -> list[tuple[str, int]]:
+    """Sort key that compares runs of digits as numbers."""
+    parts = re.findall(r"(\D*)(\d*)", str(path))
+    return [(text, int(digits or -1)) for text, digits in parts]
+
+
+def _read(path: Path) -> av.VideoFrame:
+    """Decode one file by what its first bytes say, because suffixes lie. Raises SourceError."""
+    try:
+        data = path.read_bytes()
+        codec = next(codec for magic, codec in _DECODERS.items() if data.startswith(magic))
+        (picture,) = av.CodecContext.create(codec, "r").decode(av.Packet(data))
+    except (OSError, av.FFmpegError) as error:
+        raise SourceError(f"cannot read image {path}: {error.strerror}") from None
+    except StopIteration:
+        raise SourceError(f"cannot read image {path}: it starts like none of {', '.join(_DECODERS.values())}") from None
+    return picture

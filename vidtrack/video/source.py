@@ -1,0 +1,139 @@
+"""Open what the user points at and read it ahead: video files, image folders and globs become frames."""
+
+from __future__ import annotations
+
+import difflib
+import glob
+import math
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from types import TracebackType
+
+from vidtrack.config import SourceSettings
+from vidtrack.errors import SourceError
+from vidtrack.video.container import VideoFile
+from vidtrack.video.frame import Frame
+from vidtrack.video.pictures import ImageSequence, images_in, images_like
+from vidtrack.video.planes import matched, to_frame
+from vidtrack.video.readahead import ReadAhead
+from vidtrack.video.stats import SourceStats
+
+_DEPTH = 4  # frames read ahead: enough to even out key frames, 50 MB at 4K
+_ROUNDING_S = 1e-6
+
+
+def open_source(path: str, settings: SourceSettings) -> Source:
+    """Open a video file, an image folder or a glob of images; its first picture is decoded at once.
+
+    Raises SourceError for an input that is missing, unreadable, empty or not a video.
+    """
+    stats = SourceStats()
+    try:
+        return Source(_pictures(path, settings, stats), settings, stats)
+    except OSError as error:
+        raise SourceError(f"cannot read {path}: {error.strerror}") from None
+
+
+class Source:
+    """The frames of an input from `start_s` to `end_s`, read in a thread of their own; iterate once.
+
+    name           what to call the run
+    width, height  of the first picture [px]; later ones of another size are scaled to it
+    fps            nominal frames/s; each frame has its own time
+    frames         how many to expect, for progress bars only; None if unknown
+    stats          what was read and what went wrong
+
+    Iterating raises SourceError if the span of time holds no frame.
+    """
+
+    def __init__(self, pictures: VideoFile | ImageSequence, settings: SourceSettings, stats: SourceStats) -> None:
+        self._pictures = pictures
+        self._start_s = settings.start_s
+        self._end_s = math.inf if settings.end_s is None else settings.end_s
+        self.name = pictures.name
+        self.fps = pictures.fps
+        self.stats = stats
+        frames = (to_frame(*picture) for picture in pictures)
+        first = next(frames, None)
+        if first is None:
+            raise SourceError(f"no picture of {pictures.name} can be decoded")
+        self.height, self.width = first.shape
+        self.frames = self._expected(pictures.frames)
+        self._ahead = ReadAhead(self._alike(self._in_span(chain([first], frames)), first), _DEPTH)
+
+    def __iter__(self) -> Source:
+        return self
+
+    def __next__(self) -> Frame:
+        frame = next(self._ahead)
+        self.stats.frames_read += 1
+        return frame
+
+    def __enter__(self) -> Source:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop reading; may be called at any time and again."""
+        self._ahead.close()
+        self._pictures.close()
+
+    def _expected(self, frames: int | None) -> int | None:
+        """Of `frames` in the whole input, how many lie in the span."""
+        if frames is None:
+            return None
+        first = math.ceil(self._start_s * self.fps - _ROUNDING_S)
+        return max(0, min(frames, math.floor(min(self._end_s * self.fps, frames) + _ROUNDING_S) + 1) - first)
+
+    def _in_span(self, frames: Iterator[Frame]) -> Iterator[Frame]:
+        frame = None
+        empty = True
+        for frame in frames:
+            if frame.time_s > self._end_s + _ROUNDING_S:
+                break
+            if frame.time_s >= self._start_s - _ROUNDING_S:
+                empty = False
+                yield frame
+        if empty and frame is not None:
+            raise SourceError(
+                f"{self.name} has no frame between {self._start_s:g} s and {self._end_s:g} s; "
+                f"the last one read is at {frame.time_s:g} s"
+            )
+
+    def _alike(self, frames: Iterator[Frame], first: Frame) -> Iterator[Frame]:
+        """All frames in the size and kind of the first; said once."""
+        told = False
+        for frame in frames:
+            if frame.shape != first.shape and not told:
+                told = True
+                size = f"{frame.shape[1]}x{frame.shape[0]}"
+                self.stats.warn(f"frame {frame.index} is {size}; scaled to {self.width}x{self.height} like the first")
+            yield matched(frame, first)
+
+
+def _pictures(path: str, settings: SourceSettings, stats: SourceStats) -> VideoFile | ImageSequence:
+    place = Path(path)
+    if "://" in path:  # the address stays out of the message: it may hold a password
+        raise SourceError("a stream is not a file; read it with vidtrack live")
+    if place.is_dir():
+        return ImageSequence(images_in(place), settings, stats)
+    if place.exists():
+        return VideoFile(place, settings, stats)
+    if glob.has_magic(path):
+        return ImageSequence(images_like(path), settings, stats)
+    raise SourceError(_missing(place))
+
+
+def _missing(path: Path) -> str:
+    """What is missing, and the nearest name beside it."""
+    if not path.parent.is_dir():
+        return f"cannot open {path}: there is no folder {path.parent}"
+    names = [entry.name for entry in path.parent.iterdir()]
+    near = difflib.get_close_matches(path.name, names, n=1)
+    hint = f"; did you mean {path.parent / near[0]}?" if near else ""
+    return f"cannot open {path}: no such file or folder{hint}"
