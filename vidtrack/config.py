@@ -7,12 +7,14 @@ with the nearest name or the allowed range. `vidtrack config --explain` prints t
 from __future__ import annotations
 
 import difflib
+import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic.fields import FieldInfo
 
 from vidtrack.errors import ConfigError
 
@@ -169,8 +171,8 @@ class Settings(_Group):
     output: OutputSettings = OutputSettings()
 
 
-def load(path: Path | None = None, assignments: Iterable[str] = ()) -> Settings:
-    """Settings from defaults, a TOML file and `a.b=value` assignments, the later ones winning.
+def load(path: Path | None = None, assignments: Iterable[str | tuple[str, Any]] = ()) -> Settings:
+    """Settings from defaults, a TOML file and assignments ("a.b=value" or a name with its value), later ones winning.
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest) or a bad value.
     """
@@ -183,10 +185,8 @@ def load(path: Path | None = None, assignments: Iterable[str] = ()) -> Settings:
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path} is not valid TOML: {error}") from None
     for assignment in assignments:
-        key, equals, text = assignment.partition("=")
-        if not equals or not key.strip():
-            raise ConfigError(f"--set {assignment!r}: write it as group.name=value")
-        _assign(tree, key.strip().split("."), _value(text.strip()))
+        name, value = _split(assignment) if isinstance(assignment, str) else assignment
+        _assign(tree, name.split("."), value)
     return parse(tree)
 
 
@@ -196,6 +196,13 @@ def parse(tree: Mapping[str, Any]) -> Settings:
         return Settings.model_validate(tree)
     except ValidationError as error:
         raise ConfigError("\n".join(_complaint(detail) for detail in error.errors())) from None
+
+
+def _split(assignment: str) -> tuple[str, Any]:
+    name, equals, text = assignment.partition("=")
+    if not equals or not name.strip():
+        raise ConfigError(f"--set {assignment!r}: write it as group.name=value")
+    return name.strip(), _value(text.strip())
 
 
 def _value(text: str) -> Any:
@@ -235,3 +242,40 @@ def names(group: type[BaseModel] = Settings, prefix: str = "") -> Iterable[str]:
         kind = info.annotation
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             yield from names(kind, f"{prefix}{name}.")
+
+
+def as_toml(settings: Settings, *, explain: bool = False) -> str:
+    """The settings as a TOML file that `load` reads; with `explain`, each with its meaning, unit and range."""
+    return "\n".join(_toml_group(settings, "", explain)) + "\n"
+
+
+def _toml_group(group: BaseModel, path: str, explain: bool) -> list[str]:
+    lines: list[str] = []
+    below: list[str] = []
+    for name, info in type(group).model_fields.items():
+        value = getattr(group, name)
+        if isinstance(value, BaseModel):
+            below += ["", f"[{path}{name}]", *_toml_group(value, f"{path}{name}.", explain)]
+            continue
+        if explain:
+            lines += ["", f"# {info.description}{_range(info)}"]
+        lines.append(f"# {name} =  (from the data)" if value is None else f"{name} = {_toml_value(value)}")
+    return lines + below
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, Path):
+        value = str(value)
+    return json.dumps(value)  # TOML spells booleans, numbers, strings and lists as JSON does
+
+
+def _range(info: FieldInfo) -> str:
+    """Allowed values in brackets: choices, or bounds."""
+    choices = [value for value in get_args(info.annotation) if isinstance(value, str)]
+    if choices:
+        return f" [{', '.join(choices)}]"
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+    bounds = [
+        f"{sign} {getattr(rule, name):g}" for rule in info.metadata for name, sign in signs.items() if hasattr(rule, name)
+    ]
+    return f" [{', '.join(bounds)}]" if bounds else ""

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from time import perf_counter
 
+import cv2
 import numpy as np
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN
 from vidtrack.config import Settings, TrackerSettings
+from vidtrack.errors import ConfigError
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Scan, Status, Tracks
@@ -21,7 +23,7 @@ from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
-from vidtrack.video.source import open_source  # noqa
+from vidtrack.video.source import open_source
 
 METHODS = {"nn": NN, "gnn": GNN}
 
@@ -33,11 +35,22 @@ def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[
     """
     settings = settings or Settings()
     with open_source(str(path), settings.source) as source:
-        model = background.create(settings.detector, settings.source.scale)
+        model = build_detector(settings)
         tracker = build_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, model, tracker, settings):
             assert step.frame is not None
             yield step.frame, step.tracks
+
+
+def build_detector(settings: Settings) -> Background:
+    """The detector that the settings describe. Raises ConfigError for a mask that is not a picture."""
+    path = settings.source.mask
+    keep = None
+    if path is not None:
+        keep = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if keep is None:
+            raise ConfigError(f"cannot read the mask {path}; it must be a picture, white where traffic is looked for")
+    return background.create(settings.detector, settings.source.scale, keep)
 
 
 def build_tracker(

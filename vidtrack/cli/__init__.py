@@ -1,1 +1,80 @@
+"""What the user types. Each command is a module of its own, imported when it is called."""
 
+from __future__ import annotations
+
+import signal
+import sys
+from importlib import import_module
+from importlib.metadata import version
+
+import click
+
+from vidtrack.cli.signals import Terminated, terminate
+from vidtrack.errors import Error
+
+COMMANDS = {
+    "track": "Tracks from a video, an image folder or stored detections.",
+    "simulate": "Draw a traffic video with exact truth.",
+    "eval": "Score tracks against truth.",
+    "reproduce": "Figures and tables of the papers, ours beside theirs.",
+    "view": "Look at a finished run in rerun.",
+    "repair": "Make a killed run's files whole.",
+    "config": "Show the settings and what each one does.",
+}
+
+
+class _Commands(click.Group):
+    """Imports only the command that is called, so that help answers at once."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        command = import_module(f"vidtrack.cli.{name}").command
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.command(
+    cls=_Commands,
+    epilog="""\b
+Examples:
+  vidtrack track traffic.avi
+  vidtrack track traffic.mp4 --line gate:320,0,320,360 --video annotated.mp4
+  vidtrack simulate junction -o junction
+Each command has its own --help.""",
+)
+@click.version_option(version("vidtrack"), prog_name="vidtrack")
+def cli() -> None:
+    """Vehicle tracks from traffic video, on a plain CPU."""
+
+
+def main() -> None:
+    """Run a command; every error becomes one line and an exit code (0 done, 1 stopped early, 2 usage, 3 input)."""
+    signal.signal(signal.SIGTERM, terminate)
+    try:
+        code = cli.main(prog_name="vidtrack", standalone_mode=False)
+    except Error as error:
+        code = _complain(str(error), error.exit_code)
+    except click.ClickException as error:
+        error.show()
+        code = 2
+    except (KeyboardInterrupt, click.Abort):
+        code = _complain("interrupted", 130)
+    except Terminated:
+        code = _complain("terminated", 143)
+    except BrokenPipeError:  # the reader of our output has seen enough
+        sys.stderr.close()
+        code = 0
+    sys.exit(code)
+
+
+def _complain(message: str, code: int) -> int:
+    click.echo(f"vidtrack: {message}", err=True)
+    return code

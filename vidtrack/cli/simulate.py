@@ -62,12 +62,12 @@ def command(
     nine         nine vehicles cross on an open yard
     junction     a T-junction: people, a motorcycle, cars, a lorry; 14 targets in 17 s
     """
-    from vidtrack import simulate
     from vidtrack.output.folder import open_run
+    from vidtrack.simulate import simulate, write
 
-    clip = simulate.simulate(
-        scenario, seed=seed, fps=fps, size=size, noise=noise, shake=shake, light_steps=light_steps
-    )
+    clip = simulate(scenario, seed=seed, fps=fps, size=size, noise=noise, shake=shake, light_steps=light_steps)
     folder = open_run(output, scenario, force)
-    with click.progressbar(clip, length=len(clip), label=str(folder), file=click.get_text_stream("stderr"), hidden=quiet) as frames:
-        simulate.write(clip, folder, frames)
+    with click.progressbar(
+        clip, length=len(clip), label=str(folder), file=click.get_text_stream("stderr"), hidden=quiet
+    ) as frames:
+        write(clip, folder, frames)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from contextlib import ExitStack
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,5 +69,6 @@ class Confirmed:
 
 def _rows(tracks: Tracks, keep: NDArray[np.bool_]) -> Tracks:
     """The tracks with keep (T,) True."""
-    columns = {f.name: getattr(tracks, f.name) for f in fields(tracks)}
-    return replace(tracks, **{name: v[keep] for name, v in columns.items() if isinstance(v, np.ndarray)})
+    columns: dict[str, Any] = {f.name: getattr(tracks, f.name) for f in fields(tracks)}
+    kept: dict[str, Any] = {name: v[keep] for name, v in columns.items() if isinstance(v, np.ndarray)}
+    return replace(tracks, **kept)

@@ -15,7 +15,7 @@ from vidtrack.scan import Floats, Status, Tracks
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
-Colour = tuple[int, int, int]
+Colour = tuple[int, ...]
 WHITE: Colour = (255, 255, 255)
 GREY: Colour = (170, 170, 170)
 LINE: Colour = (0, 220, 255)
@@ -104,8 +104,7 @@ def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str
         pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE, width=2)
         counts = "".join(f" {way} {n}" for way, n in (totals or {}).get(line.name, {}).items())
         width, height = pen.size(line.name + counts)
-        middle = np.array([line.x1 + line.x2 - width, line.y1 + line.y2 + height]) / 2
-        pen.label(line.name + counts, *middle, LINE)
+        pen.label(line.name + counts, (line.x1 + line.x2 - width) / 2, (line.y1 + line.y2 + height) / 2, LINE)
 
 
 def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:

@@ -62,9 +62,9 @@ class TrajectoryPlot:
         """Write the picture."""
         size = (self._layer.shape[1], self._layer.shape[0])
         scene = np.full((*self._shape, 3), 60, np.uint8) if self._scene is None else self._scene()
-        scene = cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC)
+        enlarged = cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC)
         clear = 1.0 - self._layer[:, :, 3:] / np.float32(255)
-        picture = (scene * clear + self._layer[:, :, :3]).clip(0, 255).astype(np.uint8)
+        picture = (enlarged * clear + self._layer[:, :, :3]).clip(0, 255).astype(np.uint8)
         pen = Pen(picture)
         zoom = self._zoom
         draw_lines(pen, [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines])

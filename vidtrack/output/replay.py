@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from vidtrack.errors import FormatError
 from vidtrack.output.repair import read_tracks
 from vidtrack.output.sink import Step
 from vidtrack.scan import Scan, Status, Tracks
-from vidtrack.video.frame import Image
+from vidtrack.video.frame import Frame, Image
 
 _NO_BLOBS = (np.empty((0, 2)), np.eye(2))
 
@@ -59,20 +59,26 @@ def background(run: Run) -> Image:
     return np.asarray(cv2.resize(picture, run.shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def steps(run: Run) -> Iterator[Step]:
-    """Every frame from the first row of the table to the last, also those without tracks, and no pictures."""
+def steps(run: Run, frames: Iterable[Frame] | None = None) -> Iterator[Step]:
+    """The run frame by frame: those of the source, or without them all from the table's first to its last."""
     columns = {name: run.table[name].to_numpy() for name in run.table.column_names}
+    statuses = {status.name.lower(): status for status in Status}
+    columns["status"] = np.array([statuses[word] for word in columns["status"]], np.int8)
+    number = columns["frame"]
+    for index, time_s, frame in _table_times(columns) if frames is None else ((f.index, f.time_s, f) for f in frames):
+        first, last = np.searchsorted(number, index), np.searchsorted(number, index, side="right")
+        tracks = _tracks(time_s, {name: values[first:last] for name, values in columns.items()})
+        yield Step(index, time_s, Scan(time_s, *_NO_BLOBS), tracks, frame, None, {})
+
+
+def _table_times(columns: dict[str, np.ndarray]) -> Iterator[tuple[int, float, None]]:
+    """Number and time of each frame; one without tracks is not in the table, so its time is interpolated."""
     frames, first = np.unique(columns["frame"], return_index=True)
     if not len(frames):
         return
-    statuses = {status.name.lower(): status for status in Status}
-    columns["status"] = np.array([statuses[word] for word in columns["status"]], np.int8)
     every = np.arange(frames[0], frames[-1] + 1)
     times = np.interp(every, frames, columns["time_s"][first])
-    begin, end = np.searchsorted(columns["frame"], every), np.searchsorted(columns["frame"], every, side="right")
-    for frame, time_s, a, b in zip(every.tolist(), times.tolist(), begin, end, strict=True):
-        rows = {name: values[a:b] for name, values in columns.items()}
-        yield Step(frame, time_s, Scan(time_s, *_NO_BLOBS), _tracks(time_s, rows), None, None, {})
+    yield from ((index, time_s, None) for index, time_s in zip(every.tolist(), times.tolist(), strict=True))
 
 
 def _tracks(t: float, rows: dict[str, np.ndarray]) -> Tracks:

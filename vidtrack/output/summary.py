@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import platform
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -51,7 +50,7 @@ class Summary:
         self._media_s = 0.0
         self._tracks = 0
         self._alive: set[int] = set()
-        self._stage_s: Counter[str] = Counter()
+        self._stage_s: dict[str, float] = {}
         self._due = Every(1.0)
         self._write(interrupted=True)
 
@@ -63,7 +62,7 @@ class Summary:
         self._frames += 1
         self._media_s = step.time_s
         for stage, seconds in step.stage_s.items():
-            self._stage_s[stage] += seconds
+            self._stage_s[stage] = self._stage_s.get(stage, 0.0) + seconds
         if self._due():
             self._write(interrupted=True)
 

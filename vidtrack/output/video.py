@@ -7,7 +7,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import av
-import cv2
 import numpy as np
 from av.container import OutputContainer
 from av.video.stream import VideoStream
@@ -88,12 +87,8 @@ class AnnotatedVideo:
         height, width = picture.shape[:2]
         if self._stream is None:
             self._stream = self._add_stream(width + width % 2, height + height % 2)
-        if (width, height) != (self._stream.width, self._stream.height):
-            # 4:2:0 chroma needs even sides.
-            picture = cv2.copyMakeBorder(
-                picture, 0, self._stream.height - height, 0, self._stream.width - width, cv2.BORDER_REPLICATE
-            )
-        frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+        even = np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")  # 4:2:0 chroma needs even sides
+        frame = av.VideoFrame.from_ndarray(even, format="bgr24")
         self._pts = frame.pts = max(self._pts + 1, round(time_s / _CLOCK))
         frame.time_base = _CLOCK
         with writing(self._path):

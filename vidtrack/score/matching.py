@@ -97,10 +97,16 @@ def match_points(result: Table, truth: Table, max_distance: float, reach: float 
 
 def box_iou(a: Floats, b: Floats) -> Floats:
     """Intersection over union (B,) of boxes (B, 4) with boxes (B, 4); 0 for empty boxes."""
-    corner = np.minimum(a[:, :2] + a[:, 2:], b[:, :2] + b[:, 2:])
-    overlap = np.maximum(corner - np.maximum(a[:, :2], b[:, :2]), 0.0).prod(axis=1)
-    union = a[:, 2:].prod(axis=1) + b[:, 2:].prod(axis=1) - overlap
+    a_start, b_start = a[:, :2], b[:, :2]
+    a_end, b_end = a_start + a[:, 2:], b_start + b[:, 2:]
+    overlap = _area(np.maximum(np.minimum(a_end, b_end) - np.maximum(a_start, b_start), 0.0))
+    # Sides from the rounded corners, as the overlap's are: equal boxes then have exactly 1.
+    union = _area(a_end - a_start) + _area(b_end - b_start) - overlap
     return np.divide(overlap, union, out=np.zeros_like(union), where=overlap > 0)
+
+
+def _area(sides: Floats) -> Floats:
+    return sides[:, 0] * sides[:, 1]
 
 
 def _match(

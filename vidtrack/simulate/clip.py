@@ -72,7 +72,7 @@ class Clip:
             corners = actor.outline(np.array([time]))[0] * scale + shake
             draw.place(picture, self._sprites[actor], self._to_picture(actor, time, shake), corners)
         if self.camera.gain[k] != 1:
-            picture = cv2.convertScaleAbs(picture, alpha=self.camera.gain[k])
+            picture = np.asarray(cv2.convertScaleAbs(picture, alpha=self.camera.gain[k]), dtype=np.uint8)
         row, col = self.camera.window[k]
         noise = self.camera.noise[row : row + self.size[1], col : col + self.size[0]]
         return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U))
@@ -80,7 +80,8 @@ class Clip:
     def _to_picture(self, actor: Actor, time: float, shake: Floats) -> Floats:
         """The affine map (2, 3) from the actor's own frame to the picture."""
         zero, x, y = actor.place(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), np.array([time]))[0]
-        return np.stack([x - zero, y - zero, zero], axis=1) * self.camera.scale[:, None] + [[0, 0, d] for d in shake]
+        turn = np.stack([x - zero, y - zero], axis=1)
+        return np.column_stack([turn * self.camera.scale[:, None], zero * self.camera.scale + shake])
 
     def _empty_street(self, shake: Floats) -> NDArray[np.uint8]:
         margin, (width, height) = self._margin, self.size
@@ -125,26 +126,26 @@ def simulate(
 
     Raises ConfigError for an unknown name or a value out of range.
     """
-    _check(name, fps, size, noise, shake, light_steps)
+    _check(name, seed, fps, size, noise, shake, light_steps)
     scene_rng, camera_rng = np.random.default_rng(seed).spawn(2)
     scene = SCENARIOS[name](scene_rng)
     times = scene.times(fps)
-    view = camera(
-        scene.size, size or scene.size, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps
-    )
+    view = camera(scene.size, size or scene.size, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps)
     return Clip(scene, view, scene.fps if fps is None else fps, times, seed)
 
 
 def _check(
-    name: str, fps: float | None, size: tuple[int, int] | None, noise: float, shake: float, light_steps: int
+    name: str, seed: int, fps: float | None, size: tuple[int, int] | None, noise: float, shake: float, light_steps: int
 ) -> None:
     if name not in SCENARIOS:
         near = difflib.get_close_matches(name, SCENARIOS, n=1) or [", ".join(SCENARIOS)]
         raise ConfigError(f"no scenario is called {name!r}; did you mean {near[0]}?")
+    if seed < 0:
+        raise ConfigError(f"seed is {seed}; it must be 0 or more")
     if fps is not None and not 1 <= fps <= 1000:
         raise ConfigError(f"fps is {fps}; it must be 1 to 1000 frames/s")
-    if size is not None and not (32 <= min(size) and max(size) <= 8192):
-        raise ConfigError(f"size is {size[0]}x{size[1]}; each side must be 32 to 8192 px")
+    if size is not None and not (min(size) >= 32 and max(size) <= 4096):
+        raise ConfigError(f"size is {size[0]}x{size[1]}; each side must be 32 to 4096 px")
     for what, value in (("noise", noise), ("shake", shake)):
         if not 0 <= value <= 50:
             raise ConfigError(f"{what} is {value}; it must be 0 to 50")

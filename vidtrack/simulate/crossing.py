@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, car
 from vidtrack.simulate.motion import drive, jerky, route
-from vidtrack.simulate.scene import Actor, Part, Scene, bounds, gap
+from vidtrack.simulate.scene import Actor, Part, Scene, bounds, gap, inside
 
 SIZE = (320, 240)
 FPS = 15.0
@@ -31,7 +30,7 @@ def crossing_45(rng: Generator) -> Scene:
 
 
 def _crossing(rng: Generator, turn: float) -> Scene:
-    """Draws motions until the vehicles overlap for 0.5 to 2 s, with a second apart in full view on either side."""
+    """Draws motions until the vehicles overlap for 0.6 to 2 s, with a second apart in full view on either side."""
     middle = SIZE[0] / 2, SIZE[1] / 2
     roads = Axes(middle, turn - np.pi / 2), Axes(middle, turn)
     colours = rng.choice(len(CAR_COLOURS), 2, replace=False)
@@ -52,16 +51,11 @@ def _meet_well(a: Actor, b: Actor) -> bool:
     times = np.arange(round(DURATION_S * FPS)) / FPS
     one, other = a.outline(times), b.outline(times)
     together = np.flatnonzero(gap(one, other) <= 0)
-    if not 0.5 * FPS <= len(together) <= 2 * FPS or np.ptp(together) + 1 != len(together):
+    if not 0.6 * FPS <= len(together) <= 2 * FPS or np.ptp(together) + 1 != len(together):
         return False
-    clear = _inside(bounds(one)) & _inside(bounds(other))
+    clear = inside(bounds(one), SIZE) & inside(bounds(other), SIZE)
     second = int(FPS)
     return bool(clear[together[0] - second : together[-1] + second + 1].all() and together[-1] + second < len(times))
-
-
-def _inside(box: NDArray) -> NDArray[np.bool_]:
-    """Which boxes (N, 4) of left, top, right, bottom are whole in the picture."""
-    return (box[:, :2] >= 0).all(axis=1) & (box[:, 2:] <= SIZE).all(axis=1)
 
 
 def _ground(roads: tuple[Axes, Axes]) -> tuple[Part, ...]:

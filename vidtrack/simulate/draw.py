@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vidtrack.scan import Floats
 from vidtrack.simulate.camera import Camera
-from vidtrack.simulate.scene import Actor, Look, Part, Scene, bounds
+from vidtrack.simulate.scene import Actor, Look, Scene, bounds
 
 Image = NDArray[np.uint8]
 Window = tuple[slice, slice]

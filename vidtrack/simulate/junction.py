@@ -15,7 +15,7 @@ from vidtrack.scan import Floats
 from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, PAINT, PAVING, ROOF, YELLOW, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, CLOTHES, SKIN, car, foliage, lorry, motorcycle, person
 from vidtrack.simulate.motion import cruise, length, route, sway
-from vidtrack.simulate.scene import Actor, Colour, Look, Part, Scene, bounds, gap
+from vidtrack.simulate.scene import Actor, Colour, Look, Part, Scene, bounds, gap, inside
 
 SIZE = (240, 180)
 FPS = 15.0
@@ -35,7 +35,7 @@ def junction(rng: Generator) -> Scene:
     while True:
         targets = (*_vehicles(rng), *_people(rng))
         if _can_be_followed(targets):
-            return Scene(SIZE, FPS, DURATION_S, _ground(), targets, _tree(rng), sun=(0.34, 0.24))
+            return Scene(SIZE, FPS, DURATION_S, _ground(), targets, _tree(rng), sun=(0.42, 0.3))
 
 
 def _vehicles(rng: Generator) -> list[Actor]:
@@ -62,7 +62,9 @@ def _vehicles(rng: Generator) -> list[Actor]:
     load = (225, 225, 222) if rng.random() < 0.5 else (150, 96, 52)
     pace = 45 * rng.uniform(0.97, 1.03)
     grey = Actor("grey car", car(30, 14, GREY), cruise(west, pace, END - STOP_LINE, 2.0, DURATION_S, rng, vary=0.0))
-    white = Actor("white car", car(29, 14, WHITE), cruise(west, pace, END - STOP_LINE, 2 + headway, DURATION_S, rng, 0.0))
+    white = Actor(
+        "white car", car(29, 14, WHITE), cruise(west, pace, END - STOP_LINE, 2 + headway, DURATION_S, rng, 0.0)
+    )
     return [
         grey,
         white,
@@ -101,10 +103,9 @@ def _can_be_followed(targets: tuple[Actor, ...]) -> bool:
     outlines = [actor.outline(times) for actor in targets]
     bases = [actor.place(actor.look.base, times) for actor in targets]
     boxes = np.stack([bounds(outline) for outline in outlines])
-    in_view = (boxes[..., :2] >= 0).all(axis=-1) & (boxes[..., 2:] <= SIZE).all(axis=-1)
-    if in_view.sum(axis=1).min() < 1.5 * FPS:
+    if inside(boxes, SIZE).sum(axis=1).min() < 1.5 * FPS:
         return False
-    seen = (boxes[..., 2:] > 0).all(axis=-1) & (boxes[..., :2] < SIZE).all(axis=-1)
+    seen = np.all((boxes[..., 2:] > 0) & (boxes[..., :2] < SIZE), axis=-1)
     merges = 0
     for i, j in combinations(range(len(targets)), 2):
         both = seen[i] & seen[j]

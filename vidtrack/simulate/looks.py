@@ -48,7 +48,9 @@ def car(length: float, width: float, colour: Colour) -> Look:
 def lorry(length: float, width: float, cab: Colour, load: Colour) -> Look:
     """A box lorry: a cab, a gap, and a load with ribs."""
     x, y = length / 2, width / 2
-    ribs = [Part(_box(r * x, -0.92 * y, (r + 0.025) * x, 0.92 * y), _shade(load, 0.86)) for r in np.arange(-0.8, 0.4, 0.2)]
+    ribs = [
+        Part(_box(r * x, -0.92 * y, (r + 0.025) * x, 0.92 * y), _shade(load, 0.86)) for r in np.arange(-0.8, 0.4, 0.2)
+    ]
     return _solid(
         (
             Part(_box(-x, -y, 0.5 * x, y), load),
@@ -140,10 +142,18 @@ def _taper(x0: float, y0: float, x1: float, y1: float) -> Floats:
 def _rounded(left: float, top: float, right: float, bottom: float, radius: float) -> Floats:
     """A rectangle with corners rounded by three edges each."""
     quarter = np.radians(np.arange(0, 91, 30))
-    corners = ((right, bottom, 1, 1, 0.0), (left, bottom, -1, 1, 90.0), (left, top, -1, -1, 180.0), (right, top, 1, -1, 270.0))
+    corners = (
+        (right, bottom, 1, 1, 0.0),
+        (left, bottom, -1, 1, 90.0),
+        (left, top, -1, -1, 180.0),
+        (right, top, 1, -1, 270.0),
+    )
     arcs = [
         np.stack(
-            [x - sx * radius + radius * np.cos(quarter + np.radians(a)), y - sy * radius + radius * np.sin(quarter + np.radians(a))],
+            [
+                x - sx * radius + radius * np.cos(quarter + np.radians(a)),
+                y - sy * radius + radius * np.sin(quarter + np.radians(a)),
+            ],
             axis=-1,
         )
         for x, y, sx, sy, a in corners

@@ -39,7 +39,9 @@ def drive(line: Floats, t: Floats, s: Floats) -> Path:
     return Path(t, xy, np.interp(s, middle, heading))
 
 
-def cruise(line: Floats, speed: float, s0: float, t0: float, duration_s: float, rng: Generator, vary: float = 0.06) -> Path:
+def cruise(
+    line: Floats, speed: float, s0: float, t0: float, duration_s: float, rng: Generator, vary: float = 0.06
+) -> Path:
     """Follow a polyline at about `speed` [px/s], slowly varied by the share `vary`, being at distance s0 at time t0."""
     t = np.arange(0, duration_s + KNOT_S, KNOT_S)
     period, phase = rng.uniform(4, 8), rng.uniform(0, 2 * np.pi)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.scan import Floats
 from vidtrack.simulate.ground import ASPHALT, PAVING, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, car, lorry
 from vidtrack.simulate.motion import drive, jerky, route
-from vidtrack.simulate.scene import Actor, Part, Scene, bounds, gap
+from vidtrack.simulate.scene import Actor, Part, Scene, bounds, gap, inside
 
 SIZE = (320, 240)
 FPS = 15.0
@@ -22,7 +23,10 @@ HEADINGS_DEG = (-38.0, 62.0, 0.0, 180.0, 90.0, -90.0, 140.0, -142.0, 22.0)
 
 
 def nine(rng: Generator) -> Scene:
-    """Draws motions until every vehicle is in full view for 2 s, and three to eight pairs touch, none for over 1.2 s."""
+    """Draws motions until every vehicle is in full view for 2 s, and three to eight pairs touch.
+
+    They touch for 1.2 s at most, and have been apart and in full view for 0.6 s before.
+    """
     while True:
         vehicles = tuple(_vehicle(i, heading, rng) for i, heading in enumerate(np.radians(HEADINGS_DEG)))
         if _cross_well(vehicles):
@@ -44,23 +48,30 @@ def _vehicle(i: int, heading: float, rng: Generator) -> Actor:
 def _cross_well(vehicles: tuple[Actor, ...]) -> bool:
     times = np.arange(round(DURATION_S * FPS)) / FPS
     outlines = [vehicle.outline(times) for vehicle in vehicles]
-    in_view = np.stack([_inside(bounds(outline)) for outline in outlines])
+    in_view = np.stack([inside(bounds(outline), SIZE) for outline in outlines])
     if in_view.sum(axis=1).min() < 2 * FPS:
         return False
-    pairs = [(i, j) for i in range(9) for j in range(i)]
-    touching = np.array([((gap(outlines[i], outlines[j]) <= 0) & in_view[i] & in_view[j]).sum() for i, j in pairs])
-    return bool(3 <= (touching > 0).sum() <= 8 and touching.max() <= 1.2 * FPS)
-
-
-def _inside(box: Floats) -> Floats:
-    return (box[:, :2] >= 0).all(axis=1) & (box[:, 2:] <= SIZE).all(axis=1)
+    meetings = 0
+    for i, j in combinations(range(len(vehicles)), 2):
+        touching = np.flatnonzero(gap(outlines[i], outlines[j]) <= 0)
+        if len(touching) == 0:
+            continue
+        apart = slice(max(touching[0] - round(0.6 * FPS), 0), touching[0])
+        if len(touching) > 1.2 * FPS or not (in_view[i] & in_view[j])[apart].all():
+            return False
+        meetings += 1
+    return 3 <= meetings <= 8
 
 
 def _yard() -> tuple[Part, ...]:
     """Asphalt with a paved edge and the bays of a car park along it."""
     plane = Axes((0, 0), 0)
     width, height = SIZE
-    bays = [plane.patch(((190, 192, 194), 4.0), x, x + 1.5, y, y + 16) for x in range(24, width - 20, 17) for y in (8, height - 24)]
+    bays = [
+        plane.patch(((190, 192, 194), 4.0), x, x + 1.5, y, y + 16)
+        for x in range(24, width - 20, 17)
+        for y in (8, height - 24)
+    ]
     return (
         plane.patch(PAVING, -FAR, FAR, -FAR, FAR),
         plane.patch(ASPHALT, 7, width - 7, 7, height - 7),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.scan import Floats
 
@@ -108,6 +109,11 @@ class Scene:
 def bounds(polygons: Floats) -> Floats:
     """Boxes (..., 4) left, top, right, bottom of polygons (..., V, 2)."""
     return np.concatenate([polygons.min(axis=-2), polygons.max(axis=-2)], axis=-1)
+
+
+def inside(boxes: Floats, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Which boxes (..., 4) of left, top, right, bottom lie whole in a picture of `size` (width, height)."""
+    return np.asarray((boxes[..., :2] >= 0).all(axis=-1) & (boxes[..., 2:] <= size).all(axis=-1))
 
 
 def gap(a: Floats, b: Floats) -> Floats:

@@ -25,7 +25,7 @@ def write(clip: Clip, folder: Path, frames: Iterable[NDArray[np.uint8]] | None =
 def write_video(path: Path, frames: Iterable[NDArray[np.uint8]], size: tuple[int, int], fps: float) -> None:
     """Write frames (H, W, 3) BGR as MPEG-4 (XVID) in an AVI."""
     with av.open(str(path), "w", format="avi") as container:
-        stream = container.add_stream("mpeg4", rate=Fraction(fps).limit_denominator(1001))
+        stream = container.add_stream("mpeg4", rate=_rate(fps))
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
         stream.codec_context.codec_tag = "XVID"
@@ -40,3 +40,8 @@ def write_truth(path: Path, truth: Truth) -> None:
     ones = np.ones(len(truth))
     rows = np.column_stack([truth.frame + 1, truth.id, truth.box, ones, ones, truth.visibility])
     np.savetxt(path, rows, fmt="%d,%d,%.3f,%.3f,%.3f,%.3f,%d,%d,%.3f")
+
+
+def _rate(fps: float) -> Fraction:
+    """The rate as a fraction that MPEG-4 can store: its clock has at most 65535 ticks a second."""
+    return Fraction(fps).limit_denominator(min(1001, int(65535 / fps)))

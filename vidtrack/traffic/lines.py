@@ -90,9 +90,9 @@ class _State:
     def __init__(self, ids: Ints, xy: Floats, distance: Floats, t: float, frame: int) -> None:
         shape = distance.shape
         self.id = ids
-        self.xy = xy
+        self.xy = xy.copy()
         self.confirmed = np.zeros(len(ids), bool)
-        self.distance = distance  # signed, from the line
+        self.distance = distance.copy()  # signed, from the line
         self.side = distance >= 0  # where the track clearly was
         self.counted = np.zeros((*shape, 2), bool)
         self.seen = np.zeros(shape, bool)  # measured since the last change of sign
@@ -132,8 +132,7 @@ class LineCounter:
         """Crossings that this scan decided, in order of time."""
         old = self._state
         xy = tracks.xy
-        distance = (xy[:, None] - self._start).reshape(len(xy), -1, 2)
-        distance = np.einsum("tld,ld->tl", distance, self._normal)
+        distance = np.einsum("tld,ld->tl", xy[:, None] - self._start, self._normal)
         now = _State(tracks.id, xy, distance, tracks.t, frame)
         _, rows, old_rows = np.intersect1d(tracks.id, old.id, assume_unique=True, return_indices=True)
         now.replace(rows, old, old_rows)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 T = TypeVar("T")
 
@@ -16,7 +17,7 @@ AGREEMENT = 0.1  # relative; a header's rate is kept within this of the measured
 LONGEST_WAIT = 8  # items held back for the next sane stamp: bounds memory where there are no stamps at all
 
 
-def stamp_rate(stamps_s: Sequence[float]) -> float | None:
+def stamp_rate(stamps_s: ArrayLike) -> float | None:
     """Typical rate [1/s] of timestamps in any order; None if they are all the same.
 
     One over the mean of the intervals near the median: gaps do not count, and the rounding of a
@@ -45,11 +46,11 @@ def nominal_rate(header: float, measured: float | None) -> float | None:
     return measured if is_plausible(measured) else None
 
 
-def increasing_times(stamped: Iterable[tuple[float | None, T]], period_s: float) -> Iterator[tuple[float, T]]:
-    """Give every item a time [s], strictly above the one before; the first is 0.
+def increasing_times(stamped: Iterable[tuple[float | None, T]], period: float) -> Iterator[tuple[float, T]]:
+    """Give every item a time, strictly above the one before; the first is 0. Any unit of time serves.
 
-    stamped    (timestamp [s] or None, item) in the order of presentation
-    period_s   nominal time between two items
+    stamped   (timestamp or None, item) in the order of presentation
+    period    nominal time between two items
 
     A stamp is sane if it lies above all before it. Of two such neighbours in the wrong order the first
     is at fault: a lone jump ahead must not spoil what follows. Sane stamps are kept, and with them gaps
@@ -58,23 +59,23 @@ def increasing_times(stamped: Iterable[tuple[float | None, T]], period_s: float)
     the nominal rate.
     """
     origin: float | None = None  # the stamp of time 0
-    last = -period_s
+    last = -period
     waiting: list[T] = []
     for stamp, following, item in _with_following(stamped):
         floor = -math.inf if origin is None else origin + last
         if stamp is not None and _is_sane(stamp, following, floor):
             if origin is None:
-                origin = stamp - last - period_s * (len(waiting) + 1)
+                origin = stamp - (last + period * (len(waiting) + 1))
             now = stamp - origin
-            yield from _spaced(waiting, last, min(period_s, (now - last) / (len(waiting) + 1)))
+            yield from _spaced(waiting, last, min(period, (now - last) / (len(waiting) + 1)))
             yield now, item
             last, waiting = now, []
         else:
             waiting.append(item)
             if len(waiting) == LONGEST_WAIT:
-                yield from _spaced(waiting, last, period_s)
-                last, waiting = last + period_s * len(waiting), []
-    yield from _spaced(waiting, last, period_s)
+                yield from _spaced(waiting, last, period)
+                last, waiting = last + period * len(waiting), []
+    yield from _spaced(waiting, last, period)
 
 
 def _is_sane(stamp: float, following: float | None, floor: float) -> bool:
@@ -87,12 +88,10 @@ def _spaced(items: list[T], last: float, step: float) -> Iterator[tuple[float, T
 
 def _with_following(stamped: Iterable[tuple[float | None, T]]) -> Iterator[tuple[float | None, float | None, T]]:
     """(stamp, the next item's stamp, item)."""
-    rest = iter(stamped)
-    for stamp, item in rest:
-        break
-    else:
-        return
-    for following, after in rest:
-        yield stamp, following, item
-        stamp, item = following, after
-    yield stamp, None, item
+    held: tuple[float | None, T] | None = None
+    for current in stamped:
+        if held is not None:
+            yield held[0], current[0], held[1]
+        held = current
+    if held is not None:
+        yield held[0], None, held[1]

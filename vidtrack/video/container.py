@@ -7,6 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 import av
+import numpy as np
 
 from vidtrack.config import SourceSettings
 from vidtrack.errors import SourceError
@@ -36,16 +37,16 @@ class VideoFile:
         self._packets = self._demuxed()
         self._opening = self._first_packets()
         self.name = path.stem
-        self.fps, self._tick_s = self._rate(settings)
+        self.fps, self._ticks_per_s = self._rate(settings)
         self.frames = self._stream.frames or self._frames_by_duration()
         if (missing := missing_bytes(path)) > 0:
             stats.mark_truncated(f"{path} is cut short: {missing} bytes are missing at its end")
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        stamps = ((self._stamp(picture), picture) for picture in self._decoded())
-        stamped = ((None if stamp is None else stamp * self._tick_s, picture) for stamp, picture in stamps)
-        for index, (time_s, picture) in enumerate(increasing_times(stamped, 1 / self.fps)):
-            yield index, time_s, picture
+        stamped = ((self._stamp(picture), picture) for picture in self._decoded())
+        times = increasing_times(stamped, self._ticks_per_s / self.fps)
+        for index, (ticks, picture) in enumerate(times):
+            yield index, ticks / self._ticks_per_s, picture
 
     def close(self) -> None:
         """Close the file; not while another thread iterates."""
@@ -100,18 +101,19 @@ class VideoFile:
         return packets
 
     def _rate(self, settings: SourceSettings) -> tuple[float, float]:
-        """Nominal frames/s, and the seconds per tick of the timestamps.
+        """Nominal frames/s, and the timestamps' ticks per second.
 
         Where the user states the rate, or the stamps' own is none that a camera has, the ticks are
         stretched to fit: gaps stay gaps.
         """
-        tick_s = float(self._stream.time_base)
+        ticks_per_s = float(1 / self._stream.time_base) if self._stream.time_base else 1.0
+        stamps = [stamp for packet in self._opening if packet and (stamp := self._stamp(packet)) is not None]
+        measured = stamp_rate(np.divide(stamps, ticks_per_s))
         header = float(self._stream.average_rate or 0)
-        measured = stamp_rate([tick_s * stamp for packet in self._opening if (stamp := self._stamp(packet)) is not None])
         fps = settings.fps or nominal_rate(header, measured) or self._rate_by_main_header()
         if measured is not None and (settings.fps is not None or not is_plausible(measured)):
-            tick_s *= measured / fps
-        return fps, tick_s
+            ticks_per_s *= fps / measured
+        return fps, ticks_per_s
 
     def _rate_by_main_header(self) -> float:
         """AVI states its rate twice; the second statement, or an assumption with a warning."""
@@ -124,9 +126,7 @@ class VideoFile:
         )
         return FALLBACK_FPS
 
-    def _stamp(self, coded: av.Packet | av.VideoFrame | None) -> int | None:
-        if coded is None:
-            return None
+    def _stamp(self, coded: av.Packet | av.VideoFrame) -> int | None:
         return coded.dts if self._is_avi else coded.pts
 
     def _frames_by_duration(self) -> int | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from vidtrack.errors import SourceError
 from vidtrack.formats import read_mot
 from vidtrack.scan import Floats, Scan
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
+from vidtrack.video.span import Span
 from vidtrack.video.stats import SourceStats
 
 SIGMA_SHARE = 0.05  # standard deviation of a box centre over the box's width and height
@@ -61,11 +61,33 @@ class Detections:
         right, bottom = np.ceil((self._box[:, :2] + self._box[:, 2:]).max(axis=0)).astype(int)
         self.width, self.height = info.width or int(right), info.height or int(bottom)
         length = max(info.length or 0, int(self._frame[-1]) + 1)
-        self._span = _frames_between(settings, self.fps, length)
-        self.frames = len(self._span)
+        self._frames = Span.of(settings).frames(self.fps, length)
+        self.frames = len(self._frames)
 
     def __iter__(self) -> Iterator[tuple[int, float, Scan]]:
-        bounds = np.searchsorted(self._frame, [self._span, np.add(self._span, 1)]).T
-        for index, (first, end) in zip(self._span, bounds, strict=True):
+        for index in self._frames:
+            rows = slice(*np.searchsorted(self._frame, [index, index + 1]))
+            time_s = index / self.fps
             self.stats.frames_read += 1
-            yield index, index / self.fps, self._scan(index / self.fps, slice(first, end))
+            yield index, time_s, _scan(time_s, self._box[rows], self._score[rows])
+
+
+def _scan(time_s: float, box: Floats, score: Floats) -> Scan:
+    """Boxes (M, 4) as measurements of their centres."""
+    size = box[:, 2:]
+    sigma = np.maximum(SIGMA_SHARE * size, SIGMA_FLOOR_PX)
+    relative = np.hstack([-size / 2, size])
+    return Scan(time_s, box[:, :2] + size / 2, sigma[:, :, None] ** 2 * np.eye(2), box=relative, score=score)
+
+
+def _rank(score: Floats) -> Floats:
+    """(N,) share of all values that are not above each: 1 for the best, equal for equals."""
+    return np.searchsorted(np.sort(score), score, side="right") / len(score)
+
+
+def _has_six_numbers(line: str) -> bool:
+    fields = line.replace(",", " ").split()
+    try:
+        return len([float(field) for field in fields]) >= 6
+    except ValueError:
+        return False

@@ -15,6 +15,7 @@ from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.stats import SourceStats
 
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
+_DATASET_FOLDERS = ("img1", "input")  # MOTChallenge, CDnet
 _DECODERS = {
     b"\xff\xd8": "mjpeg",
     b"\x89PNG": "png",
@@ -39,7 +40,7 @@ class ImageSequence:
         self._stats = stats
         folder = self._paths[0].parent
         info = read_sequence_info(folder)
-        self.name = info.name or folder.resolve().name
+        self.name = info.name or _name(folder.resolve())
         self.fps = untimed_rate(info, settings, stats)
         self.frames = len(self._paths)
 
@@ -57,13 +58,12 @@ class ImageSequence:
 
 
 def images_in(folder: Path) -> list[Path]:
-    """The images of a folder. Raises SourceError if there are none, naming a sub-folder that has some."""
-    images = [path for path in folder.iterdir() if _is_image(path)]
-    if not images:
-        below = sorted(path.parent for path in folder.glob("*/*") if _is_image(path))
-        hint = f"did you mean {below[0]}?" if below else f"they should end in {' '.join(sorted(SUFFIXES))}"
-        raise SourceError(f"no images in folder {folder}; {hint}")
-    return images
+    """The images of a folder, or of the sub-folder where a data set keeps them. Raises SourceError without any."""
+    for place in (*(folder / name for name in _DATASET_FOLDERS), folder):
+        images = [path for path in place.iterdir() if _is_image(path)] if place.is_dir() else []
+        if images:
+            return images
+    raise SourceError(f"no images in folder {folder}; their names should end in {', '.join(sorted(SUFFIXES))}")
 
 
 def images_like(pattern: str) -> list[Path]:
@@ -80,6 +80,10 @@ def _is_image(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
 
 
+def _name(folder: Path) -> str:
+    return folder.parent.name if folder.name in _DATASET_FOLDERS else folder.name
+
+
 def _natural(path: Path) -> list[tuple[str, int]]:
     """Sort key that compares runs of digits as numbers."""
     parts = re.findall(r"(\D*)(\d*)", str(path))
@@ -91,7 +95,7 @@ def _read(path: Path) -> av.VideoFrame:
     try:
         data = path.read_bytes()
         codec = next(codec for magic, codec in _DECODERS.items() if data.startswith(magic))
-        (picture,) = av.CodecContext.create(codec, "r").decode(av.Packet(data))
+        (picture,) = av.VideoCodecContext.create(codec, "r").decode(av.Packet(data))
     except (OSError, av.FFmpegError) as error:
         raise SourceError(f"cannot read image {path}: {error.strerror}") from None
     except StopIteration:

@@ -47,7 +47,7 @@ def _converted(picture: av.VideoFrame) -> av.VideoFrame:
 def _plane(picture: av.VideoFrame, channel: int) -> Image:
     """(h, w) view of one plane; it keeps the decoder's memory alive."""
     plane = picture.planes[channel]
-    rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
     rows.flags.writeable = False  # the decoder predicts later pictures from this memory
     return rows
 
@@ -58,17 +58,16 @@ def _thinned(plane: Image, height: int, width: int) -> Image:
 
 
 def matched(frame: Frame, first: Frame) -> Frame:
-    """The frame scaled to the first one's size, with chroma exactly if the first has some: cameras go grey at night."""
+    """The frame in the first one's size, with chroma exactly if the first has some: cameras go grey at night."""
     if frame.shape == first.shape and (frame.u is None) == (first.u is None):
         return frame
     y = _scaled(frame.y, first.y)
     if first.u is None or first.v is None:
-        u = v = None
-    elif frame.u is None or frame.v is None:
-        u = v = np.full(first.u.shape, 128, np.uint8)
-    else:
-        u, v = _scaled(frame.u, first.u), _scaled(frame.v, first.v)
-    return replace(frame, y=y, u=u, v=v)
+        return replace(frame, y=y, u=None, v=None)
+    if frame.u is None or frame.v is None:
+        neutral = np.full(first.u.shape, 128, np.uint8)
+        return replace(frame, y=y, u=neutral, v=neutral)
+    return replace(frame, y=y, u=_scaled(frame.u, first.u), v=_scaled(frame.v, first.v))
 
 
 def _scaled(plane: Image, like: Image) -> Image:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import glob
-import math
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
@@ -17,10 +16,10 @@ from vidtrack.video.frame import Frame
 from vidtrack.video.pictures import ImageSequence, images_in, images_like
 from vidtrack.video.planes import matched, to_frame
 from vidtrack.video.readahead import ReadAhead
+from vidtrack.video.span import Span
 from vidtrack.video.stats import SourceStats
 
 _DEPTH = 4  # frames read ahead: enough to even out key frames, 50 MB at 4K
-_ROUNDING_S = 1e-6
 
 
 def open_source(path: str, settings: SourceSettings) -> Source:
@@ -49,8 +48,7 @@ class Source:
 
     def __init__(self, pictures: VideoFile | ImageSequence, settings: SourceSettings, stats: SourceStats) -> None:
         self._pictures = pictures
-        self._start_s = settings.start_s
-        self._end_s = math.inf if settings.end_s is None else settings.end_s
+        self._span = Span.of(settings)
         self.name = pictures.name
         self.fps = pictures.fps
         self.stats = stats
@@ -59,7 +57,7 @@ class Source:
         if first is None:
             raise SourceError(f"no picture of {pictures.name} can be decoded")
         self.height, self.width = first.shape
-        self.frames = self._expected(pictures.frames)
+        self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
         self._ahead = ReadAhead(self._alike(self._in_span(chain([first], frames)), first), _DEPTH)
 
     def __iter__(self) -> Source:
@@ -83,27 +81,18 @@ class Source:
         self._ahead.close()
         self._pictures.close()
 
-    def _expected(self, frames: int | None) -> int | None:
-        """Of `frames` in the whole input, how many lie in the span."""
-        if frames is None:
-            return None
-        first = math.ceil(self._start_s * self.fps - _ROUNDING_S)
-        return max(0, min(frames, math.floor(min(self._end_s * self.fps, frames) + _ROUNDING_S) + 1) - first)
-
     def _in_span(self, frames: Iterator[Frame]) -> Iterator[Frame]:
-        frame = None
         empty = True
+        last_s = 0.0
         for frame in frames:
-            if frame.time_s > self._end_s + _ROUNDING_S:
+            last_s = frame.time_s
+            if self._span.over(last_s):
                 break
-            if frame.time_s >= self._start_s - _ROUNDING_S:
+            if self._span.begun(last_s):
                 empty = False
                 yield frame
-        if empty and frame is not None:
-            raise SourceError(
-                f"{self.name} has no frame between {self._start_s:g} s and {self._end_s:g} s; "
-                f"the last one read is at {frame.time_s:g} s"
-            )
+        if empty:
+            raise SourceError(f"{self.name} has no frame between {self._span}; the last one read is at {last_s:g} s")
 
     def _alike(self, frames: Iterator[Frame], first: Frame) -> Iterator[Frame]:
         """All frames in the size and kind of the first; said once."""

@@ -24,7 +24,10 @@ from vidtrack.video.runs import find_runs
 
 _GAIN_STEP = 0.02  # smaller changes of exposure are left to learning
 _FIRST_S = 0.1  # plain averaging after a start
-_UNSURE_S, _UNSURE_GHOST_S = 10.0, 0.3  # after a start ghosts are many: for so long they need only so much cover
+_UNSURE_S = 10.0  # after a start ghosts are many: for so long
+_UNSURE_GHOST_S = 0.3  # they need only so much cover
+_SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
+_SUDDEN_SHARE, _SUDDEN_S = 0.25, 0.2  # of the picture, in at most this time: traffic does not come so fast
 
 
 class Disturbance:
@@ -49,7 +52,7 @@ class Disturbance:
             self._follow_exposure(picture)
         strength, hit = self._disturbed(picture)
         mask = self._cleaned(hit)
-        if self._whole_picture_changed(mask):
+        if self._whole_picture_changed(mask, dt):
             mask[:] = 0
             if self._time_s - self._steady_s > self._settings.relearn_s:
                 self._start(picture)
@@ -58,7 +61,7 @@ class Disturbance:
             self._heal_ghosts(picture, mask)
         self._learn(picture, mask, hit, dt)
         if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
-            self._absorb(picture, known)
+            self._absorb(picture, hit, known)
         return Foreground(mask, strength, self._step)
 
     def scene(self) -> Image:
@@ -72,15 +75,20 @@ class Disturbance:
         self._shape = frame.shape
         self._step = reduction(frame.shape[0], self._scale)
         self._black = np.float32(0 if frame.full_range else VIDEO_BLACK)
-        self._time_s = self._steady_s = frame.time_s
+        self._time_s = frame.time_s
         picture = smooth(reduce(frame, self._step))
         self._keep = kept(self._keep_image, picture.luma.shape)
         self._start(picture)
 
     def _start(self, picture: Picture) -> None:
         self._scene: Scene = start(picture)
-        self._start_s = self._time_s
+        self._start_s = self._steady_s = self._time_s
         self._frames = 0
+        self._share = 0.0
+
+    @property
+    def _unsure(self) -> bool:
+        return self._time_s - self._start_s < _UNSURE_S
 
     def _follow_exposure(self, picture: Picture) -> None:
         g = gain(picture.luma, self._scene.luma, self._black)
@@ -111,16 +119,21 @@ class Disturbance:
             mask &= self._keep
         return mask
 
-    def _whole_picture_changed(self, mask: Image) -> bool:
-        """Whether more is foreground than traffic can cover; `_steady_s` is the last time it was not."""
-        changed = np.count_nonzero(mask) > self._settings.relearn_share * mask.size
-        if not changed:
-            self._steady_s = self._time_s
-        return changed
+    def _whole_picture_changed(self, mask: Image, dt: float) -> bool:
+        """Whether the light or the view changed: more is foreground than traffic covers, or it came all at once.
+
+        `_steady_s` is the last time it was not so, and `_share` the foreground's share of the picture then.
+        """
+        share = np.count_nonzero(mask) / mask.size
+        lasting = self._steady_s < self._time_s - dt
+        sudden = (dt <= _SUDDEN_S or lasting) and share - self._share > _SUDDEN_SHARE
+        if sudden or share > self._settings.relearn_share:
+            return True
+        self._steady_s, self._share = self._time_s, share
+        return False
 
     def _heal_ghosts(self, picture: Picture, mask: Image) -> None:
-        unsure = self._time_s - self._start_s < _UNSURE_S
-        settled_s = min(self._settings.ghost_s, _UNSURE_GHOST_S) if unsure else self._settings.ghost_s
+        settled_s = min(self._settings.ghost_s, _UNSURE_GHOST_S) if self._unsure else self._settings.ghost_s
         row, begin, end = find_ghosts(mask, picture.luma, self._scene, np.float32(settled_s))
         adopt(picture, self._scene, row, begin, end)
         paint(mask, row, begin, end, 0)
@@ -138,12 +151,14 @@ class Disturbance:
         rates = np.float32([weight, -math.expm1(-dt / s.noise_s), dt])
         learn(picture, self._scene, covered, *rates)
 
-    def _absorb(self, picture: Picture, known: Floats) -> None:
-        """Take for scene what has stood for absorb_s, unless the tracker knows it for a vehicle."""
+    def _absorb(self, picture: Picture, hit: Image, known: Floats) -> None:
+        """Take for scene what has stood for absorb_s, unless the tracker knows it for a vehicle, and lasting shadow."""
         covered_s = self._scene.covered_s
         left, top, width, height = (np.asarray(known, dtype=float).reshape(-1, 4) / self._step).T
         for x0, y0, x1, y1 in np.stack([left, top, left + width + 1, top + height + 1], axis=1).clip(0).astype(int):
             inside = covered_s[y0:y1, x0:x1]
             np.minimum(inside, self._settings.absorb_s / 2, out=inside)
-        row, begin, end = find_runs((covered_s >= self._settings.absorb_s).astype(np.uint8), 1)
+        shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
+        lasting = (covered_s >= self._settings.absorb_s) | ((hit == SHADOW) & (covered_s >= shadow_s))
+        row, begin, end = find_runs(lasting.view(np.uint8), 1)
         adopt(picture, self._scene, row, begin, end)

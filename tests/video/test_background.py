@@ -1,0 +1,204 @@
+"""The robust disturbance map, on drawn scenes with known answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vidtrack.config import DetectorSettings
+from vidtrack.errors import Error
+from vidtrack.video.background import create
+from vidtrack.video.background.picture import reduction
+from vidtrack.video.frame import Frame
+
+NONE_KNOWN = np.empty((0, 4))
+CAR = (40, 24)  # width, height
+
+
+class Street:
+    """A textured road with sensor noise; what moves on it is painted per frame."""
+
+    def __init__(self, shape=(120, 160), seed=1, colour=True):
+        self.rng = np.random.default_rng(seed)
+        coarse = self.rng.uniform(90, 150, (shape[0] // 8 + 1, shape[1] // 8 + 1))
+        self.road = np.kron(coarse, np.ones((8, 8)))[: shape[0], : shape[1]]
+        self.half = ((shape[0] + 1) // 2, (shape[1] + 1) // 2)
+        self.colour = colour
+
+    def frame(self, time_s, cars=(), light=1.0, region=None):
+        """cars: (left, top, grey level); region: (slice, slice, values) painted over the road."""
+        y = self.road * light
+        if region is not None:
+            y[region[0], region[1]] = region[2]
+        for left, top, grey in cars:
+            y[top : top + CAR[1], max(left, 0) : max(left + CAR[0], 0)] = grey
+        y = np.clip(y + self.rng.normal(0, 2, y.shape), 0, 255).astype(np.uint8)
+        chroma = np.full(self.half, 128, np.uint8) if self.colour else None
+        return Frame(round(time_s * 25), time_s, y, chroma, chroma, full_range=True)
+
+
+def disturbance(scale=None, keep=None, **settings):
+    return create(DetectorSettings.model_validate({"kind": "disturbance", "disturbance": settings}), scale, keep)
+
+
+def play(detector, street, seconds, start=0.0, fps=10, known=NONE_KNOWN, **scene):
+    """Show the same scene for a while; the last foreground."""
+    for k in range(round(seconds * fps)):
+        foreground = detector.apply(street.frame(start + k / fps, **scene), known)
+    return foreground
+
+
+def covered(foreground, left, top):
+    """Share of the car's place that is foreground."""
+    return (foreground.mask[top : top + CAR[1], left : left + CAR[0]] > 0).mean()
+
+
+@pytest.mark.parametrize("colour", [True, False])
+def test_an_empty_road_shows_nothing_and_a_car_shows_whole(colour):
+    street, detector = Street(colour=colour), disturbance()
+    assert not play(detector, street, 2).mask.any()
+    foreground = play(detector, street, 0.1, start=2, cars=[(60, 50, 230)])
+    assert covered(foreground, 60, 50) > 0.95
+    assert (foreground.mask > 0).sum() < 1.15 * CAR[0] * CAR[1]
+    assert foreground.strength[60, 80] > 3
+    assert set(np.unique(foreground.mask)) == {0, 255}
+
+
+def test_a_car_of_the_road_s_luminance_is_seen_by_its_colour():
+    street, detector = Street(), disturbance()
+    play(detector, street, 1)
+    frame = street.frame(1.0)
+    frame.v[25:37, 30:50] = 170
+    assert covered(detector.apply(frame, NONE_KNOWN), 60, 50) > 0.9
+
+
+def test_a_stopped_car_stays_until_it_is_absorbed():
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    assert covered(play(detector, street, 58, start=2, fps=5, cars=[(60, 50, 230)]), 60, 50) > 0.95
+    assert not play(detector, street, 5, start=60, fps=5, cars=[(60, 50, 230)]).mask.any()
+
+
+def test_a_known_car_is_never_absorbed():
+    street, detector = Street(), disturbance(absorb_s=10)
+    play(detector, street, 2)
+    known = np.array([[58.0, 48.0, 44.0, 28.0]])
+    assert covered(play(detector, street, 40, start=2, fps=5, known=known, cars=[(60, 50, 230)]), 60, 50) > 0.95
+
+
+def test_a_moving_car_leaves_no_tail():
+    street, detector = Street(), disturbance()
+    play(detector, street, 1)
+    for k in range(20):
+        left = 5 * k
+        foreground = detector.apply(street.frame(1 + k / 10, cars=[(left, 50, 200)]), NONE_KNOWN)
+        columns = np.flatnonzero(foreground.mask.any(axis=0))
+        assert columns.min() >= left - 2
+        assert columns.max() <= left + CAR[0] + 1
+
+
+def test_a_car_of_the_first_frame_leaves_no_ghost():
+    street, detector = Street(), disturbance()
+    for k in range(30):
+        foreground = detector.apply(street.frame(k / 10, cars=[(30 + 12 * k, 50, 220)]), NONE_KNOWN)
+    assert not foreground.mask.any()
+
+
+def test_a_soft_shadow_is_not_foreground():
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    place = np.s_[50:74], np.s_[60:100]
+    foreground = play(detector, street, 0.3, start=2, region=(*place, 0.6 * street.road[place]))
+    assert covered(foreground, 60, 50) < 0.15
+    assert covered(play(disturbance(shadow=False), street, 2), 60, 50) == 0
+
+
+@pytest.mark.parametrize("light", [0.6, 1.4])
+def test_a_step_of_light_does_not_flood(light):
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    for k in range(20):
+        foreground = detector.apply(street.frame(2 + k / 10, light=light), NONE_KNOWN)
+        assert (foreground.mask > 0).mean() < 0.1
+    assert not foreground.mask.any()
+
+
+def test_another_view_is_learnt_in_seconds_and_does_not_flood():
+    street, other, detector = Street(seed=1), Street(seed=2), disturbance()
+    other.road = 240 - other.road[::-1] * 1.2
+    play(detector, street, 2)
+    for k in range(25):
+        foreground = detector.apply(other.frame(2 + k / 10), NONE_KNOWN)
+    assert not foreground.mask.any()
+    assert covered(play(detector, other, 0.1, start=4.5, cars=[(60, 50, 250)]), 60, 50) > 0.95
+
+
+def test_a_swaying_region_becomes_quiet():
+    street, detector = Street(), disturbance()
+    tree = np.s_[20:60], np.s_[20:60]
+    leaves = street.rng.uniform(60, 140, (48, 48))
+    shown = []
+    for k in range(200):
+        dx, dy = street.rng.integers(0, 3, 2)
+        view = np.kron(leaves, np.ones((1, 1)))[dy : dy + 40, dx : dx + 40]
+        shown.append((detector.apply(street.frame(k / 10, region=(*tree, view)), NONE_KNOWN).mask > 0).sum())
+    assert np.mean(shown[-50:]) < 0.02 * leaves.size
+
+
+def test_time_constants_are_seconds_at_any_rate():
+    levels = []
+    for fps in (10, 30):
+        street, detector = Street(), disturbance(exposure=False)
+        play(detector, street, 3, fps=fps)
+        street.road = street.road + 10  # below the threshold: learnt like any slow change
+        play(detector, street, 2, start=3, fps=fps)
+        levels.append(detector.scene().mean())
+    assert abs(levels[0] - levels[1]) < 0.5
+
+
+def test_a_gap_in_time_does_no_harm():
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    play(detector, street, 0.5, start=100)
+    assert not play(detector, street, 0.5, start=100.5).mask.any()
+
+
+def test_nothing_is_foreground_where_the_keep_picture_is_black():
+    street = Street()
+    keep = np.zeros((60, 80), np.uint8)
+    keep[:, :40] = 255
+    detector = disturbance(keep=keep)
+    play(detector, street, 1)
+    foreground = play(detector, street, 0.1, start=1, cars=[(60, 50, 230)])
+    assert covered(foreground, 60, 50) == pytest.approx(0.5, abs=0.05)
+    assert not foreground.mask[:, 80:].any()
+
+
+@pytest.mark.parametrize(("rows", "step"), [(120, 1), (240, 1), (576, 1), (580, 1), (720, 2), (1080, 2), (1440, 3), (2160, 4)])
+def test_large_pictures_are_reduced_to_at_most_580_rows(rows, step):
+    assert reduction(rows, None) == step
+    assert rows / step <= 580
+
+
+@pytest.mark.parametrize("kind", ["disturbance", "paper", "mog2", "knn"])
+@pytest.mark.parametrize(("shape", "scale"), [((121, 163), None), ((97, 131), 0.5), ((241, 323), 0.34), ((2160, 3840), None)])
+def test_every_detector_takes_odd_and_large_pictures(kind, shape, scale):
+    street = Street(shape)
+    detector = create(DetectorSettings(kind=kind), scale)
+    for k in range(10 if kind == "knn" else 2):  # OpenCV's KNN tells its scene after some frames
+        foreground = detector.apply(street.frame(k / 10), NONE_KNOWN)
+    assert foreground.mask.shape == foreground.strength.shape
+    assert foreground.full_size(shape).shape == shape
+    assert detector.scene().shape == (*shape, 3)
+    assert abs(detector.scene().mean() - street.road.mean()) < 5
+
+
+@pytest.mark.parametrize("kind", ["disturbance", "paper", "mog2", "knn"])
+def test_a_scene_before_the_first_frame_is_refused(kind):
+    with pytest.raises(Error, match="first frame"):
+        create(DetectorSettings(kind=kind)).scene()
+
+
+def test_the_window_must_have_a_middle():
+    with pytest.raises(ValueError, match="odd"):
+        disturbance(majority_px=6)

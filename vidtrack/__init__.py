@@ -1,0 +1,63 @@
+"""Vehicle tracks from traffic video and radar plots, on a plain CPU, without a neural network."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vidtrack.associate.gate import Gate as Gate
+    from vidtrack.associate.hard import GNN as GNN
+    from vidtrack.associate.hard import NN as NN
+    from vidtrack.config import Settings as Settings
+    from vidtrack.config import load as load_settings  # noqa: F401
+    from vidtrack.errors import ConfigError as ConfigError
+    from vidtrack.errors import Error as Error
+    from vidtrack.errors import FormatError as FormatError
+    from vidtrack.errors import OutputError as OutputError
+    from vidtrack.errors import ScanError as ScanError
+    from vidtrack.errors import SourceError as SourceError
+    from vidtrack.errors import StoppedEarly as StoppedEarly
+    from vidtrack.estimate.motion import ConstantVelocity as ConstantVelocity
+    from vidtrack.pipeline import track as track
+    from vidtrack.scan import Scan as Scan
+    from vidtrack.scan import Status as Status
+    from vidtrack.scan import Tracks as Tracks
+    from vidtrack.track.groups import Groups as Groups
+    from vidtrack.track.lifecycle import LifeCycle as LifeCycle
+    from vidtrack.track.tracker import Tracker as Tracker
+
+_HOME = {
+    "ConfigError": "errors",
+    "ConstantVelocity": "estimate.motion",
+    "Error": "errors",
+    "FormatError": "errors",
+    "GNN": "associate.hard",
+    "Gate": "associate.gate",
+    "Groups": "track.groups",
+    "LifeCycle": "track.lifecycle",
+    "NN": "associate.hard",
+    "OutputError": "errors",
+    "Scan": "scan",
+    "ScanError": "errors",
+    "Settings": "config",
+    "SourceError": "errors",
+    "Status": "scan",
+    "StoppedEarly": "errors",
+    "Tracker": "track.tracker",
+    "Tracks": "scan",
+    "load_settings": "config",
+    "track": "pipeline",
+}
+__all__ = sorted(_HOME)  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: `vidtrack --help` needs none of them.
+
+    `track` is a sub-package too; the function wins once it has been asked for.
+    """
+    if name not in _HOME:
+        raise AttributeError(f"module vidtrack has no attribute {name}")
+    module = import_module(f"vidtrack.{_HOME[name]}")
+    value = getattr(module, "load" if name == "load_settings" else name)
+    globals()[name] = value
+    return value

@@ -1,0 +1,52 @@
+"""Options that commands share."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def common(output_help: str) -> Callable[[Function], Function]:
+    """-o, --seed, --force, --quiet, -v: the same words in every command that writes results."""
+
+    def decorate(function: Function) -> Function:
+        for option in (
+            click.option("-v", "--verbose", count=True, help="Say more; twice: everything."),
+            click.option("--quiet", is_flag=True, help="Only errors: no progress, no warnings."),
+            click.option("--force", is_flag=True, help="Replace the results in a folder that is not empty."),
+            click.option("--seed", default=0, show_default=True, help="The same seed gives the same random numbers."),
+            click.option("-o", "--output", type=click.Path(path_type=Path), metavar="DIR", help=output_help),
+        ):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+def start_log(verbose: int, quiet: bool) -> None:
+    """Warnings of the library to stderr, in the form of our own messages."""
+    level = logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("vidtrack: %(levelname)s: %(message)s"))
+    logging.addLevelName(logging.WARNING, "warning")
+    logging.addLevelName(logging.INFO, "info")
+    logger = logging.getLogger("vidtrack")
+    logger.handlers = [handler]
+    logger.setLevel(level)
+    logger.propagate = False
+
+
+def settings_options(function: Function) -> Function:
+    """--config and --set."""
+    function = click.option(
+        "--set", "assignments", multiple=True, metavar="A.B=VALUE", help="One setting; repeat for more."
+    )(function)
+    return click.option(
+        "--config", "config_file", type=click.Path(path_type=Path), metavar="FILE.toml", help="Settings from a file."
+    )(function)

@@ -1,0 +1,56 @@
+"""Progress of a run: a bar with rate and remaining time on a terminal, a plain line now and then otherwise."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+import click
+
+Item = TypeVar("Item")
+LINE_EVERY_S = 10.0
+
+
+def progress(items: Iterable[Item], expected: int | None, name: str, quiet: bool) -> Iterator[Item]:
+    """The items, while stderr tells how far they are."""
+    if quiet:
+        return iter(items)
+    return _bar(items, expected, name) if sys.stderr.isatty() else _lines(items, expected, name)
+
+
+def _bar(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Item]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]:.0f} frames/s"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(name, total=expected, rate=0.0)
+        began, done, told = time.monotonic(), 0, 0.0
+        for item in items:
+            yield item
+            done += 1
+            elapsed = time.monotonic() - began
+            if elapsed - told > 0.1:
+                bar.update(task, completed=done, rate=done / elapsed)
+                told = elapsed
+
+
+def _lines(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Item]:
+    began = told = time.monotonic()
+    of = f" of {expected}" if expected else ""
+    done = 0
+    for done, item in enumerate(items, start=1):
+        yield item
+        now = time.monotonic()
+        if now - told > LINE_EVERY_S:
+            click.echo(f"{name}: frame {done}{of}, {done / (now - began):.0f} frames/s", err=True)
+            told = now
+    click.echo(f"{name}: {done} frames in {time.monotonic() - began:.1f} s", err=True)

@@ -1,0 +1,46 @@
+"""`vidtrack view`: a finished run in rerun."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command(
+    name="view",
+    short_help="Show a finished run in rerun.",
+    epilog="""\b
+Examples:
+  vidtrack view runs/motorway
+  vidtrack view runs/motorway --save motorway.rrd
+  vidtrack view runs/motorway --no-video""",
+)
+@click.argument("run", type=click.Path(path_type=Path))
+@click.option("--save", metavar="FILE.rrd", help="Write a recording instead of starting the viewer.")
+@click.option("--video/--no-video", default=True, help="Show the pictures of the source, if it is still there.")
+def command(run: Path, save: str | None, video: bool) -> None:
+    """Show the tracks of the folder RUN over its video, or over the background in tracks.png without one.
+
+    What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
+    while tracking, with --rerun.
+    """
+    from contextlib import closing
+
+    from vidtrack.output import replay
+    from vidtrack.output.rerun import RerunSink
+    from vidtrack.traffic.lines import parse_lines
+    from vidtrack.video.source import open_source
+
+    finished = replay.read_run(run)
+    height, width = finished.shape
+    lines = parse_lines(finished.settings.output.lines, width, height)
+    with closing(RerunSink(save or "spawn", finished.shape, finished.settings, lines)) as sink:
+        if video and Path(finished.source).exists():
+            with open_source(finished.source, finished.settings.source) as frames:
+                for step in replay.steps(finished, frames):
+                    sink.step(step)
+        else:
+            sink.background(replay.background(finished))
+            for step in replay.steps(finished):
+                sink.step(step)

@@ -1,0 +1,125 @@
+"""A run: a source tracked into a folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+from vidtrack.config import Settings
+from vidtrack.output.counts import CountsFile
+from vidtrack.output.decisions import DecisionLog
+from vidtrack.output.folder import open_run
+from vidtrack.output.masks import MaskFolder
+from vidtrack.output.mot import MotFile
+from vidtrack.output.plot import TrajectoryPlot
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.summary import Summary
+from vidtrack.output.tables import TrackTable
+from vidtrack.pipeline import build_detector, build_tracker, detection_steps, video_steps
+from vidtrack.traffic.lines import LineCounter, parse_lines
+from vidtrack.video.detections import Detections, is_detections, open_detections
+from vidtrack.video.source import Source, open_source
+
+
+class Run:
+    """Iterates over the steps of a source while the results are written; use it with `with`.
+
+    folder  where the results are
+    name, frames  of the source; frames may be None
+
+    Leaving the `with` block, whatever the reason, ends all results as complete and valid up to the
+    last whole step; `summary.json` says whether the run was interrupted.
+    Raises SourceError, ConfigError, OutputError at the start, StoppedEarly when results cannot be written on.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        settings: Settings,
+        output: Path | None = None,
+        *,
+        force: bool = False,
+        rerun: str | None = None,
+        video: Path | None = None,
+        masks: Path | None = None,
+        decisions: bool = False,
+    ) -> None:
+        with ExitStack() as stack:  # whatever fails below, what is open by then is closed
+            self._source = opened = _open(source, settings)
+            stack.callback(opened.close)
+            shape = (opened.height, opened.width)
+            tracker = build_tracker(settings.tracker, (opened.width, opened.height), explain=decisions or rerun is not None)
+            detector = None
+            if isinstance(opened, Source):
+                detector = build_detector(settings)
+                self._steps = video_steps(opened, detector, tracker, settings)
+            else:
+                self._steps = detection_steps(opened, tracker)
+            lines = parse_lines(settings.output.lines, opened.width, opened.height)
+            self.name, self.frames = opened.name, opened.frames
+            self.folder = open_run(output, opened.name, force)
+
+            counter = LineCounter(lines) if lines else None
+            self._summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
+            self._sinks: list[Sink] = []
+
+            def add(sink: Sink) -> None:
+                self._sinks.append(sink)
+                stack.callback(sink.close)
+
+            add(self._summary)
+            add(TrackTable(self.folder))
+            add(MotFile(self.folder / "mot.txt"))
+            add(TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines))
+            if counter is not None:
+                add(CountsFile(self.folder / "counts.csv", counter))
+            if decisions:
+                add(DecisionLog(self.folder / "decisions.csv"))
+            if masks is not None:
+                add(MaskFolder(masks))
+            if video is not None:
+                from vidtrack.output.video import AnnotatedVideo
+
+                add(AnnotatedVideo(video, opened.fps, settings.output, lines))
+            if rerun is not None:
+                from vidtrack.output.rerun import RerunSink
+
+                add(RerunSink(rerun, shape, settings, lines))
+            self._open = stack.pop_all()
+
+    def __iter__(self) -> Iterator[Step]:
+        for step in self._steps:
+            for sink in self._sinks:
+                sink.step(step)
+            yield step
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._summary.interrupted = kind is not None
+        self._open.__exit__(kind, error, trace)
+
+    def _reading(self) -> dict[str, object]:
+        source, stats = self._source, self._source.stats
+        return {
+            "fps": round(source.fps, 6),
+            "width": source.width,
+            "height": source.height,
+            "frames_read": stats.frames_read,
+            "frames_dropped": stats.frames_dropped,
+            "decode_errors": stats.decode_errors,
+            "reconnects": 0,
+            "stalls": 0,
+            "truncated": stats.truncated,
+        }
+
+
+def _open(source: str, settings: Settings) -> Source | Detections:
+    if is_detections(source):
+        return open_detections(source, settings.source)
+    return open_source(source, settings.source)
