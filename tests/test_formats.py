@@ -138,7 +138,7 @@ def test_a_bad_csv_is_explained(tmp_path, old, new, message):
 
 
 def test_a_table_without_positions_names_the_nearest(tmp_path):
-    with pytest.raises(FormatError, match="no positions: nearest .*'x_pix'"):
+    with pytest.raises(FormatError, match=r"no positions: nearest .*'x_pix'"):
         formats.read(written(tmp_path, "frame,track_id,x_pix\n0,1,2\n", "a.csv"))
 
 

@@ -28,6 +28,7 @@ def judged(result: Table, truth: Table, iou: float) -> Table:
     image = result.frame + 1
     result = result.select((image >= FIRST) & (image <= LAST) & (result.xy[:, 1] >= FAR_Y))
     matchup = score.match_boxes(result, truth)
+    assert result.box is not None  # or it could not have been matched
     counts = (result.xy[:, 1] >= ENTRY_Y) & (result.box[:, 1] + result.box[:, 3] < BOTTOM_Y)
     counts[matchup.result[correspondences(matchup, iou)]] = True
     return result.select(counts)

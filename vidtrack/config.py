@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 from pydantic.fields import FieldInfo
 
 from vidtrack.errors import ConfigError
@@ -29,11 +29,19 @@ class SourceSettings(_Group):
     end_s: float | None = Field(None, ge=0)
     """s; frames after this media time are skipped; None: to the end"""
     fps: float | None = Field(None, gt=0, le=1000)
-    """frames/s for inputs that carry no time (image folders, MOT files); None: seqinfo.ini, else 25"""
+    """frames/s where the input carries no times or wrong ones; None: the video's own, seqinfo.ini's, else 25"""
     scale: float | None = Field(None, gt=0, le=1)
     """processed size over source size; None: 1 up to 580 rows, then 1 over the smallest integer that gets there"""
     mask: Path | None = None
     """picture whose white part is kept; None: everything"""
+
+    @field_validator("end_s")
+    @classmethod
+    def _after_start(cls, end_s: float | None, given: ValidationInfo) -> float | None:
+        start_s = given.data.get("start_s", 0.0)
+        if end_s is not None and end_s < start_s:
+            raise ValueError(f"must not be before source.start_s = {start_s:g}")
+        return end_s
 
 
 class DisturbanceSettings(_Group):

@@ -207,6 +207,11 @@ class Tracks:
         return len(self.id)
 
     @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(T,) whether this scan shows the track, alone or in a blob it shares."""
+        return np.asarray((self.measurement >= 0) | (self.status == Status.MERGED))
+
+    @property
     def xy(self) -> Floats:
         """(T, d) positions."""
         return self.x[:, list(self.position)]

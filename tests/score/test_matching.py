@@ -56,12 +56,8 @@ def test_only_rows_of_equal_frames_are_paired_whatever_their_order():
 
 def test_pairs_do_not_depend_on_the_size_of_blocks(monkeypatch):
     rng = np.random.default_rng(0)
-    tables = [
-        box_table(
-            rng.integers(0, 9, 200), np.arange(200), np.hstack([rng.uniform(0, 50, (200, 2)), np.full((200, 2), 20)])
-        )
-        for _ in range(2)
-    ]
+    box = np.hstack([rng.uniform(0, 50, (400, 2)), np.full((400, 2), 20)])
+    tables = [box_table(rng.integers(0, 9, 200), np.arange(200), half) for half in np.split(box, 2)]
     whole = match_boxes(*tables)
     monkeypatch.setattr(matching, "PAIRS_AT_ONCE", 50)
     blocks = match_boxes(*tables)

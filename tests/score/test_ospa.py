@@ -70,11 +70,15 @@ def test_each_frame_has_its_own_distance():
     np.testing.assert_allclose(found.distance, [6, CUTOFF, CUTOFF])
 
 
-@pytest.mark.parametrize(("cutoff", "order"), [(0, 2), (-1, 2), (10.1, 2), (10, 0.5)])
+@pytest.mark.parametrize(("cutoff", "order"), [(0, 2), (-1, 2), (10.1, 2), (np.nan, 2), (10, 0.5), (10, np.inf)])
 def test_senseless_parameters_are_refused(cutoff, order):
     matchup = match_points(points([[0, 0]]), points([[0, 0]]), max_distance=5)
     with pytest.raises(ConfigError, match="must be"):
         ospa(matchup, cutoff, order)
+
+
+def test_a_very_high_order_tends_to_the_largest_distance():
+    assert of_sets(ospa, [[0, 0], [50, 0]], [[0, 3], [50, 8]], order=300).distance == pytest.approx(8, rel=1e-2)
 
 
 @given(SETS, SETS, ORDERS)

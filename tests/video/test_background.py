@@ -174,14 +174,18 @@ def test_nothing_is_foreground_where_the_keep_picture_is_black():
     assert not foreground.mask[:, 80:].any()
 
 
-@pytest.mark.parametrize(("rows", "step"), [(120, 1), (240, 1), (576, 1), (580, 1), (720, 2), (1080, 2), (1440, 3), (2160, 4)])
+@pytest.mark.parametrize(
+    ("rows", "step"), [(120, 1), (240, 1), (576, 1), (580, 1), (720, 2), (1080, 2), (1440, 3), (2160, 4)]
+)
 def test_large_pictures_are_reduced_to_at_most_580_rows(rows, step):
     assert reduction(rows, None) == step
     assert rows / step <= 580
 
 
 @pytest.mark.parametrize("kind", ["disturbance", "paper", "mog2", "knn"])
-@pytest.mark.parametrize(("shape", "scale"), [((121, 163), None), ((97, 131), 0.5), ((241, 323), 0.34), ((2160, 3840), None)])
+@pytest.mark.parametrize(
+    ("shape", "scale"), [((121, 163), None), ((97, 131), 0.5), ((241, 323), 0.34), ((2160, 3840), None)]
+)
 def test_every_detector_takes_odd_and_large_pictures(kind, shape, scale):
     street = Street(shape)
     detector = create(DetectorSettings(kind=kind), scale)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -70,7 +71,7 @@ class Gate:
         """Largest admitted squared distance in `dim` dimensions."""
         if self.distance == "euclidean":
             return self.radius**2
-        return float(chi2.ppf(self.probability, dim))
+        return _quantile(self.probability, dim)
 
     def pairs(self, zhat: Floats, cov: Floats, scan: Scan, run: Ints | None = None) -> Pairs:
         """All pairs inside the gate; those of different Monte Carlo runs never meet.
@@ -91,6 +92,11 @@ class Gate:
         )  # fmt: skip
         start = np.searchsorted(row, np.arange(len(zhat) + 1))
         return Pairs(row, measurement, d2, log_s, limit, start)
+
+
+@lru_cache
+def _quantile(probability: float, dim: int) -> float:
+    return float(chi2.ppf(probability, dim))
 
 
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
@@ -117,12 +123,12 @@ class Grid:
 
     @classmethod
     def over(cls, z: Floats, run: Ints, reach: Floats) -> Grid:
-        """z (M, 1 or 2) points; the cell follows the median gate, bounded to about one point a cell."""
+        """z (M, 1 or 2) points; the cell follows the mean gate, bounded to about one point a cell."""
         z = z if z.shape[1] == 2 else np.column_stack([z[:, 0], np.zeros(len(z))])
         origin = z.min(axis=0, initial=np.inf) if len(z) else np.zeros(2)
         extent = z.max(axis=0) - origin if len(z) else np.zeros(2)
         finite = reach[np.isfinite(reach).all(axis=1)]
-        cell = np.median(finite, axis=0) if len(finite) else np.ones(2)
+        cell = finite.mean(axis=0) if len(finite) else np.ones(2)
         most = max(1.0, np.ceil(np.sqrt(len(z))) * 2)
         cell = np.maximum(np.maximum(cell, extent / most), 1e-9)
         shape = (extent // cell).astype(np.int64) + 1
@@ -144,10 +150,10 @@ def _gated(
     d2, log_s = np.empty(size), np.empty(size)
     n = 0
     L, v = np.empty((m, m)), np.empty(m)
+    low, high = np.empty(2, np.int64), np.empty(2, np.int64)
     for t in range(rows):
         first = n
-        low, high = np.empty(2, np.int64), np.empty(2, np.int64)
-        outside = False
+        outside = len(key) == 0 or limit[t] == 0.0
         for a in range(2):
             at = zhat[t, a] if a < m else 0.0
             below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
@@ -155,7 +161,7 @@ def _gated(
             outside |= not (below < shape[a] and above >= 0)
             low[a] = max(0.0, min(below, shape[a] - 1.0))
             high[a] = max(0.0, min(above, shape[a] - 1.0))
-        if outside or len(key) == 0:
+        if outside:
             continue
         for line in range(low[1], high[1] + 1):
             base = (own[t] * shape[1] + line) * shape[0]
@@ -163,10 +169,8 @@ def _gated(
             while at < len(key) and key[at] <= base + high[0]:
                 j = order[at]
                 at += 1
-                for a in range(m):
-                    v[a] = z[j, a] - zhat[t, a]
-                distance, log_det = _distance(v, cov[t], R[j], L, mode)
-                if not distance <= limit[t] or limit[t] == 0.0:
+                distance, log_det = _distance(zhat, cov, t, z, R, j, v, L, mode)
+                if not distance <= limit[t]:
                     continue
                 if n == size:
                     size *= 2
@@ -174,26 +178,31 @@ def _gated(
                     d2, log_s = _grown(d2, size), _grown(log_s, size)
                 row[n], measurement[n], d2[n], log_s[n] = t, j, distance, log_det
                 n += 1
-        if n - first > 1:  # the grid's order depends on the cell size; results must not
-            index = np.argsort(measurement[first:n])
-            measurement[first:n] = measurement[first:n][index]
-            d2[first:n] = d2[first:n][index]
-            log_s[first:n] = log_s[first:n][index]
+        for k in range(first + 1, n):  # the grid's order depends on the cell size; results must not
+            while k > first and measurement[k - 1] > measurement[k]:
+                measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
+                d2[k - 1], d2[k] = d2[k], d2[k - 1]
+                log_s[k - 1], log_s[k] = log_s[k], log_s[k - 1]
+                k -= 1
     return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), log_s[:n].copy()
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _distance(v: Floats, cov: Floats, R: Floats, L: Floats, mode: int) -> tuple[float, float]:
-    """Squared distance of an innovation and ln|S|, S = cov + R, by Cholesky; v is overwritten."""
+def _distance(
+    zhat: Floats, cov: Floats, t: int, z: Floats, R: Floats, j: int, v: Floats, L: Floats, mode: int
+) -> tuple[float, float]:
+    """Squared distance of measurement j from row t and ln|S|, S = cov + R, by Cholesky; v and L are scratch."""
     m = len(v)
-    total, log_det = 0.0, 0.0
-    if mode == 2:
-        for a in range(m):
+    total, det = 0.0, 1.0
+    for a in range(m):
+        v[a] = z[j, a] - zhat[t, a]
+        if mode == 2:
             total += v[a] * v[a]
+    if mode == 2:
         return total, 0.0
     for a in range(m):
         for b in range(a + 1):
-            entry = cov[a, b] + R[a, b]
+            entry = cov[t, a, b] + R[j, a, b]
             if mode == 1 and a != b:
                 entry = 0.0
             for c in range(b):
@@ -203,8 +212,8 @@ def _distance(v: Floats, cov: Floats, R: Floats, L: Floats, mode: int) -> tuple[
             v[a] -= L[a, c] * v[c]
         v[a] /= L[a, a]
         total += v[a] * v[a]
-        log_det += 2.0 * np.log(L[a, a])
-    return total, log_det
+        det *= L[a, a]
+    return total, 2.0 * np.log(det)
 
 
 @njit(cache=True, nogil=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -67,7 +68,5 @@ def command(
 
     clip = simulate(scenario, seed=seed, fps=fps, size=size, noise=noise, shake=shake, light_steps=light_steps)
     folder = open_run(output, scenario, force)
-    with click.progressbar(
-        clip, length=len(clip), label=str(folder), file=click.get_text_stream("stderr"), hidden=quiet
-    ) as frames:
+    with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=quiet) as frames:
         write(clip, folder, frames)

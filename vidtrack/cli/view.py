@@ -25,8 +25,9 @@ def command(run: Path, save: str | None, video: bool) -> None:
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
     while tracking, with --rerun.
     """
-    from contextlib import closing
+    from contextlib import ExitStack, closing, suppress
 
+    from vidtrack.errors import SourceError
     from vidtrack.output import replay
     from vidtrack.output.rerun import RerunSink
     from vidtrack.traffic.lines import parse_lines
@@ -35,12 +36,13 @@ def command(run: Path, save: str | None, video: bool) -> None:
     finished = replay.read_run(run)
     height, width = finished.shape
     lines = parse_lines(finished.settings.output.lines, width, height)
-    with closing(RerunSink(save or "spawn", finished.shape, finished.settings, lines)) as sink:
-        if video and Path(finished.source).exists():
-            with open_source(finished.source, finished.settings.source) as frames:
-                for step in replay.steps(finished, frames):
-                    sink.step(step)
-        else:
+    with ExitStack() as stack:
+        sink = stack.enter_context(closing(RerunSink(save or "spawn", finished.shape, finished.settings, lines)))
+        frames = None
+        if video:
+            with suppress(SourceError):
+                frames = stack.enter_context(open_source(finished.source, finished.settings.source))
+        if frames is None:
             sink.background(replay.background(finished))
-            for step in replay.steps(finished):
-                sink.step(step)
+        for step in replay.steps(finished, frames):
+            sink.step(step)

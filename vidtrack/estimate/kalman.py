@@ -41,7 +41,7 @@ class KalmanBank:
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance H P H' (T, m, m); the innovation covariance is that plus R."""
         H = sensor.H(self.x, self.model.position)
-        return sensor.h(self.x, self.model.position), H @ self.P @ np.swapaxes(H, 1, 2)
+        return sensor.h(self.x, self.model.position), _project(self.P, H)
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
         """Successor rows from the weights of a decision (paper 004, eqs. 3 to 5; mixtures moment-matched)."""
@@ -100,69 +100,27 @@ def _propagate(x: Floats, P: Floats, F: Floats, Q: Floats) -> tuple[Floats, Floa
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def gain(P: Floats, H: Floats, R: Floats, K: Floats) -> None:
-    """K = P H' S^-1, S = H P H' + R, by a Cholesky factor of S. P (n, n), H (m, n), R (m, m), K (n, m) is filled."""
-    m, n = H.shape
-    PH = np.empty((n, m))
-    L = np.empty((m, m))
-    for i in range(n):
+def _project(P: Floats, H: Floats) -> Floats:
+    """H P H' (T, m, m) for all rows; H (T, m, n) or (1, m, n)."""
+    rows, n = P.shape[:2]
+    m = H.shape[1]
+    out, HP = np.empty((rows, m, m)), np.empty((m, n))
+    for t in range(rows):
+        h = min(t, len(H) - 1)
         for a in range(m):
-            total = 0.0
-            for k in range(n):
-                total += P[i, k] * H[a, k]
-            PH[i, a] = total
-    for a in range(m):
-        for b in range(a + 1):
-            total = R[a, b]
-            for k in range(n):
-                total += H[a, k] * PH[k, b]
-            for c in range(b):
-                total -= L[a, c] * L[b, c]
-            L[a, b] = np.sqrt(total) if a == b else total / L[b, b]
-    for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for k in range(n):
+                    total += H[h, a, k] * P[t, k, j]
+                HP[a, j] = total
         for a in range(m):
-            total = PH[i, a]
-            for c in range(a):
-                total -= L[a, c] * K[i, c]
-            K[i, a] = total / L[a, a]
-        for a in range(m - 1, -1, -1):
-            total = K[i, a]
-            for c in range(a + 1, m):
-                total -= L[c, a] * K[i, c]
-            K[i, a] = total / L[a, a]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _joseph(P: Floats, H: Floats, R: Floats, K: Floats, out: Floats) -> None:
-    """(I - K H) P (I - K H)' + K R K': positive definite whatever the rounding."""
-    m, n = H.shape
-    A, AP, KR = np.empty((n, n)), np.empty((n, n)), np.empty((n, m))
-    for i in range(n):
-        for j in range(n):
-            total = 1.0 if i == j else 0.0
-            for a in range(m):
-                total -= K[i, a] * H[a, j]
-            A[i, j] = total
-        for a in range(m):
-            total = 0.0
-            for b in range(m):
-                total += K[i, b] * R[b, a]
-            KR[i, a] = total
-    for i in range(n):
-        for j in range(n):
-            total = 0.0
-            for k in range(n):
-                total += A[i, k] * P[k, j]
-            AP[i, j] = total
-    for i in range(n):
-        for j in range(i, n):
-            total = 0.0
-            for k in range(n):
-                total += AP[i, k] * A[j, k]
-            for a in range(m):
-                total += KR[i, a] * K[j, a]
-            out[i, j] = total
-            out[j, i] = total
+            for b in range(a, m):
+                total = 0.0
+                for k in range(n):
+                    total += HP[a, k] * H[h, b, k]
+                out[t, a, b] = total
+                out[t, b, a] = total
+    return out
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -174,34 +132,94 @@ def _update(
     rows, n = len(parent), x.shape[1]
     m = z.shape[1]
     x1, P1 = np.empty((rows, n)), np.empty((rows, n, n))
-    K, branch = np.empty((n, m)), np.empty((n, n))
+    K, L, A, AP = np.empty((n, m)), np.empty((m, m)), np.empty((n, n)), np.empty((n, n))
+    shift, mean = np.empty(n), np.empty(n)
     for k in range(rows):
         t = parent[k]
-        h = H[min(t, len(H) - 1)]
-        if start[k + 1] - start[k] == 1 and beta0[k] == 0.0:  # one measurement for certain: the Kalman update itself
-            j = measurement[start[k]]
-            gain(P[t], h, R[j], K)
-            _joseph(P[t], h, R[j], K, P1[k])
-            for i in range(n):
-                x1[k, i] = x[t, i]
-                for a in range(m):
-                    x1[k, i] += K[i, a] * (z[j, a] - zhat[t, a])
-            continue
-        mean, second = np.zeros(n), beta0[k] * P[t]  # about the prediction
+        h = min(t, len(H) - 1)
+        for i in range(n):  # moments about the prediction
+            mean[i] = 0.0
+            for c in range(n):
+                P1[k, i, c] = beta0[k] * P[t, i, c]
         for b in range(start[k], start[k + 1]):
             j = measurement[b]
-            gain(P[t], h, R[j], K)
-            _joseph(P[t], h, R[j], K, branch)
-            shift = np.zeros(n)
+            _gain(P, t, H, h, R, j, K, L)
             for i in range(n):
+                shift[i] = 0.0
                 for a in range(m):
                     shift[i] += K[i, a] * (z[j, a] - zhat[t, a])
                 mean[i] += beta[b] * shift[i]
-            for i in range(n):
-                for c in range(n):
-                    second[i, c] += beta[b] * (branch[i, c] + shift[i] * shift[c])
+            _add_branch(P, t, H, h, R, j, K, A, AP, shift if beta[b] < 1.0 else np.zeros(0), beta[b], P1, k)
+        mixed = start[k + 1] - start[k] > 1 or beta0[k] > 0.0
         for i in range(n):
             x1[k, i] = x[t, i] + mean[i]
-            for c in range(n):
-                P1[k, i, c] = second[i, c] - mean[i] * mean[c]
+            if mixed:
+                for c in range(n):
+                    P1[k, i, c] -= mean[i] * mean[c]
     return x1, P1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gain(P: Floats, t: int, H: Floats, h: int, R: Floats, j: int, K: Floats, L: Floats) -> None:
+    """K = P H' S^-1, S = H P H' + R, by a Cholesky factor of S (paper 004, eq. 3); K (n, m) and L (m, m) are filled."""
+    m, n = H.shape[1:]
+    for i in range(n):
+        for a in range(m):
+            total = 0.0
+            for k in range(n):
+                total += P[t, i, k] * H[h, a, k]
+            K[i, a] = total  # P H'
+    for a in range(m):
+        for b in range(a + 1):
+            total = R[j, a, b]
+            for k in range(n):
+                total += H[h, a, k] * K[k, b]
+            for c in range(b):
+                total -= L[a, c] * L[b, c]
+            L[a, b] = np.sqrt(total) if a == b else total / L[b, b]
+    for i in range(n):
+        for a in range(m):
+            for c in range(a):
+                K[i, a] -= L[a, c] * K[i, c]
+            K[i, a] /= L[a, a]
+        for a in range(m - 1, -1, -1):
+            for c in range(a + 1, m):
+                K[i, a] -= L[c, a] * K[i, c]
+            K[i, a] /= L[a, a]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_branch(
+    P: Floats, t: int, H: Floats, h: int, R: Floats, j: int, K: Floats, A: Floats, AP: Floats,
+    shift: Floats, weight: float, out: Floats, k: int,
+) -> None:  # fmt: skip
+    """Add weight times the updated covariance and, where it is given, the spread shift shift'.
+
+    (I - K H) P (I - K H)' + K R K' (Joseph) is positive definite whatever the rounding.
+    """
+    m, n = H.shape[1:]
+    for i in range(n):
+        for c in range(n):
+            total = 1.0 if i == c else 0.0
+            for a in range(m):
+                total -= K[i, a] * H[h, a, c]
+            A[i, c] = total
+    for i in range(n):
+        for c in range(n):
+            total = 0.0
+            for d in range(n):
+                total += A[i, d] * P[t, d, c]
+            AP[i, c] = total
+    for i in range(n):
+        for c in range(i, n):
+            total = 0.0
+            for d in range(n):
+                total += AP[i, d] * A[c, d]
+            for a in range(m):
+                for b in range(m):
+                    total += K[i, a] * R[j, a, b] * K[c, b]
+            if len(shift):
+                total += shift[i] * shift[c]
+            out[k, i, c] += weight * total
+            if c != i:
+                out[k, c, i] += weight * total

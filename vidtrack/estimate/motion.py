@@ -24,6 +24,7 @@ class ConstantVelocity:
              is constant over each step, Q = accel^2 G G', G = [dt^2/2, dt] (the papers' model)
     warmup   updates during which the noise stays isotropic, because the heading is not yet known;
              an ellipse along a wrong heading makes the filter overconfident (paper 004, SPEC trap)
+    heading  a row's heading is known while its speed is above this many standard deviations of itself
     per_size accel, cross and speed are in object sizes instead of pixels or metres
     """
 
@@ -33,6 +34,7 @@ class ConstantVelocity:
     speed: float = 10.0
     hold_s: float | None = None
     warmup: int = 6
+    heading: float = 3.0
     per_size: bool = False
 
     def __post_init__(self) -> None:
@@ -85,12 +87,12 @@ class ConstantVelocity:
         return A
 
     def settled(self, x: Floats, P: Floats, hits: np.ndarray) -> Settled:
-        """(T,) rows whose heading is known: enough updates, and a speed above three sigma of itself."""
+        """(T,) rows whose heading is known: enough updates, and a speed well above its own uncertainty."""
         if self.cross is None:
             return np.zeros(len(x), bool)
         v = x[:, self.velocity]
         variance = P[:, self.velocity, self.velocity].max(axis=1)
-        return (hits > self.warmup) & ((v * v).sum(axis=1) > 9 * variance)
+        return (hits > self.warmup) & ((v * v).sum(axis=1) > self.heading**2 * variance)
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
         """State and covariance of new rows from one located measurement each.

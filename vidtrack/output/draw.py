@@ -16,9 +16,11 @@ from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
 Colour = tuple[int, ...]
+BLACK: Colour = (0, 0, 0)
 WHITE: Colour = (255, 255, 255)
 GREY: Colour = (170, 170, 170)
 LINE: Colour = (0, 220, 255)
+_LUMA = (0.114, 0.587, 0.299)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
@@ -40,7 +42,7 @@ class Pen:
         self.picture = picture
         height = min(picture.shape[:2])
         self.width = max(1, round(height / 450))
-        self.text_scale = max(0.35, height / 1400)
+        self.text_scale = max(0.35, height / 1600)
 
     def path(self, points: ArrayLike, ink: Colour, width: int = 1) -> None:
         """A polyline through (n, 2) points."""
@@ -63,15 +65,16 @@ class Pen:
     def size(self, text: str) -> tuple[int, int]:
         """Width and height of a label in pixels."""
         (width, height), _ = cv2.getTextSize(text, _FONT, self.text_scale, self.width)
-        return width + 4, height + 5
+        return width + 4, height + 2
 
     def label(self, text: str, left: float, bottom: float, ink: Colour) -> None:
-        """Black text on a patch of colour, kept inside the picture."""
+        """Black or white text on a patch of colour, kept inside the picture."""
         width, height = self.size(text)
         x = int(np.clip(left, 0, max(0, self.picture.shape[1] - width)))
         y = int(np.clip(bottom, height, self.picture.shape[0]))
         cv2.rectangle(self.picture, (x, y - height), (x + width, y), ink, -1)
-        cv2.putText(self.picture, text, (x + 2, y - 3), _FONT, self.text_scale, (0, 0, 0), self.width, cv2.LINE_AA)
+        text_ink = BLACK if np.dot(ink, _LUMA) > 100 else WHITE
+        cv2.putText(self.picture, text, (x + 2, y - 2), _FONT, self.text_scale, text_ink, self.width, cv2.LINE_AA)
 
 
 def draw_trails(pen: Pen, paths: Mapping[int, Floats]) -> None:
@@ -101,10 +104,9 @@ def draw_tracks(pen: Pen, tracks: Tracks) -> None:
 def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str, int]] | None = None) -> None:
     """Counting lines with their names and, given totals, their counts."""
     for line in lines:
-        pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE, width=2)
+        pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE)
         counts = "".join(f" {way} {n}" for way, n in (totals or {}).get(line.name, {}).items())
-        width, height = pen.size(line.name + counts)
-        pen.label(line.name + counts, (line.x1 + line.x2 - width) / 2, (line.y1 + line.y2 + height) / 2, LINE)
+        pen.label(line.name + counts, line.x1, line.y1, LINE)
 
 
 def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:

@@ -6,7 +6,8 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from io import FileIO
 from itertools import count
 from pathlib import Path
 
@@ -49,6 +50,20 @@ def writing(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise StoppedEarly(f"stopped: cannot write {path}: {reason}; what was written before is valid") from None
+
+
+def append(file: FileIO, block: bytes) -> None:
+    """Write all of `block` at the end of an unbuffered file; when the disk refuses, raise OSError and write none."""
+    start = file.tell()
+    rest = memoryview(block)
+    try:
+        while rest:
+            rest = rest[file.write(rest) :]
+    except OSError:
+        with suppress(OSError):  # the disk may be gone altogether; the first error says more
+            file.truncate(start)
+            file.seek(start)
+        raise
 
 
 def _next_free(source_name: str) -> Path:

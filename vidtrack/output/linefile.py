@@ -6,7 +6,7 @@ import os
 import time
 from pathlib import Path
 
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import append, writing
 
 
 class Every:
@@ -31,7 +31,6 @@ class LineFile:
         self.path = path
         self._due = Every(1.0)
         self._waiting: list[str] = []
-        self._size = 0
         with writing(path):
             # Unbuffered: what a failed write left in a buffer would fail again on closing.
             self._file = open(path, "wb", buffering=0)  # noqa: SIM115
@@ -49,15 +48,7 @@ class LineFile:
         block = "".join(self._waiting).encode()
         self._waiting.clear()
         with writing(self.path):
-            try:
-                rest = memoryview(block)
-                while rest:
-                    rest = rest[self._file.write(rest) :]
-            except OSError:
-                self._file.truncate(self._size)
-                self._file.seek(self._size)
-                raise
-        self._size += len(block)
+            append(self._file, block)
 
     def close(self) -> None:
         """Write what waits."""

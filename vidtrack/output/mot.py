@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.output.linefile import Every, LineFile, sort_rows
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Ints, Status
+from vidtrack.scan import Floats, Ints
 
 _FRAME, _ID, _SEEN = 0, 1, 7
 
@@ -54,10 +54,9 @@ class MotFile:
 def _rows(step: Step) -> Floats:
     """(T, 8) frame, id, left, top, width, height, conf, seen."""
     tracks = step.tracks
-    seen = (tracks.measurement >= 0) | (tracks.status == Status.MERGED)
     frame = np.full(len(tracks), step.index + 1)
     conf = np.where(np.isnan(tracks.existence), 1.0, tracks.existence)
-    rows = np.column_stack([frame, tracks.id, tracks.box, conf, seen])
+    rows = np.column_stack([frame, tracks.id, tracks.box, conf, tracks.seen])
     return rows[~np.isnan(tracks.box).any(axis=1)]
 
 

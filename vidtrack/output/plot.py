@@ -11,7 +11,7 @@ import numpy as np
 from vidtrack.output.draw import Pen, colour, draw_lines
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Status
+from vidtrack.scan import Floats
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
@@ -19,7 +19,7 @@ _SIDE = 960
 """Pixels; smaller pictures are enlarged to about this, or their numbers could not be read."""
 
 _NUMBERED = 150
-"""Tracks that get their number; in a longer run the last ones do."""
+"""Most tracks that get their number; in a longer run the last ones do."""
 
 
 class TrajectoryPlot:
@@ -46,7 +46,7 @@ class TrajectoryPlot:
     def step(self, step: Step) -> None:
         """Extend the trajectories of one frame's confirmed tracks; a coasted gap becomes a straight line."""
         tracks = step.tracks
-        seen = (tracks.status != Status.COASTING) & (tracks.status != Status.TENTATIVE) | (tracks.measurement >= 0)
+        seen = tracks.seen
         alive = set(tracks.id.tolist())
         for track_id in self._last.keys() - alive:
             self._ends[track_id] = self._last.pop(track_id)
@@ -73,13 +73,15 @@ class TrajectoryPlot:
             self._path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
     def _number(self, pen: Pen) -> None:
-        """Each track's number at its end, moved down while it would cover another."""
+        """Each track's number at its end, or in the nearest free place above or below."""
         free = np.ones(self._layer.shape[:2], bool)
         for track_id, xy in sorted((self._ends | self._last).items()):
             width, height = pen.size(str(track_id))
             x = int(np.clip(xy[0] * self._zoom, 0, max(0, free.shape[1] - width)))
-            y = int(np.clip(xy[1] * self._zoom, height, free.shape[0]))
-            while y < free.shape[0] and not free[y - height : y, x : x + width].all():
-                y += 2
-            free[y - height : y, x : x + width] = False
-            pen.label(str(track_id), x, y, colour(track_id))
+            end = int(np.clip(xy[1] * self._zoom, height, free.shape[0]))
+            places = np.arange(height, free.shape[0] + 1, 2)
+            for y in places[np.argsort(np.abs(places - end), kind="stable")]:
+                if free[y - height : y, x : x + width].all():
+                    free[y - height : y, x : x + width] = False
+                    pen.label(str(track_id), x, y, colour(track_id))
+                    break

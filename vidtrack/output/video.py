@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from io import FileIO
 from pathlib import Path
 
 import av
@@ -14,7 +15,7 @@ from av.video.stream import VideoStream
 from vidtrack.config import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import append, writing
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
 from vidtrack.scan import Status
@@ -23,6 +24,25 @@ from vidtrack.video.frame import Image
 
 _CLOCK = Fraction(1, 90_000)
 _FRAGMENT_S = 1
+
+
+class _Disk:
+    """A file for PyAV to write to. It keeps an error for later: FFmpeg crashes on a header that it could not write."""
+
+    def __init__(self, file: FileIO) -> None:
+        self.error: OSError | None = None
+        self._file = file
+
+    def write(self, block: bytes) -> int:
+        if self.error is None:
+            try:
+                append(self._file, block)
+            except OSError as error:
+                self.error = error
+        return len(block)
+
+    def close(self) -> None:
+        self._file.close()
 
 
 class AnnotatedVideo:
@@ -42,11 +62,11 @@ class AnnotatedVideo:
         self._stream: VideoStream | None = None
         self._pts = -1
         try:
-            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
+            self._disk = _Disk(open(path, "wb", buffering=0))  # noqa: SIM115
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}; give --video another file") from None
         self._container: OutputContainer = av.open(
-            self._file,
+            self._disk,
             "w",
             format="mp4",
             options={
@@ -64,13 +84,11 @@ class AnnotatedVideo:
 
     def close(self) -> None:
         """Finish the file."""
-        with writing(self._path):
-            try:
-                if self._stream is not None:
-                    self._container.mux(self._stream.encode(None))
-            finally:
-                self._container.close()
-                self._file.close()
+        if self._stream is not None:
+            self._container.mux(self._stream.encode(None))
+        self._container.close()
+        self._disk.close()
+        self._check_disk()
 
     def _draw(self, step: Step, picture: Image) -> Image:
         self._counter.step(step.index, step.tracks)
@@ -91,13 +109,19 @@ class AnnotatedVideo:
         frame = av.VideoFrame.from_ndarray(even, format="bgr24")
         self._pts = frame.pts = max(self._pts + 1, round(time_s / _CLOCK))
         frame.time_base = _CLOCK
+        self._container.mux(self._stream.encode(frame))
+        self._check_disk()
+
+    def _check_disk(self) -> None:
         with writing(self._path):
-            self._container.mux(self._stream.encode(frame))
+            if self._disk.error is not None:
+                raise self._disk.error
 
     def _add_stream(self, width: int, height: int) -> VideoStream:
         stream = self._container.add_stream("libx264", rate=Fraction(self._fps).limit_denominator(1001))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         stream.time_base = stream.codec_context.time_base = _CLOCK
         stream.codec_context.gop_size = max(1, round(2 * self._fps))
-        stream.options = {"crf": str(self._settings.video_crf), "preset": "veryfast"}
+        # No B-frames: they would delay all times, for a fragmented file has no edit list to take that back.
+        stream.options = {"crf": str(self._settings.video_crf), "preset": "superfast", "bf": "0"}
         return stream

@@ -8,6 +8,7 @@ Metric", FUSION 2017.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,10 +46,10 @@ def ospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Ospa:
     power, pairs = _assigned(matchup, cutoff, order)
     truth, result = matchup.truth_count, matchup.result_count
     larger, smaller = np.maximum(truth, result), np.minimum(truth, result)
-    localisation = (power + cutoff**order * (smaller - pairs)) / larger
-    cardinality = cutoff**order * (larger - smaller) / larger
-    distance = localisation + cardinality
-    return Ospa(*(part ** (1 / order) for part in (distance, localisation, cardinality)))
+    localisation = (power + (smaller - pairs)) / larger
+    cardinality = (larger - smaller) / larger
+    parts = (localisation + cardinality, localisation, cardinality)
+    return Ospa(*(cutoff * part ** (1 / order) for part in parts))
 
 
 def gospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Gospa:
@@ -57,24 +58,23 @@ def gospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Gospa:
     Units and errors as for `ospa`.
     """
     power, pairs = _assigned(matchup, cutoff, order)
-    missed = cutoff**order / 2 * (matchup.truth_count - pairs)
-    false = cutoff**order / 2 * (matchup.result_count - pairs)
-    return Gospa(*(part ** (1 / order) for part in (power + missed + false, power, missed, false)))
+    missed, false = (matchup.truth_count - pairs) / 2, (matchup.result_count - pairs) / 2
+    return Gospa(*(cutoff * part ** (1 / order) for part in (power + missed + false, power, missed, false)))
 
 
 def _assigned(matchup: Matchup, cutoff: float, order: float) -> tuple[Floats, Ints]:
-    """Sum of distance^p over the optimal pairs nearer than the cutoff, and their number, by frame (F,).
+    """Sum of (distance / cutoff)^p over the optimal pairs nearer than the cutoff, and their number, by frame (F,).
 
     A pair saves cutoff^p - distance^p against leaving both alone, in OSPA as in GOSPA, so that
-    one assignment is optimal for either.
+    one assignment is optimal for either. In units of the cutoff no power overflows.
     """
-    if not 0 < cutoff <= matchup.reach:
-        raise ConfigError(f"cutoff is {cutoff}; it must be above 0 and at most {matchup.reach}, the reach of the pairs")
-    if order < 1:
-        raise ConfigError(f"order is {order}; it must be at least 1")
+    if not (0 < cutoff <= matchup.reach and cutoff < math.inf):
+        raise ConfigError(f"cutoff is {cutoff}; it must be above 0, finite, and at most {matchup.reach:g} here")
+    if not 1 <= order < math.inf:
+        raise ConfigError(f"order is {order}; it must be at least 1 and finite")
     near = matchup.distance < cutoff
-    frame, power = matchup.pair_frame[near], matchup.distance[near] ** order
-    chosen = assign(frame, matchup.truth[near], matchup.result[near], cutoff**order - power)
+    frame, power = matchup.pair_frame[near], (matchup.distance[near] / cutoff) ** order
+    chosen = assign(frame, matchup.truth[near], matchup.result[near], 1 - power)
     frame, frames = frame[chosen], len(matchup.truth_count)
     pairs = np.bincount(frame, minlength=frames)
     return np.bincount(frame, power[chosen], minlength=frames).astype(float), pairs.astype(np.int64)

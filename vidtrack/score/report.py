@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 
 import numpy as np
@@ -50,8 +51,8 @@ def evaluate(
         raise ConfigError(f"iou is {iou}; it must be above 0 and at most 1")
     if max_distance is None:
         max_distance = MAX_DISTANCE[truth.unit]
-    if not max_distance > 0:
-        raise ConfigError(f"max_distance is {max_distance}; it must be above 0")
+    if not 0 < max_distance < math.inf:
+        raise ConfigError(f"max_distance is {max_distance}; it must be a finite number above 0")
 
     points = points or result.box is None or truth.box is None
     if cutoff is None:

@@ -88,7 +88,7 @@ class Clip:
         if margin == 0:
             return self._ground.copy()
         shift = np.array([[1, 0, shake[0] - margin], [0, 1, shake[1] - margin]])
-        return np.asarray(cv2.warpAffine(self._ground, shift, (width, height), flags=cv2.INTER_LINEAR))
+        return np.asarray(cv2.warpAffine(self._ground, shift, (width, height), borderMode=cv2.BORDER_REPLICATE))
 
     @cached_property
     def _margin(self) -> int:

@@ -8,7 +8,7 @@ from numpy.random import Generator
 from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, car
 from vidtrack.simulate.motion import drive, jerky, route
-from vidtrack.simulate.scene import Actor, Part, Scene, bounds, gap, inside
+from vidtrack.simulate.scene import Actor, Part, Scene, bounds, inside, touching
 
 SIZE = (320, 240)
 FPS = 15.0
@@ -50,7 +50,7 @@ def _vehicle(name: str, road: Axes, colour: int, layer: int, rng: Generator) -> 
 def _meet_well(a: Actor, b: Actor) -> bool:
     times = np.arange(round(DURATION_S * FPS)) / FPS
     one, other = a.outline(times), b.outline(times)
-    together = np.flatnonzero(gap(one, other) <= 0)
+    together = np.flatnonzero(touching(one, other))
     if not 0.6 * FPS <= len(together) <= 2 * FPS or np.ptp(together) + 1 != len(together):
         return False
     clear = inside(bounds(one), SIZE) & inside(bounds(other), SIZE)

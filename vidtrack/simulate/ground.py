@@ -13,6 +13,7 @@ PAVING: tuple[Colour, float] = ((138, 142, 146), 5.0)
 KERB: tuple[Colour, float] = ((172, 175, 177), 3.0)
 PAINT: tuple[Colour, float] = ((218, 222, 224), 4.0)
 YELLOW: tuple[Colour, float] = ((70, 176, 206), 4.0)
+WALL: tuple[Colour, float] = ((120, 150, 172), 3.0)
 ROOF: tuple[Colour, float] = ((74, 82, 122), 4.0)
 
 

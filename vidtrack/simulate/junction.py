@@ -12,10 +12,10 @@ import numpy as np
 from numpy.random import Generator
 
 from vidtrack.scan import Floats
-from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, PAINT, PAVING, ROOF, YELLOW, Axes
+from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, PAINT, PAVING, ROOF, WALL, YELLOW, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, CLOTHES, SKIN, car, foliage, lorry, motorcycle, person
-from vidtrack.simulate.motion import cruise, length, route, sway
-from vidtrack.simulate.scene import Actor, Colour, Look, Part, Scene, bounds, gap, inside
+from vidtrack.simulate.motion import cruise, distance_to, route, sway
+from vidtrack.simulate.scene import Actor, Colour, Look, Part, Scene, bounds, inside, touching
 
 SIZE = (240, 180)
 FPS = 15.0
@@ -28,6 +28,7 @@ SIDE, SIDE_HALF = -38.0, 21.0  # px, where the side road joins, half its width
 STOP_LINE = 22.0  # px along the main road
 GREY: Colour = (146, 147, 149)
 WHITE: Colour = (236, 238, 239)
+LOADS: tuple[Colour, ...] = ((225, 225, 222), (150, 96, 52))
 
 
 def junction(rng: Generator) -> Scene:
@@ -39,7 +40,11 @@ def junction(rng: Generator) -> Scene:
 
 
 def _vehicles(rng: Generator) -> list[Actor]:
-    """Who drives where: name, look, route, speed [px/s], distance along the route that is reached at a time [s]."""
+    """Who drives where: name, look, route, speed [px/s], place along the main road and the time [s] it is passed.
+
+    The grey car is on the stop line at 2 s. It leaves the line as a ghost in a running average, which is about to
+    fade when the white car arrives.
+    """
     paints = iter(rng.permutation(len(CAR_COLOURS)))
     west = route(ROAD(END, -LANE), ROAD(-END, -LANE))
     east = route(ROAD(-END, LANE), ROAD(END, LANE))
@@ -49,25 +54,22 @@ def _vehicles(rng: Generator) -> list[Actor]:
     south_west = route(ROAD(south, -END), ROAD(south, -LANE), ROAD(-END, -LANE), radius=14)
     south_east = route(ROAD(south, -END), ROAD(south, LANE), ROAD(END, LANE), radius=20)
 
-    def drives(name: str, look: Look, line: Floats, speed: float, a: float, t: float, jitter: float = 0.3) -> Actor:
-        s0 = _distance_to(line, ROAD(a, 0))
+    def drives(name: str, look: Look, line: Floats, speed: float, a: float, t: float) -> Actor:
         aside = np.array(ROAD(0, rng.uniform(-1.2, 1.2))) - ROAD(0, 0)
-        speed, t = speed * rng.uniform(0.94, 1.06), t + rng.uniform(-jitter, jitter)
-        return Actor(name, look, cruise(line + aside, speed, s0, t, DURATION_S, rng))
+        speed, t = speed * rng.uniform(0.94, 1.06), t + rng.uniform(-0.3, 0.3)
+        return Actor(name, look, cruise(line + aside, speed, distance_to(line, ROAD(a, 0)), t, DURATION_S, rng))
+
+    def steady(name: str, look: Look, t: float) -> Actor:
+        return Actor(name, look, cruise(west, pace, END - STOP_LINE, t, DURATION_S, rng, vary=0.0))
 
     def some_car() -> Look:
         return car(rng.uniform(27, 31), rng.uniform(13, 14.5), CAR_COLOURS[next(paints)])
 
-    headway = rng.uniform(1.7, 1.9)
-    load = (225, 225, 222) if rng.random() < 0.5 else (150, 96, 52)
+    load = LOADS[rng.integers(len(LOADS))]
     pace = 45 * rng.uniform(0.97, 1.03)
-    grey = Actor("grey car", car(30, 14, GREY), cruise(west, pace, END - STOP_LINE, 2.0, DURATION_S, rng, vary=0.0))
-    white = Actor(
-        "white car", car(29, 14, WHITE), cruise(west, pace, END - STOP_LINE, 2 + headway, DURATION_S, rng, 0.0)
-    )
     return [
-        grey,
-        white,
+        steady("grey car", car(30, 14, GREY), 2.0),
+        steady("white car", car(29, 14, WHITE), 2.0 + rng.uniform(1.7, 1.9)),
         drives("car east", some_car(), east, 54, -20, 4.1),
         drives("car from the east into the side road", some_car(), west_north, 40, north, 7.0),
         drives("lorry", lorry(50, 20, CAR_COLOURS[next(paints)], load), east, 44, 0, 7.6),
@@ -109,11 +111,9 @@ def _can_be_followed(targets: tuple[Actor, ...]) -> bool:
     merges = 0
     for i, j in combinations(range(len(targets)), 2):
         both = seen[i] & seen[j]
-        if not both.any():
-            continue
-        if gap(bases[i][both], bases[j][both]).min() < 2:
+        if touching(bases[i][both], bases[j][both], margin=2.0).any():
             return False
-        together = (gap(outlines[i][both], outlines[j][both]) <= 0).sum()
+        together = touching(outlines[i][both], outlines[j][both]).sum()
         if together > 1.5 * FPS:
             return False
         merges += together >= 3
@@ -128,14 +128,6 @@ def _tree(rng: Generator) -> tuple[Actor, ...]:
     )
 
 
-def _distance_to(line: Floats, point: tuple[float, float]) -> float:
-    """Distance along a polyline (K, 2) to its vertex-wise nearest place to `point`."""
-    fine = np.linspace(0, 1, 2000)
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    places = np.stack([np.interp(fine * at[-1], at, line[:, axis]) for axis in (0, 1)], axis=-1)
-    return float(fine[np.linalg.norm(places - point, axis=1).argmin()] * length(line))
-
-
 def _ground() -> tuple[Part, ...]:
     left, right = SIDE - SIDE_HALF, SIDE + SIDE_HALF
     return (
@@ -143,7 +135,8 @@ def _ground() -> tuple[Part, ...]:
         ROAD.patch(PAVING, -END, END, -HALF - 12, HALF + 20),
         ROAD.patch(PAVING, left - 9, right + 9, -END, -HALF),
         ROAD.patch(PAVING, 4, 20, HALF, END),
-        ROAD.patch(ROOF, 30, END, -END, -HALF - 24),
+        ROAD.patch(WALL, 30, END, -END, -HALF - 21),
+        ROAD.patch(ROOF, 30, END, -END, -HALF - 29),
         ROAD.patch(KERB, -END, END, -HALF - 2, HALF + 2),
         ROAD.patch(KERB, left - 2, right + 2, -END, -HALF),
         ROAD.patch(ASPHALT, -END, END, -HALF, HALF),

@@ -135,29 +135,19 @@ def _box(left: float, top: float, right: float, bottom: float) -> Floats:
 
 
 def _taper(x0: float, y0: float, x1: float, y1: float) -> Floats:
-    """A trapezoid across the vehicle, half as wide as y0 at x0 and y1 at x1."""
+    """A trapezoid across the vehicle: from -y0 to y0 at x0, from -y1 to y1 at x1."""
     return np.array([(x0, -y0), (x0, y0), (x1, y1), (x1, -y1)])
 
 
 def _rounded(left: float, top: float, right: float, bottom: float, radius: float) -> Floats:
     """A rectangle with corners rounded by three edges each."""
-    quarter = np.radians(np.arange(0, 91, 30))
-    corners = (
-        (right, bottom, 1, 1, 0.0),
-        (left, bottom, -1, 1, 90.0),
-        (left, top, -1, -1, 180.0),
-        (right, top, 1, -1, 270.0),
-    )
-    arcs = [
-        np.stack(
-            [
-                x - sx * radius + radius * np.cos(quarter + np.radians(a)),
-                y - sy * radius + radius * np.sin(quarter + np.radians(a)),
-            ],
-            axis=-1,
-        )
-        for x, y, sx, sy, a in corners
-    ]
+    angle = np.radians([0, 30, 60, 90])
+    arc = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    quarter_turn = np.array([[0, 1], [-1, 0]])
+    arcs = []
+    for corner in np.array([(right, bottom), (left, bottom), (left, top), (right, top)]):
+        arcs.append(corner + arc - radius * np.sign(arc.sum(axis=0)))
+        arc = arc @ quarter_turn
     return np.concatenate(arcs)
 
 

@@ -12,7 +12,10 @@ KNOT_S = 1 / 120
 
 
 def route(*waypoints: tuple[float, float], radius: float = 0.0) -> Floats:
-    """A polyline (K, 2) through the waypoints; inner corners become curves that begin `radius` before the corner."""
+    """A polyline (K, 2) through the waypoints, with a vertex about every pixel.
+
+    Inner corners become curves that begin `radius` before the corner.
+    """
     points = np.array(waypoints, dtype=float)
     pieces = [points[:1]]
     for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
@@ -20,21 +23,23 @@ def route(*waypoints: tuple[float, float], radius: float = 0.0) -> Floats:
         leave = corner + radius * _unit(after - corner)
         u = np.linspace(0, 1, 25)[:, None]
         pieces.append((1 - u) ** 2 * enter + 2 * u * (1 - u) * corner + u**2 * leave)
-    return np.concatenate([*pieces, points[-1:]])
+    coarse = np.concatenate([*pieces, points[-1:]])
+    at = _distances(coarse)
+    return _interpolate(np.linspace(0, at[-1], round(at[-1]) + 1), at, coarse)
 
 
-def length(line: Floats) -> float:
-    """Length [px] of a polyline (K, 2)."""
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+def distance_to(line: Floats, point: tuple[float, float]) -> float:
+    """How far along a polyline (K, 2) its vertex nearest to `point` is [px]."""
+    return float(_distances(line)[np.linalg.norm(line - point, axis=1).argmin()])
 
 
 def drive(line: Floats, t: Floats, s: Floats) -> Path:
     """Follow a polyline (K, 2) with travelled distance s (N,) [px] at times t (N,) [s]; beyond its ends straight on."""
     steps = np.diff(line, axis=0)
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    at = _distances(line)
     middle = (at[1:] + at[:-1]) / 2
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    xy = np.stack([np.interp(s, at, line[:, axis]) for axis in (0, 1)], axis=-1)
+    xy = _interpolate(s, at, line)
     xy += np.minimum(s, 0)[:, None] * _unit(steps[0]) + np.maximum(s - at[-1], 0)[:, None] * _unit(steps[-1])
     return Path(t, xy, np.interp(s, middle, heading))
 
@@ -76,6 +81,16 @@ def sway(xy: tuple[float, float], amplitude: float, duration_s: float, rng: Gene
     wave = np.sin(2 * np.pi * f * t[:, None] + phase)
     offset = np.stack([0.7 * wave[:, 0] + 0.3 * wave[:, 1], 0.4 * wave[:, 2]], axis=-1)
     return Path(t, np.array(xy) + amplitude * offset, np.zeros(len(t)))
+
+
+def _distances(line: Floats) -> Floats:
+    """Distance (K,) of each vertex along a polyline (K, 2)."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def _interpolate(s: Floats, at: Floats, line: Floats) -> Floats:
+    """Points (N, 2) at distances s (N,) along a polyline (K, 2) whose vertices are at distances (K,)."""
+    return np.stack([np.interp(s, at, line[:, axis]) for axis in (0, 1)], axis=-1)
 
 
 def _unit(vector: Floats) -> Floats:

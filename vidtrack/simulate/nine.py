@@ -10,7 +10,7 @@ from numpy.random import Generator
 from vidtrack.simulate.ground import ASPHALT, PAVING, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, car, lorry
 from vidtrack.simulate.motion import drive, jerky, route
-from vidtrack.simulate.scene import Actor, Part, Scene, bounds, gap, inside
+from vidtrack.simulate.scene import Actor, Part, Scene, bounds, inside, touching
 
 SIZE = (320, 240)
 FPS = 15.0
@@ -53,11 +53,11 @@ def _cross_well(vehicles: tuple[Actor, ...]) -> bool:
         return False
     meetings = 0
     for i, j in combinations(range(len(vehicles)), 2):
-        touching = np.flatnonzero(gap(outlines[i], outlines[j]) <= 0)
-        if len(touching) == 0:
+        together = np.flatnonzero(touching(outlines[i], outlines[j]))
+        if len(together) == 0:
             continue
-        apart = slice(max(touching[0] - round(0.6 * FPS), 0), touching[0])
-        if len(touching) > 1.2 * FPS or not (in_view[i] & in_view[j])[apart].all():
+        apart = slice(max(together[0] - round(0.6 * FPS), 0), together[0])
+        if len(together) > 1.2 * FPS or not (in_view[i] & in_view[j])[apart].all():
             return False
         meetings += 1
     return 3 <= meetings <= 8

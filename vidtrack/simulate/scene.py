@@ -116,11 +116,21 @@ def inside(boxes: Floats, size: tuple[int, int]) -> NDArray[np.bool_]:
     return np.asarray((boxes[..., :2] >= 0).all(axis=-1) & (boxes[..., 2:] <= size).all(axis=-1))
 
 
-def gap(a: Floats, b: Floats) -> Floats:
-    """Distance (N,) between convex polygons a (N, V, 2) and b (N, W, 2) along their edge normals; negative: overlap.
+def touching(a: Floats, b: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
+    """In which rows (N,) the convex polygons a (N, V, 2) and b (N, W, 2) overlap, or come closer than `margin`.
 
-    By the separating axis theorem the sign is exact; the distance itself is a lower bound.
+    By the separating axis theorem; with a margin, corners that face each other count a little early.
     """
+    boxes = bounds(a), bounds(b)
+    result = np.all(
+        np.maximum(boxes[0][:, :2], boxes[1][:, :2]) <= np.minimum(boxes[0][:, 2:], boxes[1][:, 2:]) + margin, axis=1
+    )
+    result[result] = _gap(a[result], b[result]) <= margin
+    return result
+
+
+def _gap(a: Floats, b: Floats) -> Floats:
+    """Largest separation (N,) along any edge's normal; negative when convex polygons overlap."""
     edges = np.concatenate([np.roll(a, -1, axis=1) - a, np.roll(b, -1, axis=1) - b], axis=1)
     normals = np.stack([edges[..., 1], -edges[..., 0]], axis=-1)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)

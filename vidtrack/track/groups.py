@@ -1,9 +1,10 @@
-"""Merged blobs: several tracks that share one measurement stay several tracks.
+"""Merged and partial blobs: several tracks that share one measurement stay several tracks.
 
 A confirmed track that got no measurement of its own, but whose predicted box lies on a blob, lives on that
-blob together with whoever else is on it. The blob's centroid belongs to none of them; its edges do: the left
-edge is that of the leftmost member, and so on. Each member is updated by the edges it can claim and otherwise
-follows its own motion, so that it still knows who it is when the blob splits.
+blob together with whoever else is on it. So does a track whose blob has suddenly become much larger or
+smaller than the vehicle. The blob's centroid belongs to none of them; its edges do: the left edge is that of
+the leftmost member, and so on. Each member is updated by the edges it can claim and otherwise follows its own
+motion, so that it still knows who it is when the blob splits.
 """
 
 from __future__ import annotations
@@ -28,11 +29,14 @@ class Groups:
     cover  share of a track's predicted box that a blob must cover to carry it
     edge   standard deviation of a blob's edge, as a share of the member's box side
     gate   standard deviations within which an edge is accepted as the member's
+    growth a blob whose area is more than this many times the predicted box, or less than the inverse,
+           is not the vehicle alone or not all of it
     """
 
     cover: float = 0.5
     edge: float = 0.1
     gate: float = 3.0
+    growth: float = 1.6
 
     def __post_init__(self) -> None:
         if not 0 < self.cover <= 1:
@@ -44,15 +48,28 @@ class Groups:
         predicted (T, 4) boxes, taken (T,) measurement of each track or -1, blobs (M, 4) boxes.
         """
         shared = np.full(len(predicted), -1)
-        orphans = np.flatnonzero(confirmed & (taken < 0))
-        if not len(orphans) or not len(blobs):
+        if not len(blobs):
             return shared
+        orphans = np.flatnonzero(confirmed & (taken < 0))
         blob, share = best_cover(predicted[orphans], blobs)
         blob[share < self.cover] = -1
         shared[orphans] = blob
         hosts = confirmed & (taken >= 0) & np.isin(taken, blob[blob >= 0])
         shared[hosts] = taken[hosts]
         return shared
+
+    def changed(self, predicted: Floats, taken: Ints, blobs: Floats) -> np.ndarray:
+        """(T,) tracks whose blob has another size than the vehicle."""
+        ratio = np.ones(len(predicted))
+        hit = taken >= 0
+        ratio[hit] = blobs[taken[hit], 2:].prod(axis=1) / predicted[hit, 2:].prod(axis=1)
+        return (ratio > self.growth) | (ratio < 1 / self.growth)
+
+    def explained(self, predicted: Floats, shared: Ints, blobs: Floats) -> np.ndarray:
+        """(M,) blobs at least half of whose area the tracks on them account for; the others hide somebody new."""
+        on = shared >= 0
+        area = np.bincount(shared[on], predicted[on, 2:].prod(axis=1), minlength=len(blobs))
+        return area >= 0.5 * blobs[:, 2:].prod(axis=1)
 
     def measure(self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats) -> tuple[Floats, Floats, Ints]:
         """Position (G, 2), variances (G, 2) and count of own edges (G,) for tracks on blobs.

@@ -19,6 +19,10 @@ from vidtrack.track.register import Register
 BIRTH_EXISTENCE = 0.5
 BORDER = 2.0
 """px; a blob this close to the border is cut by it."""
+SLOW = 5.0
+"""A box follows a blob of another size this many times more slowly."""
+ADULT = 5
+"""Updates after which a track's box is believed."""
 FRAGMENT = 0.6
 """A leftover blob starts no track where a vehicle already tracked covers this share of it."""
 
@@ -146,12 +150,19 @@ class Tracker:
         if self.groups is not None and scan.box is not None:
             predicted = absolute(self.register.box, self.bank.x[:, self.model.position])
             blobs = absolute(scan.box, scan.z)
-            shared = self.groups.blob_of(predicted, _heaviest(first), confirmed, blobs)
+            taken = _heaviest(first)
+            shared = self.groups.blob_of(predicted, taken, confirmed, blobs)
+            known = confirmed & (self.bank.hits > ADULT) & ~self._cut(predicted)
+            odd = known & (shared < 0) & self.groups.changed(predicted, taken, blobs)
+            shared[odd] = taken[odd]
+            free = ~self.groups.explained(predicted, shared, blobs)
+            free[first.without(shared >= 0).measurement] = False
+        else:
+            free = np.ones(count, bool)
+            free[first.measurement] = False
+        self._free = free
         if confirmed.all():
             return first.without(shared >= 0), shared
-        free = np.ones(count, bool)
-        free[first.measurement] = False
-        free[shared[shared >= 0]] = False
         second = self.associate.decide(pairs.only(~confirmed[pairs.row] & free[pairs.measurement]), rows, count)
         return first.without(shared >= 0).joined(second), shared
 
@@ -170,7 +181,7 @@ class Tracker:
         old = np.where(new[:, None], 0.0, self.register.box[rows])
         self.register.box[rows] = old + follow[:, None] * (scan.box[taken[rows]] - old)
         if self.model.per_size:
-            self.bank.scale[rows] = self.register.box[rows, 2:].max(axis=1)
+            self.bank.scale[rows] = _longer(self.register.box[rows])
 
     def _share(self, shared: Ints, scan: Scan, dt: float, events: list[Event]) -> None:
         """Update the rows that live on a blob by its edges, and keep the book of who shares with whom."""
@@ -187,11 +198,22 @@ class Tracker:
             self.bank.update(edges, Scan(scan.t, z, R[:, :, None] * np.eye(2)), POSITION)
             self.register.history[rows[own > 0]] |= 1
             self.register.updated_s[rows[own > 0]] = scan.t
+            self._reshape(rows, shared, scan, dt)
         self._regroup(shared, scan.t, events)
+
+    def _reshape(self, rows: Ints, shared: Ints, scan: Scan, dt: float) -> None:
+        """The box of a track alone on its blob follows it slowly: if the blob stays as it is, the vehicle is so."""
+        alone = rows[np.bincount(shared[rows])[shared[rows]] == 1]
+        xy = self.bank.x[alone][:, self.model.position]
+        seen = absolute(scan.box, scan.z)[shared[alone]]
+        seen[:, :2] -= xy
+        self.register.box[alone] += -np.expm1(-dt / (SLOW * self.box_s)) * (seen - self.register.box[alone])
 
     def _regroup(self, shared: Ints, t: float, events: list[Event]) -> None:
         """A group keeps its number and its start for as long as any of its members stay together."""
         group = np.full(len(shared), -1)
+        if not ((shared >= 0).any() or (self.register.group >= 0).any()):
+            return
         blobs, count = np.unique(shared[shared >= 0], return_counts=True)
         for blob in blobs[count > 1]:
             members = np.flatnonzero(shared == blob)
@@ -221,7 +243,7 @@ class Tracker:
         self.register.existence = np.clip(odds / (1 + odds), 1e-9, 1 - 1e-9)
 
     def _confirm(self, t: float, events: list[Event]) -> None:
-        size = np.nan_to_num(self.register.box[:, 2:].max(axis=1, initial=0.0))
+        size = np.nan_to_num(_longer(self.register.box))
         ready = self.life.confirmed(self.register, t, self.bank.x[:, self.model.position], size)
         self.register.status[ready] = Status.CONFIRMED
         reason = f"{self.life.confirm_hits} hits of {self.life.confirm_window}"
@@ -247,20 +269,21 @@ class Tracker:
         if self.bounds is None:
             return np.zeros(len(self.register), bool)
         xy = self.bank.x[:, self.model.position]
-        return ((xy < 0) | (xy > np.array(self.bounds))).any(axis=1)
+        x, y = xy[:, 0], xy[:, 1]
+        return (x < 0) | (y < 0) | (x > self.bounds[0]) | (y > self.bounds[1])
 
     def _cut(self, box: Floats) -> np.ndarray:
         """(N,) boxes that the picture's border cuts: their extent changes faster than any vehicle's."""
         if self.bounds is None:
             return np.zeros(len(box), bool)
-        far = np.array(self.bounds) - BORDER
-        return (box[:, :2] < BORDER).any(axis=1) | (box[:, :2] + box[:, 2:] > far).any(axis=1)
+        left, top, width, height = box.T
+        right, bottom = self.bounds[0] - BORDER, self.bounds[1] - BORDER
+        return (left < BORDER) | (top < BORDER) | (left + width > right) | (top + height > bottom)
 
     def _register(self, scan: Scan, sensor: Sensor, decision: Decision, shared: Ints, events: list[Event]) -> Ints:
         """Start tentative tracks from measurements that belong to nobody; returns their indices."""
-        free = np.ones(len(scan), bool)
+        free = self._free.copy()
         free[decision.measurement] = False
-        free[shared[shared >= 0]] = False
         if scan.box is not None and self.groups is not None and free.any():
             known = self.register.status != Status.TENTATIVE
             tracked = absolute(self.register.box, self.bank.x[:, self.model.position])[known]
@@ -268,7 +291,7 @@ class Tracker:
             free[free] = share < FRAGMENT
         born = np.flatnonzero(free) if self.births else np.empty(0, np.int64)
         box = np.full((len(born), 4), np.nan) if scan.box is None else scan.box[born]
-        scale = box[:, 2:].max(axis=1) if self.model.per_size and scan.box is not None else np.ones(len(born))
+        scale = _longer(box) if self.model.per_size and scan.box is not None else np.ones(len(born))
         position, cov = sensor.locate(scan.z[born], scan.R[born])
         self.bank.append(position, cov, scale)
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
@@ -305,6 +328,11 @@ class Tracker:
             events=events,
             choices=choices,
         )
+
+
+def _longer(box: Floats) -> Floats:
+    """(N,) longer sides of boxes (N, 4)."""
+    return np.maximum(box[:, 2], box[:, 3])
 
 
 def _heaviest(decision: Decision) -> Ints:

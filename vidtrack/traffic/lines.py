@@ -139,7 +139,7 @@ class LineCounter:
         self._note_sign_changes(now, xy, distance, tracks.t, frame)
         now.xy, now.distance = xy, distance
         now.confirmed |= tracks.status != Status.TENTATIVE
-        now.seen |= ((tracks.measurement >= 0) | (tracks.status == Status.MERGED))[:, None]
+        now.seen |= tracks.seen[:, None]
         extent = np.abs(self._normal) @ np.nan_to_num(tracks.box[:, 2:]).T
         clear = np.abs(distance) > _MARGIN * extent.T
         crossings = self._collect(now, clear) + self._collect_gone(old, tracks.id)

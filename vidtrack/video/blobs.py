@@ -135,7 +135,7 @@ def _enlarged(box: Floats) -> Floats:
 @numba.njit(cache=True, nogil=True)
 def _measure(mask, strength):  # type: ignore[no-untyped-def]
     """Of each component, in mask pixels: count (B,), mean x, y (B, 2), covariance (B, 2, 2), box, mean strength."""
-    row, start, stop = find_runs(mask, 255)
+    row, start, stop = find_runs(mask)
     label, blobs = connect(row, start, stop, 1)
     n = np.zeros(blobs)
     first = np.zeros((blobs, 2))

@@ -17,17 +17,20 @@ AGREEMENT = 0.1  # relative; a header's rate is kept within this of the measured
 LONGEST_WAIT = 8  # items held back for the next sane stamp: bounds memory where there are no stamps at all
 
 
-def stamp_rate(stamps_s: ArrayLike) -> float | None:
-    """Typical rate [1/s] of timestamps in any order; None if they are all the same.
+def stamp_rate(stamps: ArrayLike) -> float | None:
+    """Items per unit of time from their timestamps in any order; None if the stamps are all the same.
 
-    One over the mean of the intervals near the median: gaps do not count, and the rounding of a
-    container that stores milliseconds (33, 33, 34) averages out.
+    From the mean of the intervals near the median: gaps do not count, and the rounding of a container
+    that stores milliseconds (33, 33, 34) averages out. Items that share a stamp count each.
     """
-    intervals = np.diff(np.unique(np.asarray(stamps_s, dtype=float)))
+    stamps = np.asarray(stamps, dtype=float)
+    distinct = np.unique(stamps)
+    intervals = np.diff(distinct)
     if intervals.size == 0:
         return None
     median = np.median(intervals)
-    return float(1 / intervals[np.abs(intervals - median) <= median / 2].mean())
+    typical = intervals[np.abs(intervals - median) <= median / 2].mean()
+    return float(stamps.size / distinct.size / typical)
 
 
 def is_plausible(fps: float) -> bool:

@@ -7,7 +7,6 @@ from itertools import chain
 from pathlib import Path
 
 import av
-import numpy as np
 
 from vidtrack.config import SourceSettings
 from vidtrack.errors import SourceError
@@ -107,8 +106,9 @@ class VideoFile:
         stretched to fit: gaps stay gaps.
         """
         ticks_per_s = float(1 / self._stream.time_base) if self._stream.time_base else 1.0
-        stamps = [stamp for packet in self._opening if packet and (stamp := self._stamp(packet)) is not None]
-        measured = stamp_rate(np.divide(stamps, ticks_per_s))
+        stamps = [self._stamp(packet) for packet in self._opening if packet is not None]
+        rate = stamp_rate([stamp for stamp in stamps if stamp is not None])
+        measured = None if rate is None else rate * ticks_per_s
         header = float(self._stream.average_rate or 0)
         fps = settings.fps or nominal_rate(header, measured) or self._rate_by_main_header()
         if measured is not None and (settings.fps is not None or not is_plausible(measured)):
@@ -142,12 +142,10 @@ def _open(path: Path) -> av.container.InputContainer:
     try:
         # "file:" keeps a colon in the name from being taken for a protocol; old recorders write names in any encoding
         return av.open(f"file:{path}", metadata_errors="ignore")
-    except OSError:
-        raise
     except av.FFmpegError as error:
         missing = missing_bytes(path)
         cut = f"; it is cut short, {missing} bytes are missing at its end" if missing else ""
-        raise SourceError(f"cannot open {path}: not a video that can be read ({error.strerror}){cut}") from None
+        raise SourceError(f"cannot open {path} as a video: {error.strerror}{cut}") from None
 
 
 def _video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:

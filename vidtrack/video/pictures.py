@@ -6,6 +6,7 @@ import glob
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import cast
 
 import av
 
@@ -94,10 +95,12 @@ def _read(path: Path) -> av.VideoFrame:
     """Decode one file by what its first bytes say, because suffixes lie. Raises SourceError."""
     try:
         data = path.read_bytes()
-        codec = next(codec for magic, codec in _DECODERS.items() if data.startswith(magic))
-        (picture,) = av.VideoCodecContext.create(codec, "r").decode(av.Packet(data))
+        codec = next((codec for magic, codec in _DECODERS.items() if data.startswith(magic)), None)
+        if codec is None:
+            raise SourceError(f"cannot read image {path}: it is none of {', '.join(sorted(set(_DECODERS.values())))}")
+        pictures = cast(av.VideoCodecContext, av.CodecContext.create(codec, "r")).decode(av.Packet(data))
     except (OSError, av.FFmpegError) as error:
         raise SourceError(f"cannot read image {path}: {error.strerror}") from None
-    except StopIteration:
-        raise SourceError(f"cannot read image {path}: it starts like none of {', '.join(_DECODERS.values())}") from None
-    return picture
+    if not pictures:
+        raise SourceError(f"cannot read image {path}: it ends before the picture does")
+    return pictures[0]

@@ -35,13 +35,13 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
 
 def _is_grey(picture: av.VideoFrame) -> bool:
     kind = picture.format
-    return not (kind.is_rgb or kind.has_palette or any(part.is_chroma for part in kind.components))
+    return not kind.has_palette and sum(not part.is_alpha for part in kind.components) == 1
 
 
 def _converted(picture: av.VideoFrame) -> av.VideoFrame:
-    if any(part.is_chroma for part in picture.format.components):
-        return picture.reformat(format="yuv420p")
-    return picture.reformat(format="yuv420p", dst_colorspace="ITU601", dst_color_range="JPEG")
+    if picture.format.is_rgb or picture.format.has_palette:
+        return picture.reformat(format="yuv420p", dst_colorspace="ITU601", dst_color_range="JPEG")
+    return picture.reformat(format="yuv420p")
 
 
 def _plane(picture: av.VideoFrame, channel: int) -> Image:

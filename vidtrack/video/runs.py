@@ -7,9 +7,13 @@ import numpy as np
 
 
 @numba.njit(cache=True, nogil=True)
-def find_runs(mask, value):  # type: ignore[no-untyped-def]
-    """Maximal horizontal runs of `value` in mask (h, w): row, start, stop (stop excluded), each (N,) int32, in order."""
+def find_runs(mask, background=False):  # type: ignore[no-untyped-def]
+    """Maximal horizontal runs of pixels that are not 0, or of the 0 pixels: row, start, stop in raster order.
+
+    mask (h, w) uint8; each (N,) int32, stop excluded.
+    """
     h, w = mask.shape
+    pixels, words = mask.ravel(), eights(mask)
     room = 1024
     row, start, stop = np.empty(room, np.int32), np.empty(room, np.int32), np.empty(room, np.int32)
     n = 0
@@ -17,19 +21,39 @@ def find_runs(mask, value):  # type: ignore[no-untyped-def]
         if n + w // 2 + 1 > room:
             room = 2 * room + w
             row, start, stop = _grown(row, n, room), _grown(start, n, room), _grown(stop, n, room)
-        line = mask[y]
-        x = 0
-        while x < w:
-            while x < w and line[x] != value:
-                x += 1
-            if x == w:
-                break
-            row[n], start[n] = y, x
-            while x < w and line[x] == value:
-                x += 1
-            stop[n] = x
+        left, right = y * w, (y + 1) * w
+        x = next_zero(pixels, left, right) if background else next_nonzero(pixels, words, left, right)
+        while x < right:
+            row[n], start[n] = y, x - left
+            x = next_nonzero(pixels, words, x, right) if background else next_zero(pixels, x, right)
+            stop[n] = x - left
             n += 1
+            x = next_zero(pixels, x, right) if background else next_nonzero(pixels, words, x, right)
     return row[:n], start[:n], stop[:n]
+
+
+@numba.njit(cache=True, nogil=True)
+def eights(mask):  # type: ignore[no-untyped-def]
+    """The pixels of mask (h, w) uint8 as words of eight, without what is left over."""
+    return mask.ravel()[: mask.size // 8 * 8].view(np.uint64)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def next_nonzero(pixels, words, x, end):  # type: ignore[no-untyped-def]
+    """First place in x..end where pixels (N,) is not 0, end if none; `words` skips eight zeros at a time."""
+    while x < end and pixels[x] == 0:
+        x += 1
+        while x & 7 == 0 and x < end and x >> 3 < len(words) and words[x >> 3] == 0:
+            x += 8
+    return min(x, end)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def next_zero(pixels, x, end):  # type: ignore[no-untyped-def]
+    """First place in x..end where pixels (N,) is 0, end if none."""
+    while x < end and pixels[x] != 0:
+        x += 1
+    return x
 
 
 @numba.njit(cache=True, nogil=True)

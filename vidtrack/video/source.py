@@ -55,6 +55,7 @@ class Source:
         frames = (to_frame(*picture) for picture in pictures)
         first = next(frames, None)
         if first is None:
+            pictures.close()
             raise SourceError(f"no picture of {pictures.name} can be decoded")
         self.height, self.width = first.shape
         self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))

@@ -160,5 +160,5 @@ class Disturbance:
             np.minimum(inside, self._settings.absorb_s / 2, out=inside)
         shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
         lasting = (covered_s >= self._settings.absorb_s) | ((hit == SHADOW) & (covered_s >= shadow_s))
-        row, begin, end = find_runs(lasting.view(np.uint8), 1)
+        row, begin, end = find_runs(lasting.view(np.uint8))
         adopt(picture, self._scene, row, begin, end)

@@ -40,7 +40,7 @@ class Paper:
         if self._keep is not None:
             mask &= self._keep
         self._average = (1 - s.weight) * self._average + s.weight * luma
-        return Foreground(mask, (size / s.threshold).astype(np.float32), step)
+        return Foreground(mask, size / s.threshold, step)
 
     def scene(self) -> Image:
         """(H, W, 3) the running average in source size, grey as blue-green-red."""

@@ -21,7 +21,7 @@ def paint(mask, row, start, stop, value):  # type: ignore[no-untyped-def]
 def fill_holes(mask):  # type: ignore[no-untyped-def]
     """Set to 255 the background regions (4-connected) that do not reach the picture's edge. mask (h, w) uint8."""
     h, w = mask.shape
-    row, start, stop = find_runs(mask, 0)
+    row, start, stop = find_runs(mask, True)
     label, count = connect(row, start, stop, 0)
     enclosed = np.ones(count, np.bool_)
     for k in range(len(row)):
@@ -40,7 +40,7 @@ def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
     settled_s on average.
     """
     h, w = mask.shape
-    row, start, stop = find_runs(mask, 255)
+    row, start, stop = find_runs(mask)
     label, count = connect(row, start, stop, 1)
     excess = np.zeros(count, np.float32)  # contrast of the scene above that of the frame
     lack = np.zeros(count, np.float32)  # seconds of cover below settled_s
