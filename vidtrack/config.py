@@ -148,6 +148,8 @@ class TrackerSettings(_Group):
     """object sizes; nor before it has moved this far from where it began"""
     coast_s: float = Field(1.0, ge=0)
     """s; a track is given up this long after its last evidence"""
+    hidden_s: float = Field(2.0, ge=0)
+    """s; the same for a vehicle inside a blob that it shares, where nothing could be seen of it"""
     merged_blobs: bool = True
     """vehicles that share one blob stay several tracks"""
     group_cover: float = Field(0.5, gt=0, le=1)

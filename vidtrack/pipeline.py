@@ -74,6 +74,7 @@ def build_tracker(
             confirm_s=settings.confirm_s,
             confirm_travel=settings.confirm_travel,
             coast_s=settings.coast_s,
+            hidden_s=settings.hidden_s,
             coast_scans=None,
         ),
         groups=Groups(cover=settings.group_cover) if settings.merged_blobs else None,

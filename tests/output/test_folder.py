@@ -18,7 +18,7 @@ from vidtrack.config import Settings
 from vidtrack.errors import FormatError, OutputError, StoppedEarly
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
-from vidtrack.output.folder import open_run
+from vidtrack.output.folder import open_run, replacing
 from vidtrack.output.linefile import LineFile
 from vidtrack.output.mot import MotFile
 from vidtrack.output.repair import repair
@@ -98,6 +98,15 @@ def test_a_full_disk_stops_the_run_and_leaves_whole_lines(tmp_path):
     assert stop.value.exit_code == 1
     file.close()
     assert (tmp_path / "rows.txt").read_text() == "header\nfirst\nsecond\n"
+
+
+def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "summary.json"
+    path.write_text("old")
+    with pytest.raises(StoppedEarly, match="No space left"), replacing(path) as new:  # noqa: PT012
+        new.write_text("half of it")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("summary.json", "old")]
 
 
 def test_a_folder_that_vanishes_stops_the_run(tmp_path):

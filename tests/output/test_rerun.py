@@ -1,5 +1,6 @@
 """Recordings, of a run and of a finished one."""
 
+import re
 import subprocess
 import sys
 import sysconfig
@@ -17,6 +18,7 @@ from vidtrack.errors import FormatError, OutputError
 from vidtrack.output.rerun import RerunSink
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
+from vidtrack.output.video import AnnotatedVideo
 from vidtrack.scan import Event
 from vidtrack.traffic.lines import parse_line
 
@@ -94,6 +96,21 @@ def test_view_saves_a_recording_over_the_background_when_the_source_is_gone(tmp_
     assert result.exit_code == 0
     rerun("verify", tmp_path / "a.rrd")
     assert "/world/frame" in rerun("stats", tmp_path / "a.rrd")
+
+
+def test_view_shows_the_pictures_of_the_source(tmp_path):
+    from vidtrack.cli.view import command
+
+    with closing(AnnotatedVideo(tmp_path / "a.mp4", 25.0, Settings().output)) as video:
+        for index in range(8):
+            video.step(make_step(index, [], shape=SHAPE))
+    finished_run(tmp_path, str(tmp_path / "a.mp4"))
+    for options, pictures in ([], 8), (["--no-video"], 1):
+        arguments = [str(tmp_path), "--save", str(tmp_path / "a.rrd"), *options]
+        result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+        assert result.exit_code == 0
+        chunks = re.findall(r"with (\d+) rows .* /world/frame ", rerun("print", tmp_path / "a.rrd"))
+        assert sum(map(int, chunks)) == pictures
 
 
 def test_view_refuses_what_is_no_run(tmp_path):

@@ -157,7 +157,7 @@ def test_rows_are_in_order_and_those_of_confirmed_tracks_only(lives):
 
 def test_mot_counts_from_one_and_has_ten_columns(tmp_path):
     run(MotFile(tmp_path / "mot.txt"), [(7, "c", 100, 50)])
-    assert (tmp_path / "mot.txt").read_text() == "1,7,90.00,45.00,20.00,10.00,0.900,-1,-1,-1\n"
+    assert (tmp_path / "mot.txt").read_text() == "1,7,90,45,20,10,0.9,-1,-1,-1\n"
 
 
 def test_a_gap_is_written_only_when_the_track_was_found_again(tmp_path):

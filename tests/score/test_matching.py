@@ -10,7 +10,6 @@ from hypothesis.extra.numpy import arrays
 
 from vidtrack.errors import ConfigError
 from vidtrack.formats import Table, box_table
-from vidtrack.score import matching
 from vidtrack.score.matching import assign, best_pairs, box_iou, match_boxes, match_points
 
 
@@ -54,16 +53,17 @@ def test_only_rows_of_equal_frames_are_paired_whatever_their_order():
     assert matchup.result_count.tolist() == [1, 1, 2, 0]
 
 
-def test_pairs_do_not_depend_on_the_size_of_blocks(monkeypatch):
-    rng = np.random.default_rng(0)
-    box = np.hstack([rng.uniform(0, 50, (400, 2)), np.full((400, 2), 20)])
-    tables = [box_table(rng.integers(0, 9, 200), np.arange(200), half) for half in np.split(box, 2)]
-    whole = match_boxes(*tables)
-    monkeypatch.setattr(matching, "PAIRS_AT_ONCE", 50)
-    blocks = match_boxes(*tables)
-    np.testing.assert_array_equal(whole.truth, blocks.truth)
-    np.testing.assert_array_equal(whole.result, blocks.result)
-    np.testing.assert_array_equal(whole.similarity, blocks.similarity)
+@given(st.integers(0, 2**32 - 1))
+def test_every_overlap_is_found(seed):
+    rng = np.random.default_rng(seed)
+    box = np.hstack([rng.integers(0, 50, (40, 2)), rng.integers(0, 30, (40, 2))])
+    truth, result = (box_table(rng.integers(0, 3, 20), np.arange(20), half) for half in np.split(box, 2))
+    matchup = match_boxes(result, truth)
+    t, r = np.divmod(np.arange(400), 20)
+    overlap = (box_iou(truth.box[t], result.box[r]) > 0) & (truth.frame[t] == result.frame[r])
+    found = zip(matchup.truth.tolist(), matchup.result.tolist(), strict=True)
+    assert sorted(found) == list(zip(t[overlap].tolist(), r[overlap].tolist(), strict=True))
+    assert (np.diff(matchup.pair_frame) >= 0).all()
 
 
 def test_points_are_half_similar_at_the_largest_distance():

@@ -141,7 +141,7 @@ def test_a_track_never_counts_twice_in_a_direction_and_never_without_changing_si
 
 
 @pytest.mark.parametrize(
-    "text", ["", "a", "a:1,2,3", "a:1,2,3,x", ":1,2,3,4", "a:1,2,1,2", "a:0,0,nan,1", "a,b:0,0,1,1"]
+    "text", ["", "a", "a:1,2,3", "a:1,2,3,x", ":1,2,3,4", "a:1,2,1,2", "a:0,0,nan,1", "a,b:0,0,1,1", 'a"b:0,0,1,1']
 )
 def test_a_malformed_line_is_refused_with_its_text(text):
     with pytest.raises(ConfigError, match="line"):

@@ -9,7 +9,7 @@ import wave
 import av
 import numpy as np
 import pytest
-from source_clips import write_clip
+from source_clips import picture, write_clip
 
 from vidtrack.config import SourceSettings
 from vidtrack.errors import SourceError
@@ -65,6 +65,21 @@ def test_audio_only(tmp_path):
         sound.sample_rate = 8000
         container.mux(stream.encode(sound))
         container.mux(stream.encode())
+    assert "only audio" in refused(path)
+
+
+def test_cover_of_an_audio_file_is_no_video(tmp_path):
+    path = tmp_path / "song.mp4"
+    with av.open(str(path), "w") as container:
+        cover = container.add_stream("mjpeg")
+        cover.width, cover.height, cover.pix_fmt = 64, 48, "yuvj420p"
+        cover.disposition = av.stream.Disposition.attached_pic
+        stream = container.add_stream("aac", rate=8000, layout="mono")
+        sound = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.float32), format="fltp", layout="mono")
+        sound.sample_rate = 8000
+        image = av.VideoFrame.from_ndarray(picture(0), format="bgr24").reformat(format="yuvj420p")
+        for packets in (cover.encode(image), cover.encode(), stream.encode(sound), stream.encode()):
+            container.mux(packets)
     assert "only audio" in refused(path)
 
 

@@ -33,9 +33,10 @@ def test_increasing_stamps_are_kept_to_the_digit(stamps, period):
 
 @given(st.lists(st.integers(1, 1000), min_size=4, max_size=40), stamp, st.data())
 def test_one_bad_stamp_moves_no_other_time(steps, wrong, data):
-    """Behind the second: a first stamp above the second may be the wrong one itself."""
+    """Unless it lies between the two before it: then the second of these may be the wrong one."""
     stamps = np.cumsum(steps).tolist()
     bad = data.draw(st.integers(2, len(stamps) - 2))
+    assume(wrong is None or not stamps[bad - 2] < wrong < stamps[bad - 1])
     assume(wrong != stamps[bad + 1])  # of two equal stamps the first is kept
     times = repaired([*stamps[:bad], wrong, *stamps[bad + 1 :]])
     del times[bad], stamps[bad]

@@ -48,13 +48,14 @@ class Roboflow:
         import supervision
 
         corners = np.hstack([box[:, :2], box[:, :2] + box[:, 2:]])
-        return supervision.Detections(xyxy=corners, confidence=np.ones(len(box)), class_id=np.zeros(len(box), int))
+        return supervision.Detections(xyxy=corners, confidence=np.ones(len(box)), data={"index": np.arange(len(box))})
 
     def step(self, detections: Any) -> Any:
         return self.tracker.update(detections)
 
     def assigned(self, frame: int, result: Any) -> Assigned:
-        return [(j, int(i)) for j, i in enumerate(result.tracker_id) if i >= 0]
+        pairs = zip(result.data["index"], result.tracker_id)
+        return [(int(j), int(identity)) for j, identity in pairs if identity >= 0]
 
 
 class Norfair:

@@ -125,17 +125,35 @@ class Grid:
     def over(cls, z: Floats, run: Ints, reach: Floats) -> Grid:
         """z (M, 1 or 2) points; the cell follows the mean gate, bounded to about one point a cell."""
         z = z if z.shape[1] == 2 else np.column_stack([z[:, 0], np.zeros(len(z))])
-        origin = z.min(axis=0, initial=np.inf) if len(z) else np.zeros(2)
-        extent = z.max(axis=0) - origin if len(z) else np.zeros(2)
-        finite = reach[np.isfinite(reach).all(axis=1)]
-        cell = finite.mean(axis=0) if len(finite) else np.ones(2)
+        origin, extent = (z.min(axis=0), np.ptp(z, axis=0)) if len(z) else (np.zeros(2), np.zeros(2))
         most = max(1.0, np.ceil(np.sqrt(len(z))) * 2)
-        cell = np.maximum(np.maximum(cell, extent / most), 1e-9)
-        shape = (extent // cell).astype(np.int64) + 1
-        column = ((z - origin) // cell).astype(np.int64)
-        key = (run * shape[1] + column[:, 1]) * shape[0] + column[:, 0]
+        cell = np.maximum(np.maximum(_typical(reach), extent / most), 1e-9)
+        shape = (extent / cell).astype(np.int64) + 1
+        key = _keys(z, run, origin, cell, shape)
         order = np.argsort(key, kind="stable")
         return cls(order, key[order], origin, cell, shape)
+
+
+@njit(cache=True, nogil=True)
+def _typical(reach: Floats) -> Floats:
+    """(2,) mean of the finite half sides, one where there is none."""
+    total, count = np.zeros(2), 0
+    for t in range(len(reach)):
+        if np.isfinite(reach[t, 0]) and np.isfinite(reach[t, 1]):
+            total += reach[t]
+            count += 1
+    return total / count if count else np.ones(2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _keys(z: Floats, run: Ints, origin: Floats, cell: Floats, shape: Ints) -> Ints:
+    """(M,) number of each point's cell: runs apart, rows of cells apart, columns in sequence."""
+    key = np.empty(len(z), np.int64)
+    for j in range(len(z)):
+        column = min(np.int64((z[j, 0] - origin[0]) / cell[0]), shape[0] - 1)
+        line = min(np.int64((z[j, 1] - origin[1]) / cell[1]), shape[1] - 1)
+        key[j] = (run[j] * shape[1] + line) * shape[0] + column
+    return key
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

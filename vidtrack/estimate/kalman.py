@@ -132,7 +132,8 @@ def _update(
     rows, n = len(parent), x.shape[1]
     m = z.shape[1]
     x1, P1 = np.empty((rows, n)), np.empty((rows, n, n))
-    K, L, A, AP = np.empty((n, m)), np.empty((m, m)), np.empty((n, n)), np.empty((n, n))
+    K, L, A, AH = np.empty((n, m)), np.empty((m, m)), np.empty((n, n)), np.empty((n, m))
+    alone = np.empty(0)
     shift, mean = np.empty(n), np.empty(n)
     for k in range(rows):
         t = parent[k]
@@ -149,7 +150,7 @@ def _update(
                 for a in range(m):
                     shift[i] += K[i, a] * (z[j, a] - zhat[t, a])
                 mean[i] += beta[b] * shift[i]
-            _add_branch(P, t, H, h, R, j, K, A, AP, shift if beta[b] < 1.0 else np.zeros(0), beta[b], P1, k)
+            _add_branch(P, t, H, h, R, j, K, A, AH, shift if beta[b] < 1.0 else alone, beta[b], P1, k)
         mixed = start[k + 1] - start[k] > 1 or beta0[k] > 0.0
         for i in range(n):
             x1[k, i] = x[t, i] + mean[i]
@@ -190,34 +191,38 @@ def _gain(P: Floats, t: int, H: Floats, h: int, R: Floats, j: int, K: Floats, L:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_branch(
-    P: Floats, t: int, H: Floats, h: int, R: Floats, j: int, K: Floats, A: Floats, AP: Floats,
+    P: Floats, t: int, H: Floats, h: int, R: Floats, j: int, K: Floats, A: Floats, AH: Floats,
     shift: Floats, weight: float, out: Floats, k: int,
 ) -> None:  # fmt: skip
     """Add weight times the updated covariance and, where it is given, the spread shift shift'.
 
-    (I - K H) P (I - K H)' + K R K' (Joseph) is positive definite whatever the rounding.
+    Joseph's form (I - K H) P (I - K H)' + K R K' is positive definite whatever the rounding; here A = P - K H P
+    and then A - (A H' - K R) K'.
     """
     m, n = H.shape[1:]
     for i in range(n):
         for c in range(n):
-            total = 1.0 if i == c else 0.0
-            for a in range(m):
-                total -= K[i, a] * H[h, a, c]
-            A[i, c] = total
-    for i in range(n):
+            A[i, c] = P[t, i, c]
+    for a in range(m):
         for c in range(n):
             total = 0.0
             for d in range(n):
-                total += A[i, d] * P[t, d, c]
-            AP[i, c] = total
+                total += H[h, a, d] * P[t, d, c]
+            for i in range(n):
+                A[i, c] -= K[i, a] * total
     for i in range(n):
-        for c in range(i, n):
+        for a in range(m):
             total = 0.0
             for d in range(n):
-                total += AP[i, d] * A[c, d]
+                total += A[i, d] * H[h, a, d]
+            for b in range(m):
+                total -= K[i, b] * R[j, b, a]
+            AH[i, a] = total
+    for i in range(n):
+        for c in range(i, n):
+            total = A[i, c]
             for a in range(m):
-                for b in range(m):
-                    total += K[i, a] * R[j, a, b] * K[c, b]
+                total -= AH[i, a] * K[c, a]
             if len(shift):
                 total += shift[i] * shift[c]
             out[k, i, c] += weight * total

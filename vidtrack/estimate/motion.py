@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats
@@ -67,32 +68,18 @@ class ConstantVelocity:
         x (T, n), scale (T,) multiplies the standard deviations. The acceleration covariance is
         A = cross^2 I + (accel^2 - cross^2) u u', u the unit velocity (SPEC 004).
         """
-        A = self._acceleration(x, settled) * (scale * scale)[:, None, None]
         if self.hold_s is None:
-            time = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+            time = np.array([dt**4 / 4, dt**3 / 2, dt**2])
         else:
-            time = self.hold_s * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
-        n = 2 * self.dim
-        return (A[:, :, None, :, None] * time[None, None, :, None, :]).reshape(len(x), n, n)
-
-    def _acceleration(self, x: Floats, settled: Settled) -> Floats:
-        """A (T, d, d) at scale one."""
-        A = np.broadcast_to(self.accel**2 * np.eye(self.dim), (len(x), self.dim, self.dim)).copy()
-        if self.cross is None or not settled.any():
-            return A
-        v = x[settled][:, self.velocity]
-        u = v / np.linalg.norm(v, axis=1, keepdims=True)
-        stretch = (self.accel**2 - self.cross**2) * u[:, :, None] * u[:, None, :]
-        A[settled] = self.cross**2 * np.eye(self.dim) + stretch
-        return A
+            time = self.hold_s * np.array([dt**3 / 3, dt**2 / 2, dt])
+        cross = self.accel if self.cross is None else self.cross
+        return _accelerations(x, scale, settled, self.accel, cross, time)
 
     def settled(self, x: Floats, P: Floats, hits: np.ndarray) -> Settled:
         """(T,) rows whose heading is known: enough updates, and a speed well above its own uncertainty."""
         if self.cross is None:
             return np.zeros(len(x), bool)
-        v = x[:, self.velocity]
-        variance = P[:, self.velocity, self.velocity].max(axis=1)
-        return (hits > self.warmup) & ((v * v).sum(axis=1) > self.heading**2 * variance)
+        return _heading_known(x, P, hits, self.warmup, self.heading)
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
         """State and covariance of new rows from one located measurement each.
@@ -107,3 +94,39 @@ class ConstantVelocity:
         P[:, 0::2, 0::2] = cov
         P[:, self.velocity, self.velocity] = ((self.speed * scale) ** 2)[:, None]
         return x, P
+
+
+@njit(cache=True, nogil=True)
+def _accelerations(x: Floats, scale: Floats, settled: Settled, accel: float, cross: float, time: Floats) -> Floats:
+    """Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2."""
+    rows, n = x.shape
+    dim = n // 2
+    Q = np.empty((rows, n, n))
+    for t in range(rows):
+        speed2 = 0.0
+        for a in range(dim):
+            speed2 += x[t, 2 * a + 1] ** 2
+        across = (cross if settled[t] else accel) ** 2 * scale[t] ** 2
+        stretch = (accel**2 - cross**2) * scale[t] ** 2 / speed2 if settled[t] else 0.0
+        for a in range(dim):
+            for b in range(dim):
+                A = stretch * x[t, 2 * a + 1] * x[t, 2 * b + 1]
+                if a == b:
+                    A += across
+                Q[t, 2 * a, 2 * b] = A * time[0]
+                Q[t, 2 * a, 2 * b + 1] = A * time[1]
+                Q[t, 2 * a + 1, 2 * b] = A * time[1]
+                Q[t, 2 * a + 1, 2 * b + 1] = A * time[2]
+    return Q
+
+
+@njit(cache=True, nogil=True)
+def _heading_known(x: Floats, P: Floats, hits: np.ndarray, warmup: int, heading: float) -> Settled:
+    known = np.empty(len(x), np.bool_)
+    for t in range(len(x)):
+        speed2, variance = 0.0, 0.0
+        for a in range(1, x.shape[1], 2):
+            speed2 += x[t, a] ** 2
+            variance = max(variance, P[t, a, a])
+        known[t] = hits[t] > warmup and speed2 > heading**2 * variance
+    return known

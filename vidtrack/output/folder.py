@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import tempfile
@@ -49,7 +50,23 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or str(error)
-        raise StoppedEarly(f"stopped: cannot write {path}: {reason}; what was written before is valid") from None
+        raise StoppedEarly(
+            f"cannot write {path}: {reason}; what was written before is valid, and vidtrack repair makes it whole"
+        ) from None
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write the new content of `path` to: a reader sees the old file or the new one, never half of it."""
+    new = path.with_name(path.name + ".new")
+    with writing(path):
+        try:
+            yield new
+            os.replace(new, path)
+        except OSError:
+            with suppress(OSError):
+                new.unlink(missing_ok=True)
+            raise
 
 
 def append(file: FileIO, block: bytes) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 
-from vidtrack.output.folder import append, writing
+from vidtrack.output.folder import append, replacing, writing
 
 
 class Every:
@@ -76,8 +75,6 @@ def sort_rows(path: Path, columns: int, header: bool) -> None:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write a whole file so that a reader sees the old or the new one, never half of it."""
-    with writing(path):
-        new = path.with_name(path.name + ".new")
+    """Write a whole file at once."""
+    with replacing(path) as new:
         new.write_text(text)
-        os.replace(new, path)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from vidtrack.output.linefile import Every, LineFile, sort_rows
 from vidtrack.output.sink import Step
+from vidtrack.output.tables import csv_text
 from vidtrack.scan import Floats, Ints
 
 _FRAME, _ID, _SEEN = 0, 1, 7
@@ -47,7 +49,7 @@ class MotFile:
         rows = np.concatenate([self._gaps, *(_rows(step) for step in self._steps)])
         sure, self._gaps = settle_gaps(rows, self._steps[-1].tracks.id)
         self._steps.clear()
-        self._file.add("".join(_lines(sure)))
+        self._file.add(_lines(sure))
         self._file.flush()
 
 
@@ -74,8 +76,8 @@ def settle_gaps(rows: Floats, alive: Ints) -> tuple[Floats, Floats]:
     return rows[sure], rows[~sure & np.isin(rows[:, _ID], alive)]
 
 
-def _lines(rows: Floats) -> list[str]:
-    return [
-        f"{frame:.0f},{track:.0f},{left:.2f},{top:.2f},{width:.2f},{height:.2f},{conf:.3f},-1,-1,-1\n"
-        for frame, track, left, top, width, height, conf in rows[:, :7].tolist()
-    ]
+def _lines(rows: Floats) -> str:
+    number = rows[:, [_FRAME, _ID]].astype(np.int64)
+    unused = np.full((len(rows), 3), -1)
+    columns = [*number.T, *np.round(rows[:, 2:6], 2).T, np.round(rows[:, 6], 3), *unused.T]
+    return csv_text(pa.table(columns, [str(i) for i in range(len(columns))]))

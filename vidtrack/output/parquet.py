@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 
 _PART_ROWS = 100_000
@@ -40,9 +40,9 @@ class ParquetParts:
     def close(self) -> None:
         """Join all parts to one file."""
         parts = (pq.read_table(self._part(i)) for i in range(self._count))
-        with writing(self._path):
-            write_parquet(self._path, self._schema, [*parts, *self._waiting])
-            shutil.rmtree(self._folder, ignore_errors=True)
+        last = pa.concat_tables([self._schema.empty_table(), *self._waiting])
+        write_parquet(self._path, self._schema, chain(parts, [last]))
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def _close_part(self) -> None:
         table = pa.concat_tables(self._waiting)
@@ -50,7 +50,7 @@ class ParquetParts:
         path = self._part(self._count)
         with writing(path):
             self._folder.mkdir(exist_ok=True)
-            write_parquet(path, self._schema, [table])
+        write_parquet(path, self._schema, [table])
         self._count += 1
 
     def _part(self, number: int) -> Path:
@@ -64,8 +64,6 @@ def parts_folder(path: Path) -> Path:
 
 def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
     """Write the tables one after the other; the file appears when it is complete."""
-    new = path.with_name(path.name + ".new")
-    with pq.ParquetWriter(new, schema) as writer:
+    with replacing(path) as new, pq.ParquetWriter(new, schema) as writer:
         for table in tables:
             writer.write_table(table)
-    os.replace(new, path)

@@ -11,12 +11,15 @@ import numpy as np
 from vidtrack.output.draw import Pen, colour, draw_lines
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Tracks
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
 _SIDE = 960
 """Pixels; smaller pictures are enlarged to about this, or their numbers could not be read."""
+
+_BATCH = 50
+"""Frames that are drawn together: one call for a stroke costs as much as one for a segment."""
 
 _NUMBERED = 150
 """Most tracks that get their number; in a longer run the last ones do."""
@@ -40,26 +43,38 @@ class TrajectoryPlot:
         # Colour times opacity, and opacity: anti-aliased strokes then blend exactly.
         self._layer = np.zeros((shape[0] * self._zoom, shape[1] * self._zoom, 4), np.uint8)
         self._pen = Pen(self._layer)
-        self._last: dict[int, Floats] = {}
+        self._waiting: list[Tracks] = []
+        self._id, self._xy = np.empty(0, np.int64), np.empty((0, 2))  # last drawn point of each living track
         self._ends: dict[int, Floats] = {}
 
     def step(self, step: Step) -> None:
-        """Extend the trajectories of one frame's confirmed tracks; a coasted gap becomes a straight line."""
-        tracks = step.tracks
-        seen = tracks.seen
-        alive = set(tracks.id.tolist())
-        for track_id in self._last.keys() - alive:
-            self._ends[track_id] = self._last.pop(track_id)
-        while len(self._ends) > _NUMBERED:
-            del self._ends[next(iter(self._ends))]
-        for track_id, xy in zip(tracks.id[seen].tolist(), tracks.xy[seen], strict=True):
-            before = self._last.setdefault(track_id, xy)
-            if np.abs(xy - before).max() * self._zoom >= 1.0:
-                self._pen.path(np.stack([before, xy]) * self._zoom, (*colour(track_id), 255), width=2)
-                self._last[track_id] = xy
+        """Extend the trajectories by one frame's confirmed tracks; a coasted gap becomes a straight line."""
+        self._waiting.append(step.tracks)
+        if len(self._waiting) == _BATCH:
+            self._draw()
+
+    def _draw(self) -> None:
+        """One stroke for all that a track moved since the last call."""
+        if not self._waiting:
+            return
+        ids = np.concatenate([self._id, *(t.id[t.seen] for t in self._waiting)])
+        xy = np.concatenate([self._xy, *(t.xy[t.seen] for t in self._waiting)])
+        order = np.argsort(ids, kind="stable")
+        self._id, start = np.unique(ids[order], return_index=True)
+        paths = np.split(xy[order], start[1:]) if len(start) else []
+        for track_id, path in zip(self._id.tolist(), paths, strict=True):
+            self._pen.path(path * self._zoom, (*colour(track_id), 255), width=2)
+            self._ends.pop(track_id, None)
+            self._ends[track_id] = path[-1]
+        self._xy = np.array([path[-1] for path in paths]).reshape(-1, 2)
+        alive = np.isin(self._id, self._waiting[-1].id)
+        self._id, self._xy = self._id[alive], self._xy[alive]
+        self._ends = dict(list(self._ends.items())[-_NUMBERED:])
+        self._waiting.clear()
 
     def close(self) -> None:
         """Write the picture."""
+        self._draw()
         size = (self._layer.shape[1], self._layer.shape[0])
         scene = np.full((*self._shape, 3), 60, np.uint8) if self._scene is None else self._scene()
         enlarged = cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC)
@@ -75,7 +90,7 @@ class TrajectoryPlot:
     def _number(self, pen: Pen) -> None:
         """Each track's number at its end, or in the nearest free place above or below."""
         free = np.ones(self._layer.shape[:2], bool)
-        for track_id, xy in sorted((self._ends | self._last).items()):
+        for track_id, xy in sorted(self._ends.items()):
             width, height = pen.size(str(track_id))
             x = int(np.clip(xy[0] * self._zoom, 0, max(0, free.shape[1] - width)))
             end = int(np.clip(xy[1] * self._zoom, height, free.shape[0]))

@@ -14,8 +14,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from vidtrack.config import Settings
-from vidtrack.errors import OutputError
+from vidtrack.errors import OutputError, StoppedEarly
 from vidtrack.output.draw import colour
+from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
 from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
@@ -61,7 +62,7 @@ def _open(target: str, shape: tuple[int, int]) -> rr.RecordingStream:
         else:
             recording.save(target, default_blueprint=layout)
     except (OSError, RuntimeError) as error:
-        raise OutputError(f"cannot open the recording {target}: {error}") from None
+        raise OutputError(f"cannot open the recording {target}: {error}; give --rerun another place") from None
     return recording
 
 
@@ -95,6 +96,7 @@ class RerunSink:
         self._output = settings.output
         self._trails = Trails(settings.output.trail_s)
         self._next_picture_s = -np.inf
+        self._due = Every(1.0)
         self._life: dict[int, str] = {}
         self._lanes: set[int] = set()
         self._stages: list[str] = []
@@ -126,11 +128,22 @@ class RerunSink:
         self._log_numbers(step)
         for event in step.tracks.events:
             self._log("log", rr.TextLog(f"track {event.track_id}: {event.kind}: {event.reason}", level="INFO"))
+        if self._due():
+            self._flush()
 
     def close(self) -> None:
-        """Finish the recording."""
-        self._recording.flush()
-        self._recording.disconnect()
+        """Finish the recording. Raises StoppedEarly when the disk refused some of it."""
+        try:
+            self._flush()
+        finally:
+            self._recording.disconnect()
+
+    def _flush(self) -> None:
+        # rerun writes in a thread of its own; only here does it tell that the disk is full.
+        try:
+            self._recording.flush()
+        except RuntimeError as error:
+            raise StoppedEarly(f"the rerun recording is incomplete: {error}; is the disk full?") from None
 
     def _log(self, path: str, what: rr.AsComponents) -> None:
         self._recording.log(path, what)

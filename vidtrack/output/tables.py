@@ -64,16 +64,17 @@ def video_rows(steps: Sequence[Step]) -> pa.Table:
     """Table with the columns VIDEO, rows in the order of the steps."""
     tracks = [step.tracks for step in steps]
     counts = [len(t) for t in tracks]
-    xy, v, box = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("xy", "v", "box"))
-    cov = np.concatenate([t.xy_cov for t in tracks])
+    x, P, box = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("x", "P", "box"))
+    position, velocity = list(tracks[0].position), list(tracks[0].velocity)
+    cov = P[:, position][:, :, position]
     sigma = np.sqrt(cov[:, [0, 1], [0, 1]])
     values = [
         np.repeat([step.index for step in steps], counts),
         np.repeat([step.time_s for step in steps], counts),
         np.concatenate([t.id for t in tracks]),
         _STATUS_WORDS[np.concatenate([t.status for t in tracks])],
-        *xy.T,
-        *v.T,
+        *x[:, position].T,
+        *x[:, velocity].T,
         *sigma.T,
         cov[:, 0, 1] / sigma.prod(axis=1),
         *box.T,

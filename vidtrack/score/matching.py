@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from vidtrack.errors import ConfigError
 from vidtrack.formats import Table
 from vidtrack.scan import Floats, Ints
 
 Mask = NDArray[np.bool_]
-PAIRS_AT_ONCE = 1_000_000  # bounds the memory of frames with very many objects
+FRAME_SPACING = 3.0  # in units of the reach: rows of different frames are never near
+ROUNDING = 1e-9  # keeps pairs exactly at the reach, which are judged afterwards
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +71,11 @@ def match_boxes(result: Table, truth: Table) -> Matchup:
     """Compare boxes by intersection over union. Raises ConfigError when a table has none."""
     if result.box is None or truth.box is None:
         raise ConfigError("both tables need boxes to be matched by IoU; match points instead")
-    result_box, truth_box = result.box, truth.box
-
-    def compare(t: Ints, r: Ints) -> tuple[Floats, Floats]:
-        iou = box_iou(truth_box[t], result_box[r])
-        return iou, 1 - iou
-
-    return _match(result, truth, compare, reach=1.0)
+    truth_half, result_half = truth.box[:, 2:] / 2, result.box[:, 2:] / 2
+    reach = np.nanmax(truth_half, axis=0, initial=0.0) + np.nanmax(result_half, axis=0, initial=0.0)
+    t, r = _near_rows(truth, result, truth.box[:, :2] + truth_half, result.box[:, :2] + result_half, reach)
+    iou = box_iou(truth.box[t], result.box[r])
+    return _matchup(result, truth, t, r, iou, 1 - iou, reach=1.0)
 
 
 def match_points(result: Table, truth: Table, max_distance: float, reach: float = 0.0) -> Matchup:
@@ -87,12 +87,11 @@ def match_points(result: Table, truth: Table, max_distance: float, reach: float 
     if result.unit != truth.unit:
         raise ConfigError(f"the result is in {result.unit} and the truth in {truth.unit}; give both in one unit")
     axes = min(result.xy.shape[1], truth.xy.shape[1])
-
-    def compare(t: Ints, r: Ints) -> tuple[Floats, Floats]:
-        distance = np.linalg.norm(truth.xy[t, :axes] - result.xy[r, :axes], axis=1)
-        return np.maximum(0.0, 1 - distance / (2 * max_distance)), distance
-
-    return _match(result, truth, compare, max(2 * max_distance, reach))
+    reach = max(2 * max_distance, reach)
+    t, r = _near_rows(truth, result, truth.xy[:, :axes], result.xy[:, :axes], np.full(axes, reach))
+    distance = np.linalg.norm(truth.xy[t, :axes] - result.xy[r, :axes], axis=1)
+    similarity = np.maximum(0.0, 1 - distance / (2 * max_distance))
+    return _matchup(result, truth, t, r, similarity, distance, reach)
 
 
 def box_iou(a: Floats, b: Floats) -> Floats:
@@ -109,34 +108,42 @@ def _area(sides: Floats) -> Floats:
     return sides[:, 0] * sides[:, 1]
 
 
-def _match(
-    result: Table, truth: Table, compare: Callable[[Ints, Ints], tuple[Floats, Floats]], reach: float
+def _near_rows(truth: Table, result: Table, truth_at: Floats, result_at: Floats, reach: Floats) -> tuple[Ints, Ints]:
+    """Rows of truth and result (B,), (B,) of equal frames that differ by at most `reach` (d,) on every axis.
+
+    In order of frame. A k-d tree with the frame as one more axis finds them; listing all pairs of
+    a frame would cost its square.
+    """
+    scale = np.where(reach > 0, reach, 1.0)
+    finite, trees = [], []
+    for table, at in ((truth, truth_at), (result, result_at)):
+        rows = np.flatnonzero(np.isfinite(at.sum(axis=1)))
+        points = np.column_stack([at[rows] / scale, FRAME_SPACING * table.frame[rows]])
+        finite.append(rows)
+        trees.append(cKDTree(points, balanced_tree=False, compact_nodes=False))
+    near = trees[0].sparse_distance_matrix(trees[1], 1 + ROUNDING, p=np.inf, output_type="ndarray")
+    t, r = finite[0][near["i"]], finite[1][near["j"]]
+    order = np.lexsort((r, t, truth.frame[t]))
+    return t[order], r[order]
+
+
+def _matchup(
+    result: Table, truth: Table, t: Ints, r: Ints, similarity: Floats, distance: Floats, reach: float
 ) -> Matchup:
-    """List the pairs of equal frames that are nearer than `reach`."""
-    _, frame = np.unique(np.concatenate([truth.frame, result.frame]), return_inverse=True)
-    truth_frame, result_frame = frame[: len(truth)], frame[len(truth) :]
-    kept: list[tuple[NDArray, ...]] = [(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))]
-    for t, r in _rows_of_equal_frames(truth_frame, result_frame):
-        similarity, distance = compare(t, r)
-        near = distance < reach
-        kept.append((t[near], r[near], similarity[near], distance[near]))
-    t, r, similarity, distance = (np.concatenate(column) for column in zip(*kept, strict=True))
-    truth_id = np.unique(truth.id, return_inverse=True)[1]
-    result_id = np.unique(result.id, return_inverse=True)[1]
-    return Matchup(truth_frame, result_frame, truth_id, result_id, t, r, similarity, distance, reach)
-
-
-def _rows_of_equal_frames(truth_frame: Ints, result_frame: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Every (truth row, result row) of the same frame, in order of frame, in blocks of bounded size."""
-    truth_order = np.argsort(truth_frame, kind="stable")
-    result_order = np.argsort(result_frame, kind="stable")
-    ordered = result_frame[result_order]
-    first = np.searchsorted(ordered, truth_frame[truth_order], "left")
-    partners = np.searchsorted(ordered, truth_frame[truth_order], "right") - first
-    for rows in np.array_split(np.arange(len(truth_order)), partners.sum() // PAIRS_AT_ONCE + 1):
-        count = partners[rows]
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        yield np.repeat(truth_order[rows], count), result_order[np.repeat(first[rows], count) + within]
+    """The pairs nearer than `reach`, with frames and identities numbered without gaps."""
+    frame = np.unique(np.concatenate([truth.frame, result.frame]), return_inverse=True)[1]
+    near = distance < reach
+    return Matchup(
+        truth_frame=frame[: len(truth)],
+        result_frame=frame[len(truth) :],
+        truth_id=np.unique(truth.id, return_inverse=True)[1],
+        result_id=np.unique(result.id, return_inverse=True)[1],
+        truth=t[near],
+        result=r[near],
+        similarity=similarity[near],
+        distance=distance[near],
+        reach=reach,
+    )
 
 
 def assign(frame: Ints, row: Ints, column: Ints, score: Floats) -> Mask:

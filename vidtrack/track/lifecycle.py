@@ -23,6 +23,7 @@ class LifeCycle:
     confirm_s       s; a track is not confirmed before this age, so that a high scan rate does not confirm noise
     confirm_travel  object sizes; nor before it has moved this far (swaying trees do not travel)
     coast_s         s; a confirmed track is deleted this long after its last evidence; None: by misses only
+    hidden_s        s; the same for a track inside a blob that it shares, where nothing could be seen of it
     coast_scans     or after this many scans in a row without evidence; None: by time only
     """
 
@@ -31,6 +32,7 @@ class LifeCycle:
     confirm_s: float = 0.0
     confirm_travel: float = 0.0
     coast_s: float | None = None
+    hidden_s: float = 2.0
     coast_scans: int | None = 5
 
     def __post_init__(self) -> None:
@@ -60,7 +62,8 @@ class LifeCycle:
         """(T,) confirmed rows without evidence for too long."""
         gone = np.zeros(len(register), bool)
         if self.coast_s is not None:
-            gone |= t - register.updated_s > self.coast_s
+            patience = np.where(register.status == Status.MERGED, self.hidden_s, self.coast_s)
+            gone |= t - register.updated_s > np.maximum(patience, self.coast_s)
         if self.coast_scans is not None:
             gone |= register.history & ((1 << (self.coast_scans + 1)) - 1) == 0
         return (register.status != Status.TENTATIVE) & gone

@@ -256,7 +256,7 @@ class Tracker:
     def _delete(self, t: float, taken: Ints, events: list[Event]) -> np.ndarray:
         """Drop the rows that are not believed any more; returns the mask of those kept."""
         hopeless = self.life.hopeless(self.register)
-        left = self._outside() & (self.register.history & 1 == 0)
+        left = self._leaving() & (self.register.history & 1 == 0)
         for gone, reason in ((hopeless, "too many misses before confirmation"), (left & ~hopeless, "left the picture")):
             events.extend(Event(t, int(track), "delete", reason) for track in self.register.id[gone])
         kept = ~(hopeless | left)
@@ -264,13 +264,15 @@ class Tracker:
             self._keep(kept)
         return kept
 
-    def _outside(self) -> np.ndarray:
-        """(T,) rows whose predicted position is beyond the border."""
+    def _leaving(self) -> np.ndarray:
+        """(T,) rows beyond the border, or cut by it on their way out."""
         if self.bounds is None:
             return np.zeros(len(self.register), bool)
-        xy = self.bank.x[:, self.model.position]
-        x, y = xy[:, 0], xy[:, 1]
-        return (x < 0) | (y < 0) | (x > self.bounds[0]) | (y > self.bounds[1])
+        xy, v = self.bank.x[:, self.model.position], self.bank.x[:, self.model.velocity]
+        near = absolute(self.register.box, xy)[:, :2]
+        far = near + self.register.box[:, 2:]
+        out = (xy < 0) | (xy > self.bounds) | ((near < BORDER) & (v < 0)) | ((far > np.subtract(self.bounds, BORDER)) & (v > 0))
+        return out[:, 0] | out[:, 1]
 
     def _cut(self, box: Floats) -> np.ndarray:
         """(N,) boxes that the picture's border cuts: their extent changes faster than any vehicle's."""

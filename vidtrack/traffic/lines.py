@@ -50,7 +50,7 @@ def parse_line(text: str) -> Line:
         x1, y1, x2, y2 = (float(number) for number in numbers.split(","))
     except ValueError:
         raise ConfigError(usage) from None
-    if not name or "," in name or not np.isfinite([x1, y1, x2, y2]).all():
+    if not name or set(name) & set(',"\n') or not np.isfinite([x1, y1, x2, y2]).all():
         raise ConfigError(usage)
     if (x1, y1) == (x2, y2):
         raise ConfigError(f"line {text!r} has no length: its two ends are the same point")
@@ -89,7 +89,7 @@ class _State:
 
     def __init__(self, ids: Ints, xy: Floats, distance: Floats, t: float, frame: int) -> None:
         shape = distance.shape
-        self.id = ids
+        self.id = ids.copy()
         self.xy = xy.copy()
         self.confirmed = np.zeros(len(ids), bool)
         self.distance = distance.copy()  # signed, from the line
@@ -101,6 +101,7 @@ class _State:
         self.frame = np.full(shape, frame)
 
     def replace(self, rows: Ints, old: _State, old_rows: Ints) -> None:
+        """Take the memory of tracks that were there before."""
         for name, values in vars(old).items():
             getattr(self, name)[rows] = values[old_rows]
 

@@ -152,7 +152,7 @@ def _video_stream(container: av.container.InputContainer, path: Path) -> av.Vide
     """The first stream of moving pictures: the cover of an audio file is none."""
     streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
     if not streams:
-        kinds = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
+        kinds = ", ".join(sorted({stream.type for stream in container.streams} - {"video"})) or "still pictures"
         raise SourceError(f"no video in {path}: it holds only {kinds}")
     if streams[0].codec_context is None:
         raise SourceError(f"cannot decode {path}: its codec is unknown to FFmpeg {streams[0]}; convert it to H.264")

@@ -6,6 +6,7 @@ import struct
 from pathlib import Path
 from typing import BinaryIO
 
+_BOXES = frozenset(b"ftyp styp pdin moov moof mfra mdat free skip wide sidx ssix prft emsg meta uuid".split())
 _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 
 
@@ -54,14 +55,16 @@ def _riff_end(file: BinaryIO, size: int) -> int:
 
 
 def _boxes_end(file: BinaryIO, size: int) -> int:
-    """End of the last top-level box of an MP4 file (ISO/IEC 14496-12, 4.2)."""
+    """End of the last top-level box of an MP4 file (ISO/IEC 14496-12, 4.2); unknown boxes are padding or debris."""
     end = 0
     while end < size:
         file.seek(end)
         head = file.read(16)
+        if head[4:8] not in _BOXES:
+            break
         length = int.from_bytes(head[:4], "big")
         if length == 1:
-            length = int.from_bytes(head[8:16], "big")
+            length = int.from_bytes(head[8:], "big")
         if length < 8:  # 0: up to the end of the file
             break
         end += length

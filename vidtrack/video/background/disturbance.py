@@ -91,7 +91,7 @@ class Disturbance:
         return self._time_s - self._start_s < _UNSURE_S
 
     def _follow_exposure(self, picture: Picture) -> None:
-        g = gain(picture.luma, self._scene.luma, self._black)
+        g = gain(picture.luma, self._scene, self._black)
         if abs(g - 1) > _GAIN_STEP:
             luma = self._scene.luma
             np.clip((luma - self._black) * g + self._black, 0, 255, out=luma)

@@ -12,9 +12,9 @@ _CLIPPED = np.float32(250)
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def gain(luma, scene, black):  # type: ignore[no-untyped-def]
-    """Median of (Y - black) / (B - black) over the picture; 1 where too few points could tell.
+    """Median of (Y - black) / (B - black) over the points that were not covered before; 1 if they are too few.
 
-    luma (h, w) uint8, scene (h, w) float32. Traffic does not move it while it covers less than half.
+    luma (h, w) uint8. New traffic does not move it while it comes on less than half of the points.
     """
     h, w = luma.shape
     stride = max(1, int(np.sqrt(h * w / _POINTS)))
@@ -22,8 +22,9 @@ def gain(luma, scene, black):  # type: ignore[no-untyped-def]
     n = 0
     for y in range(0, h, stride):
         for x in range(0, w, stride):
-            if _DARK < scene[y, x] < _BRIGHT and luma[y, x] <= _CLIPPED:
-                ratio[n] = (np.float32(luma[y, x]) - black) / (scene[y, x] - black)
+            B = scene.luma[y, x]
+            if scene.covered_s[y, x] == 0 and _DARK < B < _BRIGHT and luma[y, x] <= _CLIPPED:
+                ratio[n] = (np.float32(luma[y, x]) - black) / (B - black)
                 n += 1
     if 10 * n < len(ratio):
         return np.float32(1)
