@@ -6,13 +6,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from time import perf_counter
 
-import cv2
 import numpy as np
 
 from vidtrack.associate.gate import Gate
-from vidtrack.associate.hard import GNN, NN
+from vidtrack.associate.hard import GNN, NN, Associator
 from vidtrack.config import Settings, TrackerSettings
-from vidtrack.errors import ConfigError
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Scan, Status, Tracks
@@ -23,9 +21,10 @@ from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
+from vidtrack.video.mask import read_mask
 from vidtrack.video.source import open_source
 
-METHODS = {"nn": NN, "gnn": GNN}
+METHODS: dict[str, type[Associator]] = {"nn": NN, "gnn": GNN}
 
 
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
@@ -45,11 +44,7 @@ def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[
 def build_detector(settings: Settings) -> Background:
     """The detector that the settings describe. Raises ConfigError for a mask that is not a picture."""
     path = settings.source.mask
-    keep = None
-    if path is not None:
-        keep = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        if keep is None:
-            raise ConfigError(f"cannot read the mask {path}; it must be a picture, white where traffic is looked for")
+    keep = None if path is None else read_mask(path)
     return background.create(settings.detector, settings.source.scale, keep)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 
 from vidtrack.config import Settings
+from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import open_run
@@ -17,6 +18,7 @@ from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
+from vidtrack.output.threaded import Threaded
 from vidtrack.pipeline import build_detector, build_tracker, detection_steps, video_steps
 from vidtrack.traffic.lines import LineCounter, parse_lines
 from vidtrack.video.detections import Detections, is_detections, open_detections
@@ -48,7 +50,8 @@ class Run:
     ) -> None:
         with ExitStack() as stack:  # whatever fails below, what is open by then is closed
             self._source = opened = _open(source, settings)
-            stack.callback(opened.close)
+            if isinstance(opened, Source):
+                stack.callback(opened.close)
             shape = (opened.height, opened.width)
             tracker = build_tracker(settings.tracker, (opened.width, opened.height), explain=decisions or rerun is not None)
             detector = None
@@ -63,30 +66,30 @@ class Run:
 
             counter = LineCounter(lines) if lines else None
             self._summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
+            stack.callback(self._summary.close)  # last of all: it reports what the others did
             self._sinks: list[Sink] = []
 
             def add(sink: Sink) -> None:
                 self._sinks.append(sink)
                 stack.callback(sink.close)
 
-            add(self._summary)
-            add(TrackTable(self.folder))
-            add(MotFile(self.folder / "mot.txt"))
-            add(TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines))
             if counter is not None:
                 add(CountsFile(self.folder / "counts.csv", counter))
+            plot = TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines)
+            add(Confirmed(TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot))
             if decisions:
                 add(DecisionLog(self.folder / "decisions.csv"))
             if masks is not None:
-                add(MaskFolder(masks))
+                add(Threaded(MaskFolder(masks)))
             if video is not None:
                 from vidtrack.output.video import AnnotatedVideo
 
-                add(AnnotatedVideo(video, opened.fps, settings.output, lines))
+                add(Threaded(AnnotatedVideo(video, opened.fps, settings.output, lines)))
             if rerun is not None:
                 from vidtrack.output.rerun import RerunSink
 
-                add(RerunSink(rerun, shape, settings, lines))
+                add(Threaded(RerunSink(rerun, shape, settings, lines)))
+            self._sinks.append(self._summary)
             self._open = stack.pop_all()
 
     def __iter__(self) -> Iterator[Step]:

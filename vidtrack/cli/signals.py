@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Iterable, Iterator
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Item = TypeVar("Item")
 _WATCHED = (signal.SIGINT, signal.SIGTERM)
@@ -29,7 +29,7 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
             raise KeyboardInterrupt
         caught.append(number)
 
-    before = {}
+    before: dict[int, Any] = {}
     try:
         for item in items:
             if not before:  # until the first item nothing is at stake, and opening may take long

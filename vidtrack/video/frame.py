@@ -41,8 +41,6 @@ class Frame:
             return np.asarray(cv2.cvtColor(luma, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
         size = (self.y.shape[1], self.y.shape[0])
         gain = 1.0 if self.full_range else 255 / 224
-        chroma = [
-            cv2.convertScaleAbs(cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR), alpha=gain, beta=128 - 128 * gain)
-            for plane in (self.v, self.u)
-        ]
+        large = (cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR) for plane in (self.v, self.u))
+        chroma = [cv2.convertScaleAbs(plane, alpha=gain, beta=128 - 128 * gain) for plane in large]
         return np.asarray(cv2.cvtColor(cv2.merge([luma, *chroma]), cv2.COLOR_YCrCb2BGR), dtype=np.uint8)
