@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -22,7 +23,6 @@ import numpy as np
 from vidtrack.config import BlobSettings, DetectorSettings, SourceSettings
 from vidtrack.video.background import create
 from vidtrack.video.blobs import find_blobs
-from vidtrack.video.foreground import Background, Foreground
 from vidtrack.video.frame import Frame, Image
 from vidtrack.video.source import open_source
 
@@ -106,21 +106,36 @@ def enlarged(frame: Frame, size: tuple[int, int]) -> Frame:
 def times(frames: list[Frame], rounds: int) -> None:
     """Print ms a frame of the map, the map with blobs, and MOG2 with one and with all threads, and the ratios."""
     threads = cv2.getNumThreads()
-    bgr = [frame.bgr() for frame in frames]
+    mapper, finder = create(DetectorSettings()), create(DetectorSettings())
     model = cv2.createBackgroundSubtractorMOG2()
-    detector = create(DetectorSettings())
-    jobs: dict[str, tuple[int, Callable[[], object]]] = {
-        "map": (1, lambda: [detector.apply(frame, NONE_KNOWN) for frame in frames]),
-        "map + blobs": (1, lambda: [find_blobs(run(detector, frame), BlobSettings()) for frame in frames]),
-        "MOG2 1 thread": (1, lambda: [model.apply(picture) for picture in bgr]),
-        f"MOG2 {threads} threads": (threads, lambda: [model.apply(picture) for picture in bgr]),
+
+    def mog2(played: list[Frame], bgr: list[Image]) -> None:
+        for picture in bgr:
+            model.apply(picture)
+
+    def only_map(played: list[Frame], bgr: list[Image]) -> None:
+        for frame in played:
+            mapper.apply(frame, NONE_KNOWN)
+
+    def map_and_blobs(played: list[Frame], bgr: list[Image]) -> None:
+        for frame in played:
+            find_blobs(finder.apply(frame, NONE_KNOWN), BlobSettings())
+
+    jobs: dict[str, tuple[int, Callable[[list[Frame], list[Image]], None]]] = {
+        "map": (1, only_map),
+        "map + blobs": (1, map_and_blobs),
+        "MOG2 1 thread": (1, mog2),
+        f"MOG2 {threads} threads": (threads, mog2),
     }
     measured: dict[str, list[float]] = {name: [] for name in jobs}
     for turn in range(rounds + 1):  # the first round compiles and warms up
+        order = frames if turn % 2 == 0 else frames[::-1]  # back and forth: no jump where the frames begin again
+        played = [replace(frame, time_s=(turn * len(frames) + k) / 25) for k, frame in enumerate(order)]
+        bgr = [frame.bgr() for frame in played]
         for name, (used, job) in jobs.items():
             cv2.setNumThreads(used)
             began = perf_counter()
-            job()
+            job(played, bgr)
             if turn:
                 measured[name].append((perf_counter() - began) / len(frames) * 1e3)
     cv2.setNumThreads(threads)
@@ -130,11 +145,6 @@ def times(frames: list[Frame], rounds: int) -> None:
     for name in [name for name in measured if name.startswith("MOG2")]:
         ratios = [np.median(np.divide(ms, measured[name])) for ms in measured.values()]
         print(f"x {name}: " + ", ".join(f"{part} {ratio:.3f}" for part, ratio in zip(measured, ratios, strict=True)))
-
-
-def run(detector: Background, frame: Frame) -> Foreground:
-    """One frame through a detector, nothing known."""
-    return detector.apply(frame, NONE_KNOWN)
 
 
 if __name__ == "__main__":

@@ -21,9 +21,7 @@ import argparse
 import json
 import subprocess
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from fractions import Fraction
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -40,11 +38,13 @@ from vidtrack.simulate import Clip, simulate
 
 FPS = 25
 SEED = 1
-CODECS = {  # file ending, encoder, pixel format, options
-    "h264": ("mp4", "libx264", "yuv420p", {"crf": "23", "preset": "medium"}),
+BITS_PER_PIXEL = 0.1  # H.264: 2.3 Mbit/s at 1280x720, 5.2 Mbit/s at 1920x1080, as traffic cameras send it
+CODECS: dict[str, tuple[str, str, str, dict[str, str]]] = {  # file ending, encoder, pixel format, options
+    "h264": ("mp4", "libx264", "yuv420p", {}),
     "mjpg": ("avi", "mjpeg", "yuvj420p", {"qmin": "3", "qmax": "3"}),
     "xvid": ("avi", "mpeg4", "yuv420p", {"qmin": "3", "qmax": "3"}),
 }
+NAMES = ("decode", "vidtrack", "MOG2")
 STAGES = ("open", "read", "detect", "blobs", "track", "write", "close")
 
 
@@ -68,26 +68,32 @@ class Record:
 
 def encode(clip: Clip, folder: Path) -> None:
     """The clip in all codecs that are not there yet; its frames are drawn once."""
-    missing = {codec: path_of(clip, codec, folder) for codec in CODECS if not path_of(clip, codec, folder).is_file()}
-    if not missing:
-        return
-    outputs = []
-    for codec, path in missing.items():
-        _, encoder, pixels, options = CODECS[codec]
-        part = path.with_name("part-" + path.name)
-        container = av.open(str(part), "w")
-        stream = container.add_stream(encoder, rate=Fraction(FPS), options=options)
-        stream.width, stream.height, stream.pix_fmt = *clip.size, pixels
-        if codec == "xvid":
-            stream.codec_context.codec_tag = "XVID"
-        outputs.append((container, stream, part, path))
-    for image in clip:
-        for container, stream, _, _ in outputs:
+    paths = {codec: path_of(clip, codec, folder) for codec in CODECS}
+    parts = {path: path.with_name("part-" + path.name) for path in paths.values() if not path.is_file()}
+    streams = [open_stream(parts[path], codec, clip.size) for codec, path in paths.items() if path in parts]
+    for image in clip if streams else ():
+        for container, stream in streams:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
-    for container, stream, part, path in outputs:
+    for container, stream in streams:
         container.mux(stream.encode())
         container.close()
+    for path, part in parts.items():
         part.rename(path)
+
+
+def open_stream(path: Path, codec: str, size: tuple[int, int]) -> tuple[av.container.OutputContainer, av.VideoStream]:
+    """A file to be written."""
+    _, encoder, pixels, options = CODECS[codec]
+    container = av.open(str(path), "w")
+    stream = container.add_stream(encoder, rate=FPS, options=options)
+    assert isinstance(stream, av.VideoStream)
+    stream.width, stream.height = size
+    stream.pix_fmt = pixels
+    if codec == "h264":
+        stream.bit_rate = round(BITS_PER_PIXEL * FPS * size[0] * size[1])
+    elif codec == "xvid":
+        stream.codec_context.codec_tag = "XVID"
+    return container, stream
 
 
 def path_of(clip: Clip, codec: str, folder: Path) -> Path:
@@ -138,16 +144,21 @@ def take_turns(path: Path, python: Path, record: Record) -> None:
         record.add("MOG2", *run_mog2(path, python, Path(place) / "mog2.npz"))
 
 
-def quality(result: Table, truth: Table) -> Iterator[str]:
-    """MOTA at two IoU and the switches at the second."""
-    for iou in (0.5, 0.3):
-        clear = score.clear(score.match_boxes(result, truth), iou)
-        yield f"{clear.mota:9.3f}"
-    yield f"{clear.switches:4d}"
+def quality(result: Table, clip: Clip) -> str:
+    """MOTA at IoU 0.5 and 0.3, and the switches at the second."""
+    truth = formats.box_table(clip.truth.frame, clip.truth.id, clip.truth.box)
+    matchup = score.match_boxes(result, truth)
+    tight, loose = score.clear(matchup, 0.5), score.clear(matchup, 0.3)
+    return f"{tight.mota:7.3f}{loose.mota:7.3f}{loose.switches:5d}"
 
 
-def size(text: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT."""
+def named(clip: Clip, codec: str) -> str:
+    """The head of a row."""
+    return f"{clip.size[0]:4d}x{clip.size[1]:<4d} {codec}"
+
+
+def width_height(text: str) -> tuple[int, int]:
+    """A size from WIDTHxHEIGHT."""
     width, height = text.split("x")
     return int(width), int(height)
 
@@ -157,16 +168,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--peers-in", type=Path, required=True, metavar="DIR", help="folder of the environment")
     parser.add_argument("--clips", type=Path, required=True, metavar="DIR", help="folder of the clips")
-    parser.add_argument("--sizes", type=size, nargs="+", default=[(320, 240), (1280, 720), (1920, 1080)])
+    parser.add_argument("--sizes", type=width_height, nargs="+", default=[(320, 240), (1280, 720), (1920, 1080)])
     parser.add_argument("--codecs", nargs="+", choices=CODECS, default=list(CODECS))
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
     options.clips.mkdir(parents=True, exist_ok=True)
     python = python_of("numpy2", options.peers_in)
 
-    clips = {width_height: simulate("junction", seed=SEED, fps=FPS, size=width_height) for width_height in options.sizes}
-    records = {(clip, codec): Record() for clip in clips.values() for codec in options.codecs}
-    for clip in clips.values():
+    clips = [simulate("junction", seed=SEED, fps=FPS, size=size) for size in options.sizes]
+    records = {(clip, codec): Record() for clip in clips for codec in options.codecs}
+    for clip in clips:
         encode(clip, options.clips)
     with tempfile.TemporaryDirectory() as place:  # compiles, and imports what is imported late
         first, codec = next(iter(records))
@@ -175,20 +186,19 @@ def main() -> None:
         for (clip, codec), record in records.items():
             take_turns(path_of(clip, codec, options.clips), python, record)
 
-    print("ms/frame             decode  vidtrack      MOG2  vidtrack/  MOG2/     vidtrack              MOG2")
-    print("                                                 decode     vidtrack  MOTA.5  MOTA.3 IDSW   MOTA.5  MOTA.3 IDSW")
+    print("                         ms/frame                 vidtrack/    MOG2/  vidtrack at IoU       MOG2 at IoU")
+    print("              Mbit/s   decode vidtrack     MOG2   decode vidtrack     0.5    0.3 IDSW      0.5    0.3 IDSW")
     for (clip, codec), record in records.items():
-        truth = formats.box_table(clip.truth.frame, clip.truth.id, clip.truth.box)
-        row = [f"{clip.size[0]:4d}x{clip.size[1]:<4d} {codec}  "]
-        row += [f"{1e3 * median(record.seconds[name]) / len(clip):9.3f} " for name in ("decode", "vidtrack", "MOG2")]
-        row += [f"{record.ratio('vidtrack', 'decode'):8.2f}  {record.ratio('MOG2', 'vidtrack'):9.2f}  "]
-        row += [part for name in ("vidtrack", "MOG2") for part in quality(record.result[name], truth)]
-        print("".join(row))
+        rate = 8e-6 * path_of(clip, codec, options.clips).stat().st_size * FPS / len(clip)
+        times = "".join(f"{1e3 * median(record.seconds[name]) / len(clip):9.3f}" for name in NAMES)
+        ratios = f"{record.ratio('vidtrack', 'decode'):9.2f}{record.ratio('MOG2', 'vidtrack'):9.2f}"
+        scores = "  ".join(quality(record.result[name], clip) for name in NAMES[1:])
+        print(f"{named(clip, codec)}{rate:7.1f}{times}{ratios} {scores}")
 
-    print("\nms/frame            " + "".join(f"{stage:>9s}" for stage in STAGES))
+    print("\nms/frame      " + "".join(f"{stage:>9s}" for stage in STAGES))
     for (clip, codec), record in records.items():
-        parts = [1e3 * median(stages[stage] for stages in record.stages) / len(clip) for stage in STAGES]
-        print(f"{clip.size[0]:4d}x{clip.size[1]:<4d} {codec}      " + "".join(f"{part:9.3f}" for part in parts))
+        parts = (1e3 * median(stages[stage] for stages in record.stages) / len(clip) for stage in STAGES)
+        print(named(clip, codec) + "".join(f"{part:9.3f}" for part in parts))
 
 
 if __name__ == "__main__":

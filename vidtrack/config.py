@@ -20,7 +20,7 @@ from vidtrack.errors import ConfigError
 
 
 class _Group(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
 
 
 class SourceSettings(_Group):
@@ -157,6 +157,14 @@ class TrackerSettings(_Group):
     box_s: float = Field(0.2, gt=0)
     """s; time constant with which a track's box follows the blobs' boxes"""
 
+    @field_validator("confirm_window")
+    @classmethod
+    def _holds_the_hits(cls, window: int, given: ValidationInfo) -> int:
+        hits = given.data.get("confirm_hits", 1)
+        if window < hits:
+            raise ValueError(f"must not be less than tracker.confirm_hits = {hits}")
+        return window
+
 
 class OutputSettings(_Group):
     lines: tuple[str, ...] = ()
@@ -286,6 +294,9 @@ def _range(info: FieldInfo) -> str:
         return f" [{', '.join(choices)}]"
     signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
     bounds = [
-        f"{sign} {getattr(rule, name):g}" for rule in info.metadata for name, sign in signs.items() if hasattr(rule, name)
+        f"{sign} {getattr(rule, name):g}"
+        for rule in info.metadata
+        for name, sign in signs.items()
+        if hasattr(rule, name)
     ]
     return f" [{', '.join(bounds)}]" if bounds else ""

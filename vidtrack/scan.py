@@ -82,6 +82,11 @@ class Scan:
             value = np.ascontiguousarray(value, dtype=kind)
             if value.shape != shape:
                 raise ScanError(f"{name} must be {shape} to match z, not {value.shape}")
+            if not np.isfinite(value).all():
+                i = int(np.argwhere(~np.isfinite(value))[0, 0])
+                raise ScanError(
+                    f"{name} of measurement {i} is not finite: {value[i]}; leave {name} out where it is unknown"
+                )
             object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
@@ -107,7 +112,9 @@ def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
         positive = smallest > 1e-14 * scale
     if not positive.all():
         i = int(np.argmin(positive))
-        raise ScanError(f"R of measurement {i} is not positive definite: {R[i].tolist()}; give it a variance above zero")
+        raise ScanError(
+            f"R of measurement {i} is not positive definite: {R[i].tolist()}; give it a variance above zero"
+        )
 
 
 @dataclass(frozen=True, slots=True)

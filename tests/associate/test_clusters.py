@@ -10,7 +10,10 @@ from vidtrack.associate.clusters import clusters
 
 
 @given(
-    seed=st.integers(0, 2**32 - 1), rows=st.integers(0, 30), count=st.integers(1, 30), density=st.sampled_from([0.0, 0.05, 0.3])
+    seed=st.integers(0, 2**32 - 1),
+    rows=st.integers(0, 30),
+    count=st.integers(1, 30),
+    density=st.sampled_from([0.0, 0.05, 0.3]),
 )
 @settings(max_examples=200, deadline=None)
 def test_clusters_are_connected_components(seed, rows, count, density):

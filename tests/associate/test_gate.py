@@ -65,7 +65,13 @@ def test_gate_admits_what_brute_force_admits(seed, rows, count, dim, runs, dista
     rng = np.random.default_rng(seed)
     zhat, z = spread * rng.normal(size=(rows, dim)), spread * rng.normal(size=(count, dim))
     scan = Scan(0.0, z, covariances(rng, count, dim, 2.0), run=rng.integers(0, runs, count))
-    check(zhat, covariances(rng, rows, dim, 3.0), scan, Gate(probability, distance, radius=9.0), rng.integers(0, runs, rows))
+    check(
+        zhat,
+        covariances(rng, rows, dim, 3.0),
+        scan,
+        Gate(probability, distance, radius=9.0),
+        rng.integers(0, runs, rows),
+    )
 
 
 @pytest.mark.parametrize("distance", DISTANCES)
@@ -77,7 +83,9 @@ def test_order_of_the_measurements_does_not_matter(distance):
     plain = check(zhat, cov, Scan(0.0, z, R), Gate(distance=distance))
     other = check(zhat, cov, Scan(0.0, z[shuffled], R[shuffled]), Gate(distance=distance))
     assert len(plain)
-    assert set(zip(plain.row, plain.measurement, strict=True)) == set(zip(other.row, shuffled[other.measurement], strict=True))
+    assert set(zip(plain.row, plain.measurement, strict=True)) == set(
+        zip(other.row, shuffled[other.measurement], strict=True)
+    )
 
 
 @pytest.mark.parametrize("distance", ["mahalanobis", "decoupled"])
@@ -93,9 +101,9 @@ def test_gate_of_zero_admits_nothing_and_gate_of_one_everything(distance):
 def test_share_of_true_measurements_inside_is_the_gate_probability():
     rng = np.random.default_rng(8)
     S = covariances(rng, 1, 2, 3.0)
-    z = rng.multivariate_normal([5.0, -4.0], S[0], 20_000)
-    pairs = Gate(0.95).pairs(np.array([[5.0, -4.0]]), S - 0.5 * np.linalg.eigvalsh(S).min() * np.eye(2), Scan(
-        0.0, z, 0.5 * np.linalg.eigvalsh(S).min() * np.eye(2)))  # fmt: skip
+    R = 0.5 * np.linalg.eigvalsh(S[0]).min() * np.eye(2)
+    scan = Scan(0.0, rng.multivariate_normal([5.0, -4.0], S[0], 20_000), R)
+    pairs = Gate(0.95).pairs(np.array([[5.0, -4.0]]), S - R, scan)
     assert len(pairs) / 20_000 == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / 20_000))
 
 

@@ -71,7 +71,11 @@ def test_predicted_measurement_is_the_projected_state():
     np.testing.assert_allclose(cov, bank.P[:, [0, 2]][:, :, [0, 2]], rtol=1e-15)
 
 
-@given(seed=st.integers(0, 2**32 - 1), weights=st.lists(st.floats(0.05, 1.0), min_size=1, max_size=4), miss=st.floats(0.0, 1.0))
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    weights=st.lists(st.floats(0.05, 1.0), min_size=1, max_size=4),
+    miss=st.floats(0.0, 1.0),
+)
 @settings(max_examples=100, deadline=None)
 def test_soft_weights_give_the_moments_of_the_mixture(seed, weights, miss):
     rng = np.random.default_rng(seed)
@@ -109,8 +113,12 @@ def test_successors_come_from_their_parents():
     bank, single = filled_bank(rng, 2, 2), filled_bank(np.random.default_rng(4), 2, 2)
     scan = Scan(0.0, np.ones((1, 2)), np.eye(2))
     x, P = bank.x.copy(), bank.P.copy()
-    bank.update(Decision(np.array([1, 1]), np.array([0]), np.array([0]), np.ones(1), np.array([0.0, 1.0])), scan, POSITION)
-    single.update(Decision(np.arange(2), np.array([1]), np.array([0]), np.ones(1), np.array([1.0, 0.0])), scan, POSITION)
+    bank.update(
+        Decision(np.array([1, 1]), np.array([0]), np.array([0]), np.ones(1), np.array([0.0, 1.0])), scan, POSITION
+    )
+    single.update(
+        Decision(np.arange(2), np.array([1]), np.array([0]), np.ones(1), np.array([1.0, 0.0])), scan, POSITION
+    )
     np.testing.assert_allclose(bank.x, [single.x[1], x[1]])
     np.testing.assert_allclose(bank.P, [single.P[1], P[1]])
 
@@ -161,7 +169,9 @@ def test_a_million_updates_stay_positive_definite():
         assert (np.linalg.eigvalsh(P) > 0).all()
 
 
-@given(st.lists(st.sampled_from([0.0, 1e-9, 1e-3, 0.04, 1.0, 60.0, 3600.0]), min_size=1, max_size=30), st.integers(0, 1000))
+@given(
+    st.lists(st.sampled_from([0.0, 1e-9, 1e-3, 0.04, 1.0, 60.0, 3600.0]), min_size=1, max_size=30), st.integers(0, 1000)
+)
 @settings(max_examples=60, deadline=None)
 def test_any_time_steps_keep_the_covariances(steps, seed):
     rng = np.random.default_rng(seed)

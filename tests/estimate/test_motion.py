@@ -75,7 +75,7 @@ def follow(model, velocity, updates, sigma=0.1):
 
 def stretched(bank):
     """Whether the bank's next prediction trusts the heading."""
-    x, P = bank.ahead(0.1)
+    _, P = bank.ahead(0.1)
     F = bank.model.transition(0.1)
     Q = P[0] - F @ bank.P[0] @ F.T
     return Q[1, 1] > 1.5 * Q[3, 3]
@@ -105,7 +105,9 @@ def test_second_measurement_gives_the_two_point_estimate():
     np.testing.assert_allclose(bank.P[0], [[4.0, 8.0], [8.0, 32.0]], rtol=1e-6)
 
 
-@pytest.mark.parametrize("bad", [{"dim": 4}, {"accel": 0.0}, {"accel": np.nan}, {"cross": -1.0}, {"speed": np.inf}, {"hold_s": 0.0}])
+@pytest.mark.parametrize(
+    "bad", [{"dim": 4}, {"accel": 0.0}, {"accel": np.nan}, {"cross": -1.0}, {"speed": np.inf}, {"hold_s": 0.0}]
+)
 def test_a_model_that_makes_no_sense_is_refused(bad):
     name, value = next(iter(bad.items()))
     with pytest.raises(ConfigError, match=f"{name} is {value}"):

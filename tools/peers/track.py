@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import datetime
 import sys
-from itertools import count
+from collections.abc import Callable
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -54,7 +54,7 @@ class Roboflow:
         return self.tracker.update(detections)
 
     def assigned(self, frame: int, result: Any) -> Assigned:
-        pairs = zip(result.data["index"], result.tracker_id)
+        pairs = zip(result.data["index"], result.tracker_id, strict=True)
         return [(int(j), int(identity)) for j, identity in pairs if identity >= 0]
 
 
@@ -89,7 +89,7 @@ class Motpy:
         from motpy.tracker import IOUAndFeatureMatchingFunction
 
         class Listening(IOUAndFeatureMatchingFunction):
-            matched: Assigned
+            matched: list[tuple[int, str]]
 
             def __call__(self, trackers: Any, detections: Any) -> Any:
                 pairs = super().__call__(trackers, detections)
@@ -189,19 +189,20 @@ class StoneSoup:
         return next(self.steps)[1]
 
     def assigned(self, frame: int, result: Any) -> Assigned:
-        updated = [track for track in result if isinstance(track.states[-1], self.update)]
+        last = ((track.states[-1], track.id) for track in result)
         return [
-            (track.states[-1].hypothesis.measurement.metadata["index"], self.number.setdefault(track.id, len(self.number)))
-            for track in updated
+            (state.hypothesis.measurement.metadata["index"], self.number.setdefault(name, len(self.number)))
+            for state, name in last
+            if isinstance(state, self.update)
         ]
 
 
-PEERS = {
+PEERS: dict[str, Callable[[float], Peer]] = {
     "sort": lambda fps: Roboflow("SORTTracker", fps),
     "bytetrack": lambda fps: Roboflow("ByteTrackTracker", fps),
-    "motpy": Motpy,
+    "motpy": lambda fps: Motpy(fps),
     "similari": lambda fps: Similari(),
-    "stonesoup": StoneSoup,
+    "stonesoup": lambda fps: StoneSoup(fps),
     "norfair-iou": lambda fps: Norfair("iou", 1 - MIN_IOU),
     "norfair-euclidean": lambda fps: Norfair("euclidean", 30.0),
 }
@@ -211,11 +212,11 @@ def main(name: str, data: str, result: str) -> None:
     """Run the peer over all frames and store what it did."""
     stored = np.load(data)
     frames = np.split(stored["box"], stored["start"][1:-1])
-    peer: Peer = PEERS[name](float(stored["fps"]))
+    peer = PEERS[name](float(stored["fps"]))
     detections = [peer.prepare(frame, box) for frame, box in enumerate(frames)]
     seconds = np.empty(len(frames))
     rows: list[tuple[int, int, int]] = []
-    for frame, prepared in zip(count(), detections):
+    for frame, prepared in enumerate(detections):
         begin = perf_counter()
         found = peer.step(prepared)
         seconds[frame] = perf_counter() - begin

@@ -69,9 +69,6 @@ def main() -> None:
         code = _complain("interrupted", 130)
     except Terminated:
         code = _complain("terminated", 143)
-    except BrokenPipeError:  # the reader of our output has seen enough
-        sys.stderr.close()
-        code = 0
     sys.exit(code)
 
 

@@ -36,7 +36,7 @@ class Groups:
     cover: float = 0.5
     edge: float = 0.1
     gate: float = 3.0
-    growth: float = 1.6
+    growth: float = 2.5
 
     def __post_init__(self) -> None:
         if not 0 < self.cover <= 1:
@@ -71,18 +71,21 @@ class Groups:
         area = np.bincount(shared[on], predicted[on, 2:].prod(axis=1), minlength=len(blobs))
         return area >= 0.5 * blobs[:, 2:].prod(axis=1)
 
-    def measure(self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats) -> tuple[Floats, Floats, Ints]:
+    def measure(
+        self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray
+    ) -> tuple[Floats, Floats, Ints]:
         """Position (G, 2), variances (G, 2) and count of own edges (G,) for tracks on blobs.
 
         predicted (G, 4) boxes, box (G, 4) relative to the position, var (G, 2) predicted position variances,
-        blob (G,) index of each track's blob.
+        blob (G,) index of each track's blob, blobs (M, 4), cut (M, 4) sides of blobs that are the picture's
+        border and no edge of a vehicle.
         """
-        return _from_edges(predicted, box, var, blob, blobs, self.edge, self.gate)
+        return _from_edges(predicted, box, var, blob, blobs, cut, self.edge, self.gate)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _from_edges(
-    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, edge: float, gate: float
+    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, edge: float, gate: float
 ) -> tuple[Floats, Floats, Ints]:
     """Each member's position from the four edges of its blob.
 
@@ -97,6 +100,8 @@ def _from_edges(
             weight, total = 0.0, 0.0
             noise = (edge * predicted[i, 2 + axis]) ** 2 + 1.0
             for far in range(2):  # near: left or top, far: right or bottom
+                if cut[blob[i], axis + 2 * far]:
+                    continue
                 sign = 1.0 - 2.0 * far
                 mine = predicted[i, axis] + far * predicted[i, 2 + axis]
                 extreme, rival = mine, np.inf

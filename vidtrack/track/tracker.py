@@ -23,8 +23,9 @@ SLOW = 5.0
 """A box follows a blob of another size this many times more slowly."""
 ADULT = 5
 """Updates after which a track's box is believed."""
-FRAGMENT = 0.6
-"""A leftover blob starts no track where a vehicle already tracked covers this share of it."""
+FRAGMENT, NEAR, SMALL = 0.6, 0.25, 0.6
+"""A leftover blob starts no track where a tracked vehicle, widened by NEAR of its longer side, covers FRAGMENT of
+it, if the blob is smaller than SMALL of the vehicle: it is a piece of it, or of its shadow."""
 
 
 class Tracker:
@@ -191,15 +192,32 @@ class Tracker:
             box = self.register.box[rows]
             predicted = absolute(box, self.bank.x[rows][:, position])
             var = np.diagonal(self.bank.P[rows], axis1=1, axis2=2)[:, position]
-            z, R, own = self.groups.measure(predicted, box, var, shared[rows], absolute(scan.box, scan.z))
+            blobs = absolute(scan.box, scan.z)
+            z, R, own = self.groups.measure(predicted, box, var, shared[rows], blobs, self._at_border(blobs))
             beta0 = np.ones(len(shared))
             beta0[rows] = 0.0
             edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
             self.bank.update(edges, Scan(scan.t, z, R[:, :, None] * np.eye(2)), POSITION)
             self.register.history[rows[own > 0]] |= 1
             self.register.updated_s[rows[own > 0]] = scan.t
+            before = predicted - np.pad(dt * self.bank.x[rows][:, self.model.velocity], ((0, 0), (0, 2)))
+            self._enter(rows, before, blobs[shared[rows]])
             self._reshape(rows, shared, scan, dt)
         self._regroup(shared, scan.t, events)
+
+    def _enter(self, rows: Ints, before: Floats, blobs: Floats) -> None:
+        """A vehicle that was cut by the border, and whose blob still is, reaches to the border: the rest comes in.
+
+        rows (G,), before (G, 4) their boxes a scan ago, blobs (G, 4) theirs now.
+        """
+        both = self._at_border(before) & self._at_border(blobs)
+        if not both.any():
+            return
+        box = absolute(self.register.box[rows], self.bank.x[rows][:, self.model.position])
+        far = box[:, :2] + box[:, 2:]
+        near = np.where(both[:, :2], np.minimum(box[:, :2], 0.0), box[:, :2])
+        far = np.where(both[:, 2:], np.maximum(far, self.bounds), far)
+        self.register.box[rows] = np.hstack([near - self.bank.x[rows][:, self.model.position], far - near])
 
     def _reshape(self, rows: Ints, shared: Ints, scan: Scan, dt: float) -> None:
         """The box of a track alone on its blob follows it slowly: if the blob stays as it is, the vehicle is so."""
@@ -274,23 +292,34 @@ class Tracker:
         out = (xy < 0) | (xy > self.bounds) | ((near < BORDER) & (v < 0)) | ((far > np.subtract(self.bounds, BORDER)) & (v > 0))
         return out[:, 0] | out[:, 1]
 
+    def _pieces(self, blobs: Floats) -> np.ndarray:
+        """(M,) blobs that are pieces of a vehicle already tracked."""
+        known = self.register.status != Status.TENTATIVE
+        tracked = absolute(self.register.box, self.bank.x[:, self.model.position])[known]
+        margin = NEAR * _longer(tracked)[:, None]
+        vehicle, share = best_cover(blobs, tracked + margin * [-1, -1, 2, 2])
+        piece = (vehicle >= 0) & (share >= FRAGMENT)
+        piece[piece] = _area(blobs[piece]) < SMALL * _area(tracked[vehicle[piece]])
+        return piece
+
     def _cut(self, box: Floats) -> np.ndarray:
         """(N,) boxes that the picture's border cuts: their extent changes faster than any vehicle's."""
+        return self._at_border(box).any(axis=1)
+
+    def _at_border(self, box: Floats) -> np.ndarray:
+        """(N, 4) which sides (left, top, right, bottom) of boxes lie on the picture's border."""
         if self.bounds is None:
-            return np.zeros(len(box), bool)
+            return np.zeros((len(box), 4), bool)
         left, top, width, height = box.T
         right, bottom = self.bounds[0] - BORDER, self.bounds[1] - BORDER
-        return (left < BORDER) | (top < BORDER) | (left + width > right) | (top + height > bottom)
+        return np.column_stack([left < BORDER, top < BORDER, left + width > right, top + height > bottom])
 
     def _register(self, scan: Scan, sensor: Sensor, decision: Decision, shared: Ints, events: list[Event]) -> Ints:
         """Start tentative tracks from measurements that belong to nobody; returns their indices."""
         free = self._free.copy()
         free[decision.measurement] = False
         if scan.box is not None and self.groups is not None and free.any():
-            known = self.register.status != Status.TENTATIVE
-            tracked = absolute(self.register.box, self.bank.x[:, self.model.position])[known]
-            _, share = best_cover(absolute(scan.box[free], scan.z[free]), tracked)
-            free[free] = share < FRAGMENT
+            free[free] = ~self._pieces(absolute(scan.box[free], scan.z[free]))
         born = np.flatnonzero(free) if self.births else np.empty(0, np.int64)
         box = np.full((len(born), 4), np.nan) if scan.box is None else scan.box[born]
         scale = _longer(box) if self.model.per_size and scan.box is not None else np.ones(len(born))
@@ -335,6 +364,10 @@ class Tracker:
 def _longer(box: Floats) -> Floats:
     """(N,) longer sides of boxes (N, 4)."""
     return np.maximum(box[:, 2], box[:, 3])
+
+
+def _area(box: Floats) -> Floats:
+    return box[:, 2] * box[:, 3]
 
 
 def _heaviest(decision: Decision) -> Ints:

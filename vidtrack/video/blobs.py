@@ -44,7 +44,9 @@ class Blobs:
         """The blobs as measurements: z the centroids, boxes relative to them.
 
         R = (jitter_px step)^2 I + jitter_share^2 cov: the border is uncertain by a part of a processed pixel, and
-        what is missed or added at an end moves the centroid along the extent.
+        what is missed or added at an end moves the centroid along the extent. From frame to frame centroids of
+        vehicles jitter by 0.1 to 0.25 px at 240 to 360 rows; the defaults are above that, because shadow and parts
+        that look like the road come and go slowly.
         """
         base = (self.settings.jitter_px * self.step) ** 2
         R = base * np.eye(2) + self.settings.jitter_share**2 * self.cov
@@ -135,7 +137,7 @@ def _enlarged(box: Floats) -> Floats:
 @numba.njit(cache=True, nogil=True)
 def _measure(mask, strength):  # type: ignore[no-untyped-def]
     """Of each component, in mask pixels: count (B,), mean x, y (B, 2), covariance (B, 2, 2), box, mean strength."""
-    row, start, stop = find_runs(mask)
+    row, start, stop = find_runs(mask, False)
     label, blobs = connect(row, start, stop, 1)
     n = np.zeros(blobs)
     first = np.zeros((blobs, 2))

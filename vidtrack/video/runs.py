@@ -7,10 +7,10 @@ import numpy as np
 
 
 @numba.njit(cache=True, nogil=True)
-def find_runs(mask, background=False):  # type: ignore[no-untyped-def]
-    """Maximal horizontal runs of pixels that are not 0, or of the 0 pixels: row, start, stop in raster order.
+def find_runs(mask, background):  # type: ignore[no-untyped-def]
+    """Maximal horizontal runs of pixels that are not 0, or for `background` those that are: row, start, stop.
 
-    mask (h, w) uint8; each (N,) int32, stop excluded.
+    mask (h, w) uint8; each (N,) int32 in raster order, stop excluded.
     """
     h, w = mask.shape
     pixels, words = mask.ravel(), eights(mask)
@@ -59,7 +59,8 @@ def next_zero(pixels, x, end):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _grown(values, used, room):  # type: ignore[no-untyped-def]
     bigger = np.empty(room, values.dtype)
-    bigger[:used] = values[:used]
+    for i in range(used):
+        bigger[i] = values[i]
     return bigger
 
 

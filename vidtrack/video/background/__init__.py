@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from numpy.typing import NDArray
+
 from vidtrack.config import DetectorSettings
 from vidtrack.video.background.disturbance import Disturbance
 from vidtrack.video.background.opencv import OpenCV
 from vidtrack.video.background.paper import Paper
+from vidtrack.video.background.picture import View
 from vidtrack.video.foreground import Background
-from vidtrack.video.frame import Image
 
 
-def create(settings: DetectorSettings, scale: float | None = None, keep: Image | None = None) -> Background:
+def create(settings: DetectorSettings, scale: float | None = None, keep: NDArray | None = None) -> Background:
     """The detector `settings.kind`.
 
     scale: processed over source size, None by the picture's size; keep (h, w) of any size: there is no foreground
-    where this picture is black.
+    where this picture is dark.
     """
+    view = View(scale, keep)
     if settings.kind == "paper":
-        return Paper(settings.paper, scale, keep)
+        return Paper(settings.paper, view)
     if settings.kind == "disturbance":
-        return Disturbance(settings.disturbance, scale, keep)
-    return OpenCV(settings.kind, scale, keep)
+        return Disturbance(settings.disturbance, view)
+    return OpenCV(settings.kind, view)

@@ -5,9 +5,26 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-_POINTS = 1500  # wanted on the grid; the median of as many ratios is good to about a tenth of a per cent
+_POINTS = 1500  # wanted on the grid
 _DARK, _BRIGHT = np.float32(24), np.float32(235)  # grey levels between which a ratio means something
 _CLIPPED = np.float32(250)
+_STEP = np.float32(0.02)  # a smaller change is left to learning
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def follow_gain(picture, scene, black):  # type: ignore[no-untyped-def]
+    """Multiply the scene's luminance by the camera's gain against it, if that is more than learning follows."""
+    g = gain(picture.luma, scene, black)
+    if abs(g - np.float32(1)) > _STEP:
+        for plane in (scene.luma, scene.former):
+            for y in range(len(plane)):
+                _amplify(plane[y], g, black)
+
+
+@numba.njit(cache=True, nogil=True)
+def _amplify(row, g, black):  # type: ignore[no-untyped-def]
+    for x in range(len(row)):
+        row[x] = min(black + g * (row[x] - black), np.float32(255))
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

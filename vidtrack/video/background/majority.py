@@ -25,8 +25,8 @@ def majority(hit, window, mask):  # type: ignore[no-untyped-def]
             _add(hit[y + reach], inside)
         if y - reach - 1 >= 0:
             _subtract(hit[y - reach - 1], inside)
-        total[:] = column[:w]
-        for shift in range(1, window):
+        total[:] = 0
+        for shift in range(window):
             _accumulate(column[shift : shift + w], total)
         _more_than(total, need, mask[y])
 

@@ -7,9 +7,8 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from vidtrack.errors import Error
 from vidtrack.scan import Floats
-from vidtrack.video.background.picture import kept, reduce, reduction
+from vidtrack.video.background.picture import View
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -20,33 +19,25 @@ _SHADOW = 127  # OpenCV's mark
 class OpenCV:
     """MOG2 or KNN with OpenCV's defaults on the reduced picture; shadow is not foreground; 7x7 median."""
 
-    def __init__(self, kind: Literal["mog2", "knn"], scale: float | None = None, keep: Image | None = None) -> None:
-        """scale: processed over source size; keep (any size): there is no foreground where it is black."""
+    def __init__(self, kind: Literal["mog2", "knn"], view: View) -> None:
         create = cv2.createBackgroundSubtractorMOG2 if kind == "mog2" else cv2.createBackgroundSubtractorKNN
         self._model = create(detectShadows=True)
-        self._scale = scale
-        self._keep_image = keep
-        self._shape: tuple[int, int] | None = None
+        self._view = view
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; strength is 1 on it, as OpenCV gives none; `known` boxes change nothing here."""
-        step = reduction(frame.shape[0], self._scale)
-        luma, cb, cr = reduce(frame, step)
-        colours = (cb, cr) if cb.size else (None, None)
-        picture = Frame(frame.index, frame.time_s, luma, *colours, frame.full_range).bgr()
-        if self._shape is None:
-            self._shape = frame.shape
-            self._keep = kept(self._keep_image, luma.shape)
-        found = self._model.apply(picture)
+        y, u, v = self._view.reduce(frame)
+        coloured = frame.u is not None
+        picture = Frame(
+            frame.index, frame.time_s, y, u if coloured else None, v if coloured else None, frame.full_range
+        )
+        found = self._model.apply(picture.bgr())
         mask = cv2.medianBlur(np.where(found > _SHADOW, np.uint8(255), np.uint8(0)), _WINDOW)
-        if self._keep is not None:
-            mask &= self._keep
-        return Foreground(mask, (mask > 0).astype(np.float32), step)
+        return self._view.foreground(np.asarray(mask, np.uint8), (mask > 0).astype(np.float32))
 
     def scene(self) -> Image:
         """(H, W, 3) the model's background in source size, blue-green-red."""
-        if self._shape is None:
-            raise Error("there is no scene before the first frame; call apply first")
+        h, w = self._view.shape
         return np.asarray(
-            cv2.resize(self._model.getBackgroundImage(), self._shape[::-1], interpolation=cv2.INTER_LINEAR)
+            cv2.resize(self._model.getBackgroundImage(), (w, h), interpolation=cv2.INTER_LINEAR), np.uint8
         )

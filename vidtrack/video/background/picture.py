@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.errors import Error
+from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
 FULL_SIZE_ROWS = 580  # taller pictures are reduced to at most this many rows
-VIDEO_BLACK = 16  # luminance of black where it does not span the full range
+_VIDEO_BLACK = 16  # luminance of black where it does not span the full range
 
 
 class Picture(NamedTuple):
@@ -22,8 +24,56 @@ class Picture(NamedTuple):
     cb: NDArray
     cr: NDArray
 
+    def grey(self) -> Picture:
+        """The luminance alone."""
+        return Picture(self.luma, self.cb[:0], self.cr[:0])
 
-NO_CHROMA: Image = np.zeros((0, 0), np.uint8)
+
+class View:
+    """How a detector sees a source; the first frame decides.
+
+    step   source pixels per processed pixel
+    black  luminance of black
+    """
+
+    def __init__(self, scale: float | None, keep: NDArray | None) -> None:
+        """scale: processed over source size, None by the rows; keep (any size): no foreground where it is dark."""
+        self._scale = scale
+        self._keep = keep
+        self._shape: tuple[int, int] | None = None
+        self.step = 1
+        self.black = 0
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W) of the source. Raises Error before the first frame."""
+        if self._shape is None:
+            raise Error("there is no scene before the first frame; call apply first")
+        return self._shape
+
+    def reduce(self, frame: Frame) -> Picture:
+        """The frame's planes as area averages of step x step pixels."""
+        if self._shape is None:
+            self._shape = frame.shape
+            self.step = reduction(frame.shape[0], self._scale)
+            self.black = 0 if frame.full_range else _VIDEO_BLACK
+        return reduce(frame, self.step)
+
+    def foreground(self, mask: Image, strength: NDArray) -> Foreground:
+        """The mask (h, w), 0 and 255, without what is not to be looked at."""
+        if self._keep is not None:
+            h, w = mask.shape
+            keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)
+            mask = np.where(keep > 127, mask, np.uint8(0))
+        return Foreground(mask, strength, self.step)
+
+    def enlarge(self, picture: Picture) -> Image:
+        """(H, W, 3) the picture in blue, green, red at source size. Raises Error before the first frame."""
+        h, w = self.shape
+        half = ((h + 1) // 2, (w + 1) // 2)
+        y = _enlarge(picture.luma, (h, w), self.step)
+        u, v = (_enlarge(plane, half, self.step) if plane.size else None for plane in (picture.cb, picture.cr))
+        return Frame(0, 0.0, y, u, v, full_range=self.black == 0).bgr()
 
 
 def reduction(rows: int, scale: float | None) -> int:
@@ -39,45 +89,29 @@ def reduce(frame: Frame, step: int) -> Picture:
     Rows and columns that do not fill a window at the lower and right edge are left out; h and w are then even,
     so that chroma still covers the picture.
     """
-    chroma = [NO_CHROMA if plane is None else plane for plane in (frame.u, frame.v)]
+    cb, cr = (np.empty((0, 0), np.uint8) if plane is None else plane for plane in (frame.u, frame.v))
     if step == 1:
-        return Picture(frame.y, *chroma)
+        return Picture(frame.y, cb, cr)
     h, w = (2 * max(1, size // (2 * step)) for size in frame.shape)
-    cb, cr = (_area_average(plane, h // 2, w // 2, step) if plane.size else plane for plane in chroma)
-    return Picture(_area_average(frame.y, h, w, step), cb, cr)
+    half = (h // 2, w // 2)
+    cb, cr = (_area_average(plane, half, step) if plane.size else plane for plane in (cb, cr))
+    return Picture(_area_average(frame.y, (h, w), step), cb, cr)
 
 
 def smooth(picture: Picture) -> Picture:
-    """Each plane weighted 1-2-1 in both directions: sensor noise halves, edges stay."""
+    """Each plane weighted 1-2-1 in both directions, against sensor noise."""
     return Picture(*(cv2.GaussianBlur(plane, (3, 3), 0) if plane.size else plane for plane in picture))
 
 
-def kept(keep: Image | None, shape: tuple[int, ...]) -> Image | None:
-    """255 where the picture `keep` (any size) is bright, else 0, at `shape` (h, w)."""
-    if keep is None:
-        return None
-    resized = cv2.resize(keep, (shape[1], shape[0]), interpolation=cv2.INTER_NEAREST)
-    return np.where(resized > 127, np.uint8(255), np.uint8(0))
-
-
-def to_bgr(picture: Picture, shape: tuple[int, int], step: int, full_range: bool) -> Image:
-    """The picture in blue, green, red, enlarged to the source size `shape` (H, W)."""
-    half = ((shape[0] + 1) // 2, (shape[1] + 1) // 2)
-    y, u, v = (
-        _enlarge(plane, size, step) if plane.size else None
-        for plane, size in zip(picture, (shape, half, half), strict=True)
-    )
-    assert y is not None
-    return Frame(0, 0.0, y, u, v, full_range).bgr()
+def _area_average(plane: Image, shape: tuple[int, int], step: int) -> NDArray:
+    h, w = shape
+    return cv2.resize(plane[: h * step, : w * step], (w, h), interpolation=cv2.INTER_AREA)
 
 
 def _enlarge(plane: NDArray, shape: tuple[int, int], step: int) -> Image:
     """Bilinear enlargement by step; what the reduction left out repeats the last row and column."""
     h, w = plane.shape[0] * step, plane.shape[1] * step
     grown = cv2.resize(plane.astype(np.float32), (w, h), interpolation=cv2.INTER_LINEAR)
-    grown = cv2.copyMakeBorder(grown, 0, shape[0] - h, 0, shape[1] - w, cv2.BORDER_REPLICATE)
+    missing = max(0, shape[0] - h), max(0, shape[1] - w)
+    grown = cv2.copyMakeBorder(grown, 0, missing[0], 0, missing[1], cv2.BORDER_REPLICATE)[: shape[0], : shape[1]]
     return np.clip(np.rint(grown), 0, 255).astype(np.uint8)
-
-
-def _area_average(plane: Image, h: int, w: int, step: int) -> Image:
-    return np.asarray(cv2.resize(plane[: h * step, : w * step], (w, h), interpolation=cv2.INTER_AREA))

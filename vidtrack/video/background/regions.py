@@ -8,6 +8,9 @@ import numpy as np
 from vidtrack.video.runs import connect, find_runs
 
 _REACH = 3  # px to either side of a border over which contrast is taken
+_ALIKE = np.float32(6)  # grey levels within which a pixel is as it was before; wider, dark vehicles pass for it
+_RETURNED = 0.6  # share of a blob's pixels that are as they were before
+_MARGIN = np.float32(1.3)  # against healing what is really there: a dark vehicle on a road with marks
 
 
 @numba.njit(cache=True, nogil=True)
@@ -35,27 +38,35 @@ def fill_holes(mask):  # type: ignore[no-untyped-def]
 def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
     """Runs (row, start, stop) of the blobs that are in the scene and no longer in the picture.
 
-    The border of a blob has its edge where the object is. A ghost has more contrast (luminance differences over
-    +-3 px, across and down) along its border in the scene than in the frame, and the border has been covered for
-    settled_s on average.
+    Either the road is seen again as it was before the scene took over what stood on it. Or the edge of the object
+    that made the blob is in the scene: along its border the scene has clearly more contrast (luminance differences
+    over +-3 px, across and down) than the frame, and it has been covered for settled_s on average.
     """
     h, w = mask.shape
-    row, start, stop = find_runs(mask)
+    row, start, stop = find_runs(mask, False)
     label, count = connect(row, start, stop, 1)
+    area = np.zeros(count, np.int64)
+    returned = np.zeros(count, np.int64)
     excess = np.zeros(count, np.float32)  # contrast of the scene above that of the frame
     lack = np.zeros(count, np.float32)  # seconds of cover below settled_s
     for k in range(len(row)):
         y, blob = row[k], label[k]
+        area[blob] += stop[k] - start[k]
+        for x in range(start[k], stop[k]):
+            returned[blob] += abs(np.float32(luma[y, x]) - scene.former[y, x]) < _ALIKE
         if y < _REACH or y >= h - _REACH:
             continue
         for x in range(max(start[k], _REACH), min(stop[k], w - _REACH)):
             if start[k] < x < stop[k] - 1 and mask[y - 1, x] > 0 and mask[y + 1, x] > 0:
                 continue
-            excess[blob] += abs(scene.luma[y, x + _REACH] - scene.luma[y, x - _REACH])
-            excess[blob] += abs(scene.luma[y + _REACH, x] - scene.luma[y - _REACH, x])
-            excess[blob] -= abs(np.float32(luma[y, x + _REACH]) - np.float32(luma[y, x - _REACH]))
-            excess[blob] -= abs(np.float32(luma[y + _REACH, x]) - np.float32(luma[y - _REACH, x]))
+            excess[blob] += _contrast(scene.luma, y, x) - _MARGIN * _contrast(luma, y, x)
             lack[blob] += settled_s - scene.covered_s[y, x]
-    ghost = (excess > 0) & (lack <= 0)
+    ghost = (returned > _RETURNED * area) | ((excess > 0) & (lack <= 0))
     chosen = ghost[label]
     return row[chosen], start[chosen], stop[chosen]
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _contrast(luma, y, x):  # type: ignore[no-untyped-def]
+    across = abs(np.float32(luma[y, x + _REACH]) - np.float32(luma[y, x - _REACH]))
+    return across + abs(np.float32(luma[y + _REACH, x]) - np.float32(luma[y - _REACH, x]))

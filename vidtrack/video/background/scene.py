@@ -9,26 +9,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.shadow import SHADOW
 
 FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
+NEVER = np.float32(-1000)  # like no luminance
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
 _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
 
 
 class Scene(NamedTuple):
-    """Running averages, float32: luma, noise (h, w); cb, cr at half size; seconds each pixel has been covered."""
+    """What is remembered of each pixel, float32 (h, w), chroma at half size.
+
+    luma, cb, cr  running averages
+    noise         running average of |Y - luma|
+    covered_s     seconds since it was last seen free
+    former        luma before the picture was adopted last, NEVER if it was not
+    """
 
     luma: NDArray[np.float32]
     cb: NDArray[np.float32]
     cr: NDArray[np.float32]
     noise: NDArray[np.float32]
     covered_s: NDArray[np.float32]
+    former: NDArray[np.float32]
 
 
 def start(picture: Picture) -> Scene:
     """The first frame is the scene: averaging for seconds would smear the traffic into it."""
     luma, cb, cr = (plane.astype(np.float32) for plane in picture)
-    return Scene(luma, cb, cr, np.full(luma.shape, FRESH_NOISE), np.zeros(luma.shape, np.float32))
+    shape = luma.shape
+    return Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), np.zeros(shape, np.float32), np.full(shape, NEVER))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -53,16 +63,31 @@ def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no
 @numba.njit(cache=True, nogil=True)
 def adopt(picture, scene, row, start, stop):  # type: ignore[no-untyped-def]
     """Take the picture for the scene on the runs (row, start, stop), as if it had just begun there."""
-    coloured = len(picture.cb) > 0
     for k in range(len(row)):
-        y = row[k]
         for x in range(start[k], stop[k]):
-            scene.luma[y, x] = picture.luma[y, x]
-            scene.noise[y, x] = FRESH_NOISE
-            scene.covered_s[y, x] = np.float32(0)
-            if coloured:
-                scene.cb[y // 2, x // 2] = picture.cb[y // 2, x // 2]
-                scene.cr[y // 2, x // 2] = picture.cr[y // 2, x // 2]
+            _adopt(picture, scene, row[k], x)
+
+
+@numba.njit(cache=True, nogil=True)
+def absorb(picture, scene, hit, absorb_s, shadow_s):  # type: ignore[no-untyped-def]
+    """Take the picture for the scene where it was covered for absorb_s, or is shadow and was covered for shadow_s."""
+    h, w = hit.shape
+    for y in range(h):
+        for x in range(w):
+            covered_s = scene.covered_s[y, x]
+            if covered_s >= absorb_s or (covered_s >= shadow_s and hit[y, x] == SHADOW):
+                _adopt(picture, scene, y, x)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _adopt(picture, scene, y, x):  # type: ignore[no-untyped-def]
+    scene.former[y, x] = scene.luma[y, x]
+    scene.luma[y, x] = picture.luma[y, x]
+    scene.noise[y, x] = FRESH_NOISE
+    scene.covered_s[y, x] = np.float32(0)
+    if len(picture.cb) > 0:
+        scene.cb[y // 2, x // 2] = picture.cb[y // 2, x // 2]
+        scene.cr[y // 2, x // 2] = picture.cr[y // 2, x // 2]
 
 
 @numba.njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ import numpy as np
 from vidtrack.video.runs import find_runs
 
 SHADOW = 2  # value of a hit that is shadow
-_DARKEST, _LIGHTEST = np.float32(0.5), np.float32(0.97)  # share of the scene's light
+_DARKEST, _LIGHTEST = np.float32(0.4), np.float32(0.97)  # share of the scene's light
 _CHROMA = np.float32(6)  # grey levels by which each chroma plane may miss the factor
 _TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.08)  # grey levels, and share of the scene's light
 _REACH = 2  # px to either side over which luminance differences are taken
@@ -21,7 +21,7 @@ def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-2 px, across and down.
     """
-    row, start, stop = find_runs(hit)
+    row, start, stop = find_runs(hit, False)
     coloured = len(picture.cb) > 0
     for k in range(len(row)):
         y = row[k]

@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from vidtrack.associate.gate import Gate
+from vidtrack.associate.hard import GNN
+from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.papers.p004 import reference
+from vidtrack.papers.p004.montecarlo import PAIRS, difference, measure
+from vidtrack.papers.p004.scenarios import crossing, nine, shares, wrong_identities
+from vidtrack.papers.p004.simulated import Targets, drive, nearest_target, track, two_points
+
+RUNS = 2000
+
+
+@pytest.fixture(scope="module")
+def table():
+    return measure(RUNS, seed=1)[0]
+
+
+@pytest.mark.parametrize("scenario", reference.CROSSING)
+@pytest.mark.parametrize("pair", PAIRS)
+def test_shares_agree_with_the_reference_within_four_standard_errors(table, scenario, pair):
+    theirs = np.array(reference.CROSSING[scenario][pair])
+    assert table[scenario][pair].sum() == pytest.approx(1)
+    assert np.abs(difference(table[scenario][pair], RUNS, theirs)).max() < 4
+
+
+def test_with_isotropic_noise_the_confidence_region_is_the_minimum_distance_exactly():
+    targets = crossing(300, 0.0, True, np.random.default_rng(2))
+    isotropic = ConstantVelocity(accel=0.8)
+    near = track(targets, isotropic, GNN(), Gate(distance="euclidean", radius=np.inf))
+    region = track(targets, isotropic, GNN(), Gate(1.0, "mahalanobis"))
+    np.testing.assert_array_equal(near, region)
+    assert (shares(targets, "gnn", "euclidean", isotropic) != [1, 0, 0, 0]).any()
+
+
+def test_runs_do_not_meet():
+    rng = np.random.default_rng(3)
+    targets = crossing(50, 0.0, True, rng)
+    own = targets.run == 7
+    alone = Targets(targets.truth[:, own], targets.z[:, own], np.zeros(2, np.int64), targets.seen[:, own])
+    model = ConstantVelocity(accel=0.8, cross=0.2, heading=0.0)
+    together = track(targets, model, GNN(), Gate(0.9999))
+    np.testing.assert_array_equal(together[:, own], track(alone, model, GNN(), Gate(0.9999)))
+
+
+def test_the_region_loses_fewer_of_nine_and_exclusivity_matters_more():
+    targets = nine(60, np.random.default_rng(4))
+    wrong = {pair: wrong_identities(targets, *pair).mean() for pair in PAIRS}
+    assert wrong["gnn", "mahalanobis"] < wrong["nn", "mahalanobis"] < wrong["nn", "euclidean"]
+    assert wrong["gnn", "euclidean"] < wrong["nn", "mahalanobis"]
+
+
+def test_two_points_give_position_and_velocity():
+    x, P = two_points(np.array([[1.0, 2.0]]), np.array([[3.0, 1.0]]))
+    np.testing.assert_allclose(x, [[3, 2, 1, -1]])
+    np.testing.assert_allclose(P[0, :2, :2], 0.49 * np.array([[1, 1], [1, 2]]))
+    np.testing.assert_allclose(P[0, :2, 2:], 0)
+
+
+def test_without_noise_targets_go_straight():
+    path = drive(np.zeros((1, 2)), np.array([np.pi / 2]), 5, 2.0, 0.0, 0.0, np.random.default_rng(0))
+    np.testing.assert_allclose(path[:, 0], np.stack([np.zeros(5), 2.0 * np.arange(5)], axis=1), atol=1e-12)
+
+
+def test_nearest_target_looks_in_its_own_run():
+    truth = np.array([[0.0, 0], [10, 0], [100, 0], [110, 0]])
+    target, away = nearest_target(np.array([[9.0, 0], [1, 0], [101, 0], [99, 0]]), truth, np.array([0, 0, 1, 1]))
+    np.testing.assert_array_equal(target, [[1, 0], [0, 0]])
+    np.testing.assert_allclose(away, 1.0)

@@ -1,0 +1,321 @@
+"""The command line: what it says, what it returns, and what it leaves behind when it is stopped."""
+
+import json
+import logging
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from command_line import ENVIRONMENT, SAMPLES, first_frames, loop_video, start
+
+from vidtrack.cli import COMMANDS, main
+
+CROSSING = SAMPLES / "crossing.avi"
+
+
+@pytest.fixture
+def vidtrack(tmp_path, monkeypatch, capfd):
+    """Calls a command in this process, in an empty folder; gives its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    logger = logging.getLogger("vidtrack")
+    before = logger.handlers, logger.level, logger.propagate, signal.getsignal(signal.SIGTERM)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["vidtrack", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        assert "Traceback" not in out + err
+        return ended.value.code or 0, out, err
+
+    yield call
+    logger.handlers, logger.level, logger.propagate = before[:3]
+    signal.signal(signal.SIGTERM, before[3])
+
+
+def rows_of(folder):
+    """Lines of tracks.csv without the header, checked to be whole."""
+    header, *lines = (folder / "tracks.csv").read_text().splitlines()
+    assert header.startswith("frame,time_s,track_id,status,")
+    assert all(line.count(",") == header.count(",") for line in lines)
+    return lines
+
+
+def check_results(folder):
+    """Everything a run leaves is complete and of one mind; returns summary.json."""
+    summary = json.loads((folder / "summary.json").read_text())
+    rows = rows_of(folder)
+    assert pq.read_table(folder / "tracks.parquet").num_rows == len(rows)
+    assert all(0 <= int(row.split(",")[0]) < summary["frames"] for row in rows)
+    for line in (folder / "mot.txt").read_text().splitlines():
+        assert len([float(cell) for cell in line.split(",")]) == 10
+    assert (folder / "tracks.png").stat().st_size > 0
+    return summary
+
+
+# What can be asked
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_shows_three_examples(vidtrack, command):
+    code, out, _ = vidtrack(command, "--help")
+    assert code == 0
+    examples = [line for line in out.partition("Examples:")[2].splitlines() if f"vidtrack {command}" in line]
+    assert len(examples) >= 3
+
+
+def test_help_lists_the_commands(vidtrack):
+    code, out, _ = vidtrack("--help")
+    assert code == 0
+    assert all(command in out for command in COMMANDS)
+
+
+def test_version(vidtrack):
+    code, out, _ = vidtrack("--version")
+    assert code == 0
+    assert out.startswith("vidtrack, version ")
+
+
+@pytest.mark.parametrize("explain", [(), ("--explain",)])
+def test_printed_configuration_is_one(vidtrack, tmp_path, explain):
+    code, out, err = vidtrack("config", *explain, "--set", "tracker.coast_s=2.5")
+    assert (code, err) == (0, "")
+    (tmp_path / "settings.toml").write_text(out)
+    assert "coast_s = 2.5" in vidtrack("config", "--config", "settings.toml")[1]
+
+
+# A run
+
+
+def test_track_prints_the_folder_and_nothing_else(vidtrack, tmp_path):
+    code, out, err = vidtrack("track", CROSSING, "--end", 3, "--line", "gate:200,0,200,240")
+    assert code == 0
+    assert out == "runs/crossing\n"
+    assert "frames in" in err
+    summary = check_results(tmp_path / "runs" / "crossing")
+    assert summary["interrupted"] is summary["truncated"] is False
+    assert summary["frames"] == 46
+    assert summary["tracks"] == 2
+    assert (
+        (tmp_path / "runs" / "crossing" / "counts.csv").read_text().startswith("time_s,frame,line,direction,track_id")
+    )
+    assert vidtrack("track", CROSSING, "--end", 0.5, "--quiet")[1:] == ("runs/crossing-2\n", "")
+
+
+def test_options_stand_for_settings(vidtrack, tmp_path):
+    options = ("--method", "nn", "--distance", "euclidean", "--detector", "paper", "--set", "tracker.coast_s=2")
+    code, _, _ = vidtrack("track", CROSSING, "-o", "out", "--end", 0.5, *options)
+    assert code == 0
+    found = json.loads((tmp_path / "out" / "summary.json").read_text())["settings"]
+    assert (found["tracker"]["method"], found["tracker"]["distance"]) == ("nn", "euclidean")
+    assert found["detector"]["kind"] == "paper"
+    assert found["tracker"]["coast_s"] == 2.0
+    assert found["source"]["end_s"] == 0.5
+
+
+def test_stored_detections_are_tracked_like_a_video(vidtrack, tmp_path):
+    table = [f"{k},-1,{10 + 4 * k},50,30,16,0.9,-1,-1,-1\n" for k in range(1, 40)]
+    (tmp_path / "det.txt").write_text("".join(table))
+    code, out, _ = vidtrack("track", "det.txt", "--fps", 25, "-o", "out")
+    assert (code, out) == (0, "out\n")
+    assert len({row.split(",")[2] for row in rows_of(tmp_path / "out")}) == 1
+
+
+def test_an_old_result_is_replaced_only_when_told(vidtrack, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    (tmp_path / "out" / "tracks.csv").write_text("old")
+    code, _, err = vidtrack("track", CROSSING, "-o", "out", "--end", 0.5)
+    assert code == 2
+    assert "--force" in err
+    assert (tmp_path / "out" / "tracks.csv").read_text() == "old"
+    assert vidtrack("track", CROSSING, "-o", "out", "--end", 0.5, "--force")[0] == 0
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+    check_results(tmp_path / "out")
+
+
+# Bad input
+
+
+def make_bad_inputs(folder):
+    (folder / "empty.avi").write_bytes(b"")
+    (folder / "text.avi").write_text("this is no video\n" * 50)
+    (folder / "no_pictures").mkdir()
+    (folder / "no_pictures" / "readme.txt").write_text("nothing to see")
+    (folder / "det.txt").write_text("")
+
+
+@pytest.mark.parametrize("source", ["missing.avi", "empty.avi", "text.avi", "no_pictures", "no/such/*.png", "det.txt"])
+def test_an_input_that_yields_nothing_is_one_line_and_3(vidtrack, tmp_path, source):
+    make_bad_inputs(tmp_path)
+    code, out, err = vidtrack("track", source)
+    assert (code, out) == (3, "")
+    assert err.startswith("vidtrack: ")
+    assert source in err
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_cut_video_is_tracked_to_its_end_with_a_warning(vidtrack, tmp_path):
+    content = CROSSING.read_bytes()
+    (tmp_path / "cut.avi").write_bytes(content[: len(content) // 2])
+    code, out, err = vidtrack("track", "cut.avi", "-o", "out")
+    assert (code, out) == (0, "out\n")
+    assert "vidtrack: warning: " in err
+    summary = check_results(tmp_path / "out")
+    assert summary["truncated"] is True
+    assert summary["interrupted"] is False
+    assert 10 < summary["frames"] < 130
+
+
+def test_a_video_of_one_frame_has_no_tracks(vidtrack, tmp_path):
+    first_frames(CROSSING, tmp_path / "one.avi", 1)
+    code, out, _ = vidtrack("track", "one.avi", "-o", "out")
+    assert (code, out) == (0, "out\n")
+    assert check_results(tmp_path / "out")["frames"] == 1
+    assert rows_of(tmp_path / "out") == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--set", "tracker.gate_probability=1.5"), ["gate_probability", "1.5", "less than or equal to 1"]),
+        (("--set", "tracker.coast=1"), ["tracker.coast", "tracker.coast_s"]),
+        (("--set", "tracker.coast_s"), ["group.name=value"]),
+        (("--config", "wrong.toml"), ["tracker.gate_probability"]),
+        (("--config", "missing.toml"), ["missing.toml"]),
+        (("--line", "gate:1,2,3"), ["gate:1,2,3", "NAME:x1,y1,x2,y2"]),
+        (("--mask", "missing.png"), ["missing.png"]),
+        (("--scale", "2"), ["source.scale", "2"]),
+        (("--start", "5", "--end", "2"), ["end_s", "5"]),
+        (("--method", "guess"), ["guess", "gnn"]),
+        (("-o", "a_file"), ["a_file"]),
+        (("-o", "a_file/below"), ["a_file"]),
+        (("--video", "a_file/annotated.mp4"), ["a_file"]),
+        (("--save-masks", "a_file"), ["a_file"]),
+    ],
+)
+def test_wrong_use_is_one_clear_message_and_2(vidtrack, tmp_path, options, words):
+    (tmp_path / "a_file").write_text("")
+    (tmp_path / "wrong.toml").write_text("[tracker]\ngate_prob = 0.99\n")
+    code, out, err = vidtrack("track", CROSSING, "--end", 0.3, *options)
+    assert (code, out) == (2, "")
+    for word in words:
+        assert word in err
+
+
+def test_an_unknown_command_is_2(vidtrack):
+    code, _, err = vidtrack("trakc", CROSSING)
+    assert code == 2
+    assert "trakc" in err
+
+
+# Stopped on the way
+
+
+@pytest.fixture(scope="module")
+def long_video(tmp_path_factory):
+    """A video that takes far longer than any of these tests waits."""
+    path = tmp_path_factory.mktemp("long") / "long.avi"
+    loop_video(SAMPLES / "junction.avi", path, times=60)
+    return path
+
+
+def stopped(tmp_path, video, number, *options):
+    """Sends a signal to a run once its first rows are on disk; gives exit code, stdout, stderr and the folder."""
+    process = start("track", video, "-o", "out", *options, cwd=tmp_path)
+    try:
+        table, deadline = tmp_path / "out" / "tracks.csv", time.monotonic() + 120
+        while process.poll() is None and time.monotonic() < deadline:
+            if table.is_file() and table.stat().st_size > 1000:
+                break
+            time.sleep(0.02)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert "Traceback" not in err
+    return process.returncode, out, err, tmp_path / "out"
+
+
+@pytest.mark.parametrize(
+    ("number", "expected", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_a_stopped_run_ends_in_complete_results(tmp_path, long_video, number, expected, word):
+    code, out, err, folder = stopped(tmp_path, long_video, number)
+    assert (code, out) == (expected, "")
+    assert err.splitlines()[-1] == f"vidtrack: {word}"
+    summary = check_results(folder)
+    assert summary["interrupted"] is True
+    assert summary["tracks"] > 0
+    assert not (folder / "tracks.parquet.parts").exists()
+
+
+def test_a_killed_run_leaves_readable_tables_and_can_be_repaired(tmp_path, long_video, vidtrack):
+    code, _, _, folder = stopped(tmp_path, long_video, signal.SIGKILL)
+    assert code == -signal.SIGKILL
+    assert rows_of(folder)
+    assert json.loads((folder / "summary.json").read_text())["interrupted"] is True
+    assert vidtrack("repair", folder)[0] == 0
+    assert pq.read_table(folder / "tracks.parquet").num_rows == len(rows_of(folder))
+    assert json.loads((folder / "summary.json").read_text())["interrupted"] is True
+
+
+_ON_A_SMALL_DISK = """
+import resource, sys
+from vidtrack.cli import main
+video = sys.argv[1]
+for folder, options in (("whole", []), ("short", ["--quiet"])):  # the first one loads all compiled code
+    sys.argv = ["vidtrack", "track", video, "-o", folder, *options]
+    try:
+        main()
+    except SystemExit as ended:
+        code = ended.code
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, 8_000))
+sys.exit(code)
+"""
+
+
+def test_a_full_disk_ends_the_run_with_1_and_valid_results(tmp_path):
+    """No file can grow beyond 8,000 bytes, as on a disk that fills up."""
+    command = [sys.executable, "-c", _ON_A_SMALL_DISK, str(CROSSING)]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "vidtrack: cannot write" in done.stderr.splitlines()[-1]
+    whole, short = rows_of(tmp_path / "whole"), rows_of(tmp_path / "short")
+    assert short == whole[: len(short)]
+    json.loads((tmp_path / "short" / "summary.json").read_text())
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
+    process = start("config", "--explain", cwd=tmp_path)
+    process.stdout.close()
+    err = process.stderr.read()
+    process.wait(timeout=60)
+    process.stderr.close()
+    assert err == ""
+
+
+def test_a_video_of_which_no_frame_can_be_decoded_is_3(vidtrack, tmp_path):
+    content = bytearray(CROSSING.read_bytes())
+    pictures = content.index(b"movi") + 4
+    content[pictures:] = bytes(len(content) - pictures)
+    (tmp_path / "blank.avi").write_bytes(content)
+    code, out, err = vidtrack("track", "blank.avi", "-o", "out")
+    assert (code, out) == (3, "")
+    assert err.startswith("vidtrack: no picture of blank")
+    assert len(err.splitlines()) == 1
+
+
+def test_a_folder_named_like_a_video_is_a_folder(vidtrack, tmp_path):
+    Path(tmp_path / "street.avi").mkdir()
+    code, _, err = vidtrack("track", "street.avi")
+    assert code == 3
+    assert "street.avi" in err

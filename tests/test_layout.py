@@ -1,0 +1,158 @@
+"""The shape of the package: imports point downwards, heavy libraries stay where they belong."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "vidtrack"
+FLOORS = (
+    "__main__",
+    "cli",
+    "papers",
+    "run",
+    "pipeline",
+    "serve",
+    "simulate",
+    "output",
+    "score",
+    "traffic",
+    "video",
+    "radar",
+    "track",
+    "associate",
+    "estimate",
+    "detection",
+    "formats",
+    "scan",
+    "config",
+    "errors",
+)
+"""From the top: a file may import its own floor and those below it."""
+
+
+def modules():
+    """(dotted name without `vidtrack.`, syntax tree) of every file but the package's front door."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        if parts != ("__init__",):
+            yield ".".join(part for part in parts if part != "__init__"), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imported(tree):
+    """Full names of all modules that a file imports anywhere, those for type checkers only left out."""
+    for_types = {
+        node
+        for block in ast.walk(tree)
+        if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+        for node in ast.walk(block)
+    }
+    for node in ast.walk(tree):
+        if node in for_types:
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are written in full"
+            for alias in node.names:  # `from package import module` is about the module
+                module = f"{node.module}.{alias.name}"
+                yield module if module.removeprefix("vidtrack.") in MODULES else node.module
+
+
+MODULES = dict(modules())
+IMPORTS = {name: set(imported(tree)) for name, tree in MODULES.items()}
+
+
+def floor(name):
+    return FLOORS.index(name.split(".")[0])
+
+
+def own(names):
+    """The package's modules among imported names."""
+    return {name.removeprefix("vidtrack.") for name in names} & set(MODULES)
+
+
+def users_of(library):
+    return {name for name, found in IMPORTS.items() if any(f == library or f.startswith(f"{library}.") for f in found)}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_imports_point_downwards(name):
+    upwards = {other for other in own(IMPORTS[name]) if floor(other) < floor(name)}
+    assert not upwards
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    waiting = {name: own(found) - {name} for name, found in IMPORTS.items()}
+    while free := [name for name, needs in waiting.items() if not needs & set(waiting)]:
+        for name in free:
+            del waiting[name]
+    assert not waiting, "these import each other"
+
+
+def test_rerun_is_imported_in_one_file():
+    assert users_of("rerun") == {"output.rerun"}
+
+
+def test_opencv_is_used_where_there_are_pictures():
+    assert {name.split(".")[0] for name in users_of("cv2")} <= {"video", "output", "simulate", "papers"}
+
+
+@pytest.mark.parametrize("library", ["matplotlib", "click", "rich"])
+def test_libraries_for_people_stay_out_of_the_core(library):
+    allowed = {"matplotlib": {"output", "papers"}, "click": {"cli", "__main__"}, "rich": {"cli"}}[library]
+    assert {name.split(".")[0] for name in users_of(library)} <= allowed
+
+
+def test_nothing_is_pickled_and_nobody_prints():
+    assert not users_of("pickle")
+    printing = [
+        name
+        for name, tree in MODULES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
+    ]
+    assert not printing
+
+
+def test_files_hold_one_idea():
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in PACKAGE.rglob("*.py")}
+    assert not {path.name: length for path, length in lengths.items() if length > 400}
+
+
+def run(code):
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def test_help_imports_nothing_heavy():
+    result = run(
+        "import sys\n"
+        "from vidtrack.cli import cli\n"
+        "cli.main(['--help'], standalone_mode=False)\n"
+        "heavy = {'numpy', 'cv2', 'numba', 'rerun', 'scipy', 'pydantic', 'pyarrow', 'av', 'rich'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("first", ["Tracker", "track"])
+def test_public_names_are_what_they_say_in_any_order(first):
+    """`track` is a function and also the name of a sub-package: importing the latter must not hide the former."""
+    result = run(
+        "import vidtrack as vt\n"
+        f"vt.{first}\n"
+        "for name in vt.__all__: assert getattr(vt, name) is not None, name\n"
+        "import inspect\n"
+        "assert inspect.isfunction(vt.track), vt.track\n"
+        "assert inspect.isclass(vt.Tracker)\n"
+        "assert issubclass(vt.ScanError, vt.Error)\n"
+        "import vidtrack.track.groups\n"
+        "assert inspect.isfunction(vt.track), vt.track\n"
+    )
+    assert result.returncode == 0, result.stderr

@@ -1,0 +1,105 @@
+"""From a video to tracks, by the Python API."""
+
+from itertools import islice, pairwise
+
+import numpy as np
+import pytest
+from command_line import SAMPLES
+
+from vidtrack import formats, score
+from vidtrack.config import Settings, TrackerSettings, load
+from vidtrack.errors import ConfigError, SourceError
+from vidtrack.pipeline import build_detector, build_tracker, expected_boxes, track, video_steps
+from vidtrack.run import Run
+from vidtrack.scan import Scan, Status
+from vidtrack.video.source import open_source
+
+CROSSING = SAMPLES / "crossing.avi"
+
+
+def test_track_yields_each_frame_with_its_tracks():
+    seen = list(track(CROSSING))
+    assert [frame.index for frame, _ in seen] == list(range(150))
+    assert all(frame.time_s == tracks.t for frame, tracks in seen)
+    assert all(a.time_s < b.time_s for (a, _), (b, _) in pairwise(seen))
+    assert seen[0][0].bgr().shape == (240, 320, 3)
+    known = {int(i) for _, tracks in seen for i in tracks.id[tracks.status != Status.TENTATIVE]}
+    assert len(known) == 2
+
+
+def test_track_is_lazy_and_may_be_left():
+    frames = track(CROSSING, load(assignments=["tracker.method=nn"]))
+    assert [frame.index for frame, _ in islice(frames, 3)] == [0, 1, 2]
+    frames.close()
+
+
+def test_a_missing_video_is_told_when_the_first_frame_is_asked_for():
+    frames = track("nowhere.avi")
+    with pytest.raises(SourceError, match=r"nowhere\.avi"):
+        next(frames)
+
+
+def test_the_crossing_vehicles_keep_their_identities(tmp_path):
+    with Run(str(CROSSING), Settings(), tmp_path / "out") as run:
+        for _ in run:
+            pass
+    scores = score.evaluate(formats.read(tmp_path / "out"), formats.read(SAMPLES / "crossing.txt"), iou=0.3)
+    assert scores["switches"] == 0
+    assert scores["tracks"] == scores["truth_tracks"] == 2
+    assert scores["idf1"] > 0.95
+
+
+def test_steps_carry_everything_about_a_frame():
+    settings = load(assignments=["source.end_s=2"])
+    with open_source(str(CROSSING), settings.source) as source:
+        tracker = build_tracker(settings.tracker, (source.width, source.height))
+        steps = list(video_steps(source, build_detector(settings), tracker, settings))
+    last = steps[-1]
+    assert last.foreground.mask.shape == last.frame.shape
+    assert len(last.scan) >= 2
+    assert last.scan.box.shape == (len(last.scan), 4)
+    assert set(last.stage_s) == {"read", "detect", "blobs", "track"}
+    assert all(seconds >= 0 for seconds in last.stage_s.values())
+
+
+def test_what_the_mask_hides_is_not_tracked(tmp_path):
+    import cv2
+
+    mask = np.zeros((240, 320), np.uint8)
+    mask[:, 200:] = 255
+    cv2.imwrite(str(tmp_path / "mask.png"), mask)
+    settings = load(assignments=[("source.mask", tmp_path / "mask.png")])
+    seen = [tracks.xy for _, tracks in track(CROSSING, settings)]
+    xy = np.concatenate(seen)
+    assert len(xy)
+    assert (xy[:, 0] > 190).all()
+
+
+def test_a_mask_that_is_no_picture_is_refused(tmp_path):
+    (tmp_path / "mask.png").write_text("no picture")
+    with pytest.raises(ConfigError, match=r"mask\.png"):
+        build_detector(load(assignments=[("source.mask", tmp_path / "mask.png")]))
+
+
+def test_only_tracks_that_are_believed_reach_the_detector():
+    tracker = build_tracker(TrackerSettings(), (320, 240))
+    box = np.array([[-10.0, -5.0, 20.0, 10.0]])
+    for k in range(12):
+        known = expected_boxes(tracker, 0.04 * k)
+        z = np.array([[50.0 + 4 * k, 80.0]])
+        assert len(known) == 0 if k < 4 else True
+        tracks = tracker.step(Scan(0.04 * k, z, np.eye(2), box=box))
+    assert tracks.status.tolist() == [Status.CONFIRMED]
+    np.testing.assert_allclose(expected_boxes(tracker, 0.04 * 12), [[88.0, 75.0, 20.0, 10.0]], atol=2)
+
+
+@pytest.mark.parametrize("method", ["nn", "gnn"])
+@pytest.mark.parametrize("distance", ["mahalanobis", "decoupled", "euclidean"])
+def test_settings_reach_the_tracker(method, distance):
+    settings = load(
+        assignments=[f"tracker.method={method}", f"tracker.distance={distance}", "tracker.merged_blobs=false"]
+    )
+    tracker = build_tracker(settings.tracker)
+    assert type(tracker.associate).__name__.lower() == method
+    assert tracker.gate.distance == distance
+    assert tracker.groups is None

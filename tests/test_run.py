@@ -1,0 +1,106 @@
+"""A run writes its results while it goes, and ends them whatever happens."""
+
+import json
+
+import pyarrow.parquet as pq
+import pytest
+from command_line import SAMPLES
+
+from vidtrack.config import load
+from vidtrack.errors import ConfigError, OutputError, SourceError
+from vidtrack.run import Run
+
+CROSSING = str(SAMPLES / "crossing.avi")
+SHORT = load(assignments=["source.end_s=1.5"])
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_every_step_is_seen_and_written(tmp_path):
+    with Run(CROSSING, SHORT, tmp_path / "out") as run:
+        steps = list(run)
+    assert run.folder == tmp_path / "out"
+    assert run.name == "crossing"
+    assert run.frames == len(steps) == 23
+    assert [step.index for step in steps] == list(range(23))
+    found = summary(run.folder)
+    assert found["interrupted"] is False
+    assert found["frames"] == found["frames_read"] == 23
+    assert set(found["stages"]) >= {"read", "detect", "blobs", "track"}
+    assert (found["width"], found["height"], found["fps"]) == (320, 240, 15.0)
+    assert {path.name for path in run.folder.iterdir()} == {
+        "tracks.csv",
+        "tracks.parquet",
+        "mot.txt",
+        "summary.json",
+        "tracks.png",
+    }
+
+
+def test_a_run_left_by_an_error_is_complete_up_to_there(tmp_path):
+    def use_half():
+        with Run(CROSSING, SHORT, tmp_path / "out") as run:
+            for step in run:
+                if step.index == 15:
+                    raise RuntimeError("ours")
+
+    with pytest.raises(RuntimeError, match="ours"):
+        use_half()
+    found = summary(tmp_path / "out")
+    assert found["interrupted"] is True
+    assert found["frames"] == 16
+    frames = pq.read_table(tmp_path / "out" / "tracks.parquet")["frame"].to_pylist()
+    assert max(frames) <= 15
+    assert len((tmp_path / "out" / "tracks.csv").read_text().splitlines()) == len(frames) + 1
+
+
+def test_a_run_that_is_never_started_leaves_empty_results(tmp_path):
+    with Run(CROSSING, SHORT, tmp_path / "out"):
+        pass
+    assert summary(tmp_path / "out")["frames"] == 0
+    assert pq.read_table(tmp_path / "out" / "tracks.parquet").num_rows == 0
+
+
+def test_extras_are_written_where_they_were_asked_for(tmp_path):
+    settings = load(assignments=["source.end_s=1.5", ("output.lines", ["gate:30,0,30,240"])])
+    with Run(CROSSING, settings, tmp_path / "out", masks=tmp_path / "masks", decisions=True) as run:
+        count = sum(1 for _ in run)
+    assert sorted(path.name for path in (tmp_path / "masks").iterdir()) == [f"{k:06d}.png" for k in range(count)]
+    assert (tmp_path / "out" / "decisions.csv").stat().st_size > 0
+    rows = (tmp_path / "out" / "counts.csv").read_text().splitlines()[1:]
+    assert summary(tmp_path / "out")["counts"]
+    assert len(rows) == 1
+
+
+def test_the_same_video_gives_the_same_tables(tmp_path):
+    for name in ("one", "two"):
+        with Run(CROSSING, SHORT, tmp_path / name) as run:
+            for _ in run:
+                pass
+    for table in ("tracks.csv", "mot.txt"):
+        assert (tmp_path / "one" / table).read_bytes() == (tmp_path / "two" / table).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("source", "assignment", "error"),
+    [
+        ("missing.avi", "tracker.coast_s=1", SourceError),
+        (CROSSING, "source.mask=missing.png", ConfigError),
+        (CROSSING, 'output.lines=["gate"]', ConfigError),
+        (CROSSING, 'output.lines=["a:1,2,3,4", "a:1,2,3,5"]', ConfigError),
+    ],
+)
+def test_what_cannot_begin_leaves_no_folder(tmp_path, monkeypatch, source, assignment, error):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(error):
+        Run(source, load(assignments=[assignment]), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_is_taken_is_refused_before_anything_is_computed(tmp_path):
+    (tmp_path / "old.txt").write_text("mine")
+    with pytest.raises(OutputError, match="not empty"):
+        Run(CROSSING, SHORT, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["old.txt"]

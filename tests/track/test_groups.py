@@ -1,0 +1,171 @@
+"""Vehicles that share a blob stay vehicles: who they are, where they are, when they are given up."""
+
+import numpy as np
+import pytest
+from blob_scene import centred, confirmed_ids, default_tracker, events, nearest_id, play
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Status
+from vidtrack.track.groups import Groups
+
+SPEED = 60.0
+
+
+def right(t, meet=2.0, size=(30, 16)):
+    return centred(160 + SPEED * (t - meet), 120, *size)
+
+
+def down(t, meet=2.05, size=(16, 30)):
+    return centred(160, 120 + SPEED * (t - meet), *size)
+
+
+def left(t, meet=2.1, size=(30, 16)):
+    return centred(170 - SPEED * (t - meet), 124, *size)
+
+
+def track_of(tracks, number):
+    return int(np.flatnonzero(tracks.id == number)[0])
+
+
+def overlaps(a, b):
+    return a[0] < b[0] + b[2] and b[0] < a[0] + a[2] and a[1] < b[1] + b[3] and b[1] < a[1] + a[3]
+
+
+@pytest.mark.parametrize("method", ["nn", "gnn"])
+@pytest.mark.parametrize("seed", range(5))
+def test_two_vehicles_that_cross_in_one_blob_keep_their_ids_and_velocities(method, seed):
+    tracker = default_tracker(method=method)
+    seen = play(tracker, lambda t: [right(t), down(t)], 4.0, jitter=0.5, seed=seed)
+    before, after = seen[25], seen[-10]  # 1.0 s, 3.6 s
+    ids = nearest_id(before, 100, 120), nearest_id(before, 160, 57)
+    assert confirmed_ids(seen) == set(ids)
+    for number, place, velocity in ((ids[0], (256, 120), (SPEED, 0)), (ids[1], (160, 213), (0, SPEED))):
+        row = track_of(after, number)
+        np.testing.assert_allclose(after.xy[row], place, atol=5)
+        np.testing.assert_allclose(after.v[row], velocity, atol=12)
+
+
+def test_group_says_who_shares_a_blob_and_since_when():
+    seen = play(default_tracker(), lambda t: [right(t), down(t)], 4.0)
+    shared = [tracks for tracks in seen if (tracks.group >= 0).any()]
+    ids = confirmed_ids(seen)
+    assert len(shared) >= 5
+    since = shared[0].t
+    for tracks in shared:
+        both = np.isin(tracks.id, list(ids))
+        assert (tracks.status[both] == Status.MERGED).all()
+        assert len(set(tracks.group[both].tolist())) == 1
+        np.testing.assert_array_equal(tracks.group_since_s[both], since)
+        assert tracks.seen[both].all()
+        assert overlaps(right(tracks.t), down(tracks.t))
+    alone = [tracks for tracks in seen if (tracks.group < 0).all()]
+    for tracks in alone:
+        assert np.isnan(tracks.group_since_s).all()
+        assert not (tracks.status == Status.MERGED).any()
+    assert {(since, number) for number in ids} == set(events(seen, "merge"))
+    split = events(seen, "split")
+    assert {number for _, number in split} == ids
+    assert all(time > shared[-1].t for time, _ in split)
+
+
+def test_three_vehicles_in_one_blob_come_out_as_three():
+    seen = play(default_tracker(), lambda t: [right(t), down(t), left(t)], 4.0, jitter=0.3, seed=1)
+    before, after = seen[25], seen[-10]
+    ids = nearest_id(before, 100, 120), nearest_id(before, 160, 57), nearest_id(before, 236, 124)
+    assert any((tracks.group >= 0).sum() == 3 for tracks in seen)
+    assert confirmed_ids(seen) == set(ids)
+    for number, vehicle in zip(ids, (right, down, left), strict=True):
+        x, y, width, height = vehicle(after.t)
+        assert nearest_id(after, x + width / 2, y + height / 2) == number
+
+
+def test_a_blob_that_swallows_a_car_for_good_does_not_keep_it_alive():
+    """A car drives behind a standing lorry and stays there: nothing in the picture is evidence for it."""
+
+    def scene(t):
+        lorry = centred(220, 120, 80, 60)
+        car = centred(min(20 + 50 * t, 220), 120, 24, 14)
+        return [lorry, car]
+
+    tracker = default_tracker(confirm_travel=0.0, coast_s=1.0)
+    seen = play(tracker, scene, 9.0)
+    lorry = nearest_id(seen[40], 220, 120)
+    assert len(seen[40].id[seen[40].status != Status.TENTATIVE]) == 2
+    assert seen[-1].id.tolist() == [lorry]
+    hidden_at = (220 - 40 + 12 - 20) / 50
+    (gone,) = (t for t, number in events(seen, "delete") if number != lorry)
+    assert hidden_at < gone < hidden_at + 5.0  # coast_s after it would have passed the lorry's far edge
+
+
+def test_a_car_that_a_pillar_half_covers_keeps_its_position():
+    """The visible edge goes on with the car; half covered, the centroid of what is left lags by 10 px."""
+    pillar = 200
+
+    def centre(t):
+        return 20 + 50 * t
+
+    def scene(t):
+        x, y, width, height = centred(centre(t), 120, 40, 20)
+        return [[x, y, min(width, pillar - x), height]] if x < pillar - 1 else []
+
+    seen = play(default_tracker(), scene, 4.2, jitter=0.2)
+    number = nearest_id(seen[60], centre(seen[60].t), 120)
+    for tracks in seen[75:]:
+        covered = centre(tracks.t) + 20 - pillar
+        if 0 < covered <= 20:
+            row = track_of(tracks, number)
+            assert abs(tracks.xy[row, 0] - centre(tracks.t)) < 5
+    assert confirmed_ids(seen) == {number}
+
+
+def test_one_shared_blob_is_two_deaths_and_a_birth_without_groups():
+    """The switch does what it says: without groups the crossing vehicles are never merged."""
+    seen = play(default_tracker(merged_blobs=False), lambda t: [right(t), down(t)], 4.0)
+    assert not any((tracks.status == Status.MERGED).any() or (tracks.group >= 0).any() for tracks in seen)
+    assert not events(seen, "merge")
+
+
+def measure(predicted, relative, var, on, blobs):
+    """Positions by the edges of blobs that no border cuts."""
+    return Groups().measure(predicted, relative, var, on, blobs, np.zeros((len(blobs), 4), bool))
+
+
+numbers = st.floats(-1e4, 1e4)
+lengths = st.floats(0, 1e3)
+boxes = st.tuples(numbers, numbers, lengths, lengths)
+
+
+@given(
+    members=st.lists(st.tuples(boxes, st.floats(0, 1e6)), min_size=1, max_size=5),
+    blobs=st.lists(boxes, min_size=1, max_size=3),
+    data=st.data(),
+)
+@settings(max_examples=200, deadline=None)
+def test_edges_never_give_anything_but_a_measurement(members, blobs, data):
+    predicted = np.array([box for box, _ in members])
+    var = np.array([[v, v] for _, v in members])
+    relative = np.column_stack([-predicted[:, 2:] / 2, predicted[:, 2:]])
+    on = np.array(data.draw(st.lists(st.integers(0, len(blobs) - 1), min_size=len(members), max_size=len(members))))
+    z, R, own = measure(predicted, relative, var, on, np.array(blobs))
+    assert np.isfinite(z).all()
+    assert np.isfinite(R).all()
+    assert (R > 0).all()
+    assert ((own >= 0) & (own <= 4)).all()
+
+
+def test_a_lone_members_edges_are_those_of_its_blob():
+    """A vehicle of 20 x 10 predicted at (50, 50), its blob seen 3 px to the right."""
+    predicted, relative = np.array([[40.0, 45.0, 20.0, 10.0]]), np.array([[-10.0, -5.0, 20.0, 10.0]])
+    seen = np.array([[43.0, 45.0, 20.0, 10.0]])
+    z, R, own = measure(predicted, relative, np.ones((1, 2)), np.array([0]), seen)
+    np.testing.assert_allclose(z, [[53.0, 50.0]])
+    assert own.tolist() == [4]
+    assert (R < 20**2).all()
+
+
+@pytest.mark.parametrize("cover", [0.0, -1.0, 1.1])
+def test_a_cover_that_makes_no_sense_is_refused(cover):
+    with pytest.raises(ConfigError, match=str(cover)):
+        Groups(cover=cover)

@@ -1,0 +1,51 @@
+"""Names of the experiments and where they are. Modules are imported only when one is asked for."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib import import_module
+
+from vidtrack.errors import ConfigError
+from vidtrack.papers.result import Result
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """A figure or table of a paper: `reproduce(runs, seed)` of a module of this package, and what it shows."""
+
+    module: str
+    title: str
+
+    def reproduce(self, runs: int | None = None, seed: int = 0) -> Result:
+        """Do it. runs: Monte Carlo runs or simulated videos; None: as many as the claim needs."""
+        function: Callable[[int | None, int], Result] = import_module(f"vidtrack.papers.{self.module}").reproduce
+        return function(runs, seed)
+
+
+EXPERIMENTS = {
+    "004-fig1": Experiment("p004.fig1", "A measurement nearer to one target and more probable for the other"),
+    "004-fig2": Experiment("p004.fig2", "The confidence region of a moving target's predicted position"),
+    "004-fig3": Experiment("p004.fig3", "Crossing targets: who takes which measurement, by distance and by region"),
+    "004-fig5": Experiment("p004.fig5", "Two crossing objects in a video: minimum distance against confidence region"),
+    "004-fig6": Experiment("p004.fig6", "Nine objects in a video: minimum distance against confidence region"),
+    "004-fig7": Experiment("p004.fig7", "T-junction: the grey car covers the stop line"),
+    "004-fig8": Experiment("p004.fig8", "T-junction: the stop line's ghost after the grey car has passed"),
+    "004-fig9": Experiment("p004.fig9", "T-junction: the white car and the stop line's ghost"),
+    "004-montecarlo": Experiment(
+        "p004.montecarlo", "Shares of swapped, merged and lost tracks, thousands of crossings"
+    ),
+}
+
+
+def choose(names: Iterable[str]) -> dict[str, Experiment]:
+    """The experiments of these names, or all for none. Raises ConfigError for an unknown one, naming the nearest."""
+    chosen = {}
+    for name in names or EXPERIMENTS:
+        if name not in EXPERIMENTS:
+            near = difflib.get_close_matches(name, EXPERIMENTS, n=1, cutoff=0.5)
+            hint = f"did you mean {near[0]}?" if near else "vidtrack reproduce --list shows all"
+            raise ConfigError(f"there is no experiment {name!r}; {hint}")
+        chosen[name] = EXPERIMENTS[name]
+    return chosen

@@ -1,0 +1,43 @@
+"""What an experiment hands over: a picture, a table, and one sentence."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vidtrack.output.folder import writing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Row = dict[str, object]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """An experiment's outcome.
+
+    figure   drawn, not yet written
+    rows     the table, ours beside the paper's or a reference's; all rows have the same keys
+    verdict  one sentence: what came out, and how it compares
+    """
+
+    figure: Figure
+    rows: Sequence[Row]
+    verdict: str
+
+    def write(self, folder: Path, name: str) -> None:
+        """Write NAME.png and NAME.csv into a folder that exists. Raises StoppedEarly when the disk refuses."""
+        with writing(folder / f"{name}.png"):
+            self.figure.savefig(folder / f"{name}.png")
+        with writing(folder / f"{name}.csv"), (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            table = csv.DictWriter(file, list(self.rows[0]))
+            table.writeheader()
+            table.writerows({key: _text(value) for key, value in row.items()} for row in self.rows)
+
+
+def _text(value: object) -> object:
+    return f"{value:.6g}" if isinstance(value, float) else value
