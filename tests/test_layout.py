@@ -22,7 +22,7 @@ FLOORS = (
     "traffic",
     "video",
     "radar",
-    "track",
+    "tracking",
     "associate",
     "estimate",
     "detection",
@@ -152,7 +152,7 @@ def test_public_names_are_what_they_say_in_any_order(first):
         "assert inspect.isfunction(vt.track), vt.track\n"
         "assert inspect.isclass(vt.Tracker)\n"
         "assert issubclass(vt.ScanError, vt.Error)\n"
-        "import vidtrack.track.groups\n"
+        "import vidtrack.tracking.groups\n"
         "assert inspect.isfunction(vt.track), vt.track\n"
     )
     assert result.returncode == 0, result.stderr

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
-    from vidtrack.track.groups import Groups as Groups
-    from vidtrack.track.lifecycle import LifeCycle as LifeCycle
-    from vidtrack.track.tracker import Tracker as Tracker
+    from vidtrack.tracking.groups import Groups as Groups
+    from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
+    from vidtrack.tracking.tracker import Tracker as Tracker
 
 _HOME = {
     "ConfigError": "errors",
@@ -32,8 +32,8 @@ _HOME = {
     "FormatError": "errors",
     "GNN": "associate.hard",
     "Gate": "associate.gate",
-    "Groups": "track.groups",
-    "LifeCycle": "track.lifecycle",
+    "Groups": "tracking.groups",
+    "LifeCycle": "tracking.lifecycle",
     "NN": "associate.hard",
     "OutputError": "errors",
     "Scan": "scan",
@@ -42,7 +42,7 @@ _HOME = {
     "SourceError": "errors",
     "Status": "scan",
     "StoppedEarly": "errors",
-    "Tracker": "track.tracker",
+    "Tracker": "tracking.tracker",
     "Tracks": "scan",
     "load_settings": "config",
     "track": "pipeline",

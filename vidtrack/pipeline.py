@@ -14,9 +14,9 @@ from vidtrack.config import Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Scan, Status, Tracks
-from vidtrack.track.groups import Groups
-from vidtrack.track.lifecycle import LifeCycle
-from vidtrack.track.tracker import Tracker
+from vidtrack.tracking.groups import Groups
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.tracker import Tracker
 from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
 from vidtrack.video.foreground import Background

@@ -113,6 +113,30 @@ def test_a_car_of_the_first_frame_leaves_no_ghost():
             assert (foreground.mask > 0).sum() < 0.01 * CAR[0] * CAR[1]
 
 
+def zebra(street):
+    """Paint bright bars on the road; the place of a car on them."""
+    street.road[44:80, 50:110] = 100
+    for left in range(50, 110, 8):
+        street.road[44:80, left : left + 4] = 220
+    return 60, 50
+
+
+def test_road_marks_reappear_at_once_when_a_car_leaves_them():
+    street, detector = Street(), disturbance()
+    left, top = zebra(street)
+    play(detector, street, 2)
+    play(detector, street, 8, start=2, cars=[(left, top, 60)])  # plain grey on bars: it looks like a ghost
+    assert not play(detector, street, 0.2, start=10).mask.any()
+
+
+def test_a_known_car_on_road_marks_is_not_taken_for_a_ghost():
+    street, detector = Street(), disturbance()
+    left, top = zebra(street)
+    play(detector, street, 2)
+    known = np.array([[left - 2.0, top - 2.0, CAR[0] + 4.0, CAR[1] + 4.0]])
+    assert covered(play(detector, street, 8, start=2, known=known, cars=[(left, top, 60)]), left, top) > 0.95
+
+
 def test_a_soft_shadow_is_not_foreground():
     street, detector = Street(), disturbance()
     play(detector, street, 2)

@@ -92,8 +92,8 @@ def _outside(scan: Scan, low: Floats, high: Floats) -> Scan:
     """The scan without blobs that meet the boxes from low (B, 2) to high (B, 2)."""
     assert scan.box is not None
     start = scan.z + scan.box[:, :2]
-    meets = (start[:, None] < high) & (start[:, None] + scan.box[:, None, 2:] > low)
-    keep = ~meets.all(axis=2).any(axis=1)
+    overlap = np.minimum(start[:, None] + scan.box[:, None, 2:], high) - np.maximum(start[:, None], low)
+    keep = overlap.min(axis=2).max(axis=1, initial=-np.inf) <= 0
     return Scan(scan.t, scan.z[keep], scan.R[keep], box=scan.box[keep])
 
 

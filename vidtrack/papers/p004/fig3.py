@@ -34,7 +34,7 @@ WORDS = {"euclidean": "minimum distance", "decoupled": "confidence region, eq. (
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Two predictions zhat (2, 2) and their cov (2, 2, 2) without R, headings u (2, 2); measurement i is of target i."""
+    """Two predictions zhat (2, 2) and their cov (2, 2, 2) without R, headings u (2, 2); z[i] is of target i."""
 
     zhat: Floats
     cov: Floats

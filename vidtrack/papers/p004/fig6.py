@@ -45,8 +45,8 @@ def reproduce(runs: int | None, seed: int) -> Result:
         f"seed {seeds[shown]}: {lost[shown][NEAR].size} of 9 vehicles lose their identity by minimum distance, "
         f"{lost[shown][REGION].size} by confidence region (the paper: one absorbed, none); over {len(seeds)} videos "
         f"the mean (gnn) is {mean[NEAR_UNSHARED]} and {mean[REGION_UNSHARED]} if a shared blob measures nobody, "
-        f"{mean[NEAR]} and {mean[REGION]} if it is taken for one vehicle, and {mean[DEFAULT]} by default, where merged blobs are "
-        f"recognised."
+        f"{mean[NEAR]} and {mean[REGION]} if it is taken for one vehicle, and {mean[DEFAULT]} by default, where "
+        f"merged blobs are recognised."
     )
     return Result(drawing, [_row(way, count[way]) for way in WAYS], verdict)
 

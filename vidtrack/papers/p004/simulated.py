@@ -12,8 +12,8 @@ from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import Associator
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Floats, Ints, Scan
-from vidtrack.track.lifecycle import LifeCycle
-from vidtrack.track.tracker import Tracker
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.tracker import Tracker
 
 MEASUREMENT_SIGMA = 0.7
 """px, of a blob's centroid in each axis."""

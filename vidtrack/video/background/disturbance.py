@@ -25,6 +25,7 @@ _FIRST_S = 0.1  # plain averaging after a start
 _UNSURE_S = 10.0  # after a start ghosts are many: for so long
 _UNSURE_GHOST_S = 0.3  # they need only so much cover
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
+_KNOWN_S = 0.1  # shorter than all of these, and not 0: that is for pixels that are seen free
 
 
 class Disturbance:
@@ -40,7 +41,7 @@ class Disturbance:
         self._frames = 0  # learnt since the start
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never absorbed by the scene."""
+        """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never taken for scene."""
         s = self._settings
         picture = smooth(self._view.reduce(frame))
         if self._scene is None:
@@ -60,11 +61,12 @@ class Disturbance:
             return self._view.foreground(np.zeros_like(mask), strength)
         if s.holes:
             fill_holes(mask)
+        self._spare(scene, known)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
         self._learn(picture, scene, mask, hit, dt)
         if math.floor(frame.time_s) != math.floor(frame.time_s - dt):  # once a second is often enough
-            self._absorb(picture, scene, hit, known)
+            self._absorb(picture, scene, hit)
         return self._view.foreground(mask, strength)
 
     def scene(self) -> Image:
@@ -113,12 +115,15 @@ class Disturbance:
             weight = max(weight, 1 / self._frames)
         learn(picture, scene, covered, np.float32(weight), np.float32(-math.expm1(-dt / s.noise_s)), np.float32(dt))
 
-    def _absorb(self, picture: Picture, scene: Scene, hit: Image, known: Floats) -> None:
-        """Take for scene what has stood for absorb_s, unless the tracker knows it for a vehicle, and lasting shadow."""
-        absorb_s, shadow_s = self._settings.absorb_s, _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
+    def _spare(self, scene: Scene, known: Floats) -> None:
+        """Let the cover of known vehicles never last as long as ghosts and absorption need."""
         left, top, width, height = np.asarray(known, dtype=float).reshape(-1, 4).T / self._view.step
         edges = np.stack([left, top, left + width + 1, top + height + 1], axis=1).clip(0).astype(int)
         for x0, y0, x1, y1 in edges:
             inside = scene.covered_s[y0:y1, x0:x1]
-            np.minimum(inside, absorb_s / 2, out=inside)
-        absorb(picture, scene, hit, np.float32(absorb_s), np.float32(shadow_s))
+            np.minimum(inside, _KNOWN_S, out=inside)
+
+    def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
+        """Take for scene what has stood for absorb_s, and lasting shadow."""
+        shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
+        absorb(picture, scene, hit, np.float32(self._settings.absorb_s), np.float32(shadow_s))

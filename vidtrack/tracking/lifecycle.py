@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Status
-from vidtrack.track.register import Register
+from vidtrack.tracking.register import Register
 
 Mask = np.ndarray
 

@@ -10,8 +10,8 @@ from vidtrack.associate.gate import Gate
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Scan, Status
-from vidtrack.track.lifecycle import LifeCycle
-from vidtrack.track.tracker import Tracker
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.tracker import Tracker
 
 EYE = np.eye(2)
 

@@ -13,9 +13,9 @@ from vidtrack.associate.hard import GNN, NN
 from vidtrack.errors import ScanError
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Scan, Status
-from vidtrack.track.groups import Groups
-from vidtrack.track.lifecycle import LifeCycle
-from vidtrack.track.tracker import Tracker
+from vidtrack.tracking.groups import Groups
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.tracker import Tracker
 
 EYE = np.eye(2)
 NOTHING = np.empty((0, 2))

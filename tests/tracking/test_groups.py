@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Status
-from vidtrack.track.groups import Groups
+from vidtrack.tracking.groups import Groups
 
 SPEED = 60.0
 

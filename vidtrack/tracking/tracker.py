@@ -11,10 +11,10 @@ from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.scan import Choices, Decision, Event, Floats, Ints, Scan, Status, Tracks
-from vidtrack.track.boxes import absolute, best_cover
-from vidtrack.track.groups import Groups
-from vidtrack.track.lifecycle import LifeCycle
-from vidtrack.track.register import Register
+from vidtrack.tracking.boxes import absolute, best_cover
+from vidtrack.tracking.groups import Groups
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.register import Register
 
 BIRTH_EXISTENCE = 0.5
 BORDER = 2.0

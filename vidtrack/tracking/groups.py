@@ -16,7 +16,7 @@ from numba import njit
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
-from vidtrack.track.boxes import best_cover
+from vidtrack.tracking.boxes import best_cover
 
 UNKNOWN = 1e8
 """Variance of a coordinate that no edge tells about."""
