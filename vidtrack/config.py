@@ -76,7 +76,7 @@ class DisturbanceSettings(_Group):
     ghost_s: float = Field(1.0, ge=0)
     """s; cover of a region before it can be called a ghost"""
     absorb_s: float = Field(60.0, gt=0)
-    """s; what stands longer, and is not a tracked vehicle, becomes scene"""
+    """s; what stands longer, and is not a tracked vehicle, becomes scene; its leaving is recognised all the same"""
     relearn_share: float = Field(0.6, gt=0, le=1)
     """share of the picture; more foreground than that is no traffic but a change of light or view"""
     relearn_s: float = Field(1.0, ge=0)
@@ -91,6 +91,8 @@ class DisturbanceSettings(_Group):
 
 
 class PaperSettings(_Group):
+    """The map exactly as paper 004 has it."""
+
     weight: float = Field(0.1, gt=0, le=1)
     """share of the new frame in the average, per frame"""
     threshold: float = Field(20.0, gt=0, le=255)
@@ -107,8 +109,10 @@ class DetectorSettings(_Group):
 
 
 class BlobSettings(_Group):
+    """Connected regions of the foreground, as measurements."""
+
     min_area_share: float = Field(1e-4, ge=0, le=1)
-    """share of the picture's area; smaller blobs are left out"""
+    """share of the picture's area (8 pixels of 320x240); smaller blobs are left out"""
     join_overlap: float = Field(0.7, gt=0, le=1)
     """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
     join_gap: float = Field(0.05, ge=0, le=1)

@@ -10,6 +10,7 @@ import numpy as np
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN, Associator
+from vidtrack.associate.shape import Shape
 from vidtrack.config import Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
@@ -49,9 +50,17 @@ def build_detector(settings: Settings) -> Background:
 
 
 def build_tracker(
-    settings: TrackerSettings, bounds: tuple[float, float] | None = None, *, explain: bool = False
+    settings: TrackerSettings,
+    bounds: tuple[float, float] | None = None,
+    *,
+    whole: bool = False,
+    explain: bool = False,
 ) -> Tracker:
-    """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height)."""
+    """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height).
+
+    whole  each box is one whole object, from a detector that tells objects apart: boxes may overlap but are
+           never shared, and their size is evidence
+    """
     return Tracker(
         model=ConstantVelocity(
             dim=2,
@@ -72,16 +81,15 @@ def build_tracker(
             hidden_s=settings.hidden_s,
             coast_scans=None,
         ),
-        groups=Groups(cover=settings.group_cover) if settings.merged_blobs else None,
+        groups=Groups(cover=settings.group_cover) if settings.merged_blobs and not whole else None,
+        shape=Shape() if whole else None,
         bounds=bounds,
         box_s=settings.box_s,
         explain=explain,
     )
 
 
-def video_steps(
-    frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings
-) -> Iterator[Step]:
+def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:
     """Each frame through detector and tracker.
 
     What the tracker expects in a frame reaches the detector before the frame is looked at: fragments are

@@ -53,7 +53,9 @@ class Run:
             if isinstance(opened, Source):
                 stack.callback(opened.close)
             shape = (opened.height, opened.width)
-            tracker = build_tracker(settings.tracker, (opened.width, opened.height), explain=decisions or rerun is not None)
+            bounds, stored = (opened.width, opened.height), isinstance(opened, Detections)
+            explain = decisions or rerun is not None
+            tracker = build_tracker(settings.tracker, bounds, whole=stored, explain=explain)
             detector = None
             if isinstance(opened, Source):
                 detector = build_detector(settings)

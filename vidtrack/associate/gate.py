@@ -23,7 +23,9 @@ class Pairs:
 
     row, measurement (N,)
     d2     (N,) squared distance the gate compares: v' S^-1 v, eq. (8), or |v|^2
-    log_s  (N,) ln|S| of the pair (zero for euclidean), so that d2 + log_s ranks pairs of different tracks
+    log_s  (N,) ln|S| of the pair (zero for euclidean)
+    cost   (N,) d2 + log_s and what attributes add: twice the negative log likelihood but for a constant,
+           so that pairs of different tracks can be ranked
     limit  (T,) the gate: largest d2 admitted in each row
     start  (T + 1,) pairs of row t are start[t]..start[t+1]
     """
@@ -32,6 +34,7 @@ class Pairs:
     measurement: Ints
     d2: Floats
     log_s: Floats
+    cost: Floats
     limit: Floats
     start: Ints
 
@@ -42,7 +45,7 @@ class Pairs:
         """The pairs of a mask (N,)."""
         row = self.row[mask]
         start = np.searchsorted(row, np.arange(len(self.limit) + 1))
-        return Pairs(row, self.measurement[mask], self.d2[mask], self.log_s[mask], self.limit, start)
+        return Pairs(row, self.measurement[mask], self.d2[mask], self.log_s[mask], self.cost[mask], self.limit, start)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +94,7 @@ class Gate:
             scan.z, scan.R, grid.order, grid.key, grid.origin, grid.cell, grid.shape,
         )  # fmt: skip
         start = np.searchsorted(row, np.arange(len(zhat) + 1))
-        return Pairs(row, measurement, d2, log_s, limit, start)
+        return Pairs(row, measurement, d2, log_s, d2 + log_s, limit, start)
 
 
 @lru_cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numba import njit
@@ -15,7 +15,12 @@ from vidtrack.scan import Decision, Floats, Ints
 
 
 class Associator(Protocol):
-    """A rule that turns gated pairs into weights."""
+    """A rule that turns gated pairs into weights.
+
+    gated_births  whether a measurement in a track's gate that no track got may start one
+    """
+
+    gated_births: ClassVar[bool]
 
     def decide(self, pairs: Pairs, rows: int, measurements: int) -> Decision:
         """Weights of the measurements for each of `rows` tracks."""
@@ -23,31 +28,39 @@ class Associator(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class NN:
-    """Nearest neighbour: each track takes its nearest measurement; two tracks may take the same one."""
+    """Nearest neighbour: each track takes its nearest measurement; two tracks may take the same one.
+
+    What lies in a gate starts no track, or each redundant measurement would.
+    """
+
+    gated_births: ClassVar[bool] = False
 
     def decide(self, pairs: Pairs, rows: int, measurements: int) -> Decision:
-        """Smallest d2 + ln|S| in each row."""
-        return one_hot(_nearest(pairs.start, pairs.measurement, pairs.d2 + pairs.log_s))
+        """Smallest cost in each row."""
+        return one_hot(_nearest(pairs.start, pairs.measurement, pairs.cost))
 
 
 @dataclass(frozen=True, slots=True)
 class GNN:
-    """Global nearest neighbour: the exclusive assignment of least summed d2 + ln|S|.
+    """Global nearest neighbour: the exclusive assignment of least summed cost, d2 + ln|S|.
 
     A track may stay without a measurement at the cost of one at the edge of its gate, the "missed-track"
     convention (SPEC 001, `gnn_nonassignment`): two bad pairs never beat one good pair and a miss.
-    ln|S| makes tracks of different certainty comparable; a miss is priced at the largest ln|S| of the
+    ln|S| makes tracks of different certainty comparable; a miss is priced with the largest ln|S| of the
     cluster, so that every gated pair beats a miss.
     """
 
+    gated_births: ClassVar[bool] = True
+
     def decide(self, pairs: Pairs, rows: int, measurements: int) -> Decision:
         """Optimal assignment, cluster by cluster."""
-        cost = pairs.d2 + pairs.log_s
         cluster = clusters(pairs.row, pairs.measurement, rows, measurements)
-        miss = pairs.limit + _largest(cluster, pairs.row, pairs.log_s)
+        miss = pairs.limit + _largest(cluster, pairs.row, pairs.cost - pairs.d2)
         finite = np.isfinite(miss)
-        miss[~finite] = 1.0 + cost.max(initial=0.0) - min(0.0, cost.min(initial=0.0))  # a gate of one: never miss
-        return one_hot(assign(pairs.start, pairs.measurement, cost, miss, measurements))
+        miss[~finite] = (
+            1.0 + pairs.cost.max(initial=0.0) - min(0.0, pairs.cost.min(initial=0.0))
+        )  # a gate of one: never miss
+        return one_hot(assign(pairs.start, pairs.measurement, pairs.cost, miss, measurements))
 
 
 def one_hot(taken: Ints) -> Decision:

@@ -138,6 +138,7 @@ def _update(
     for k in range(rows):
         t = parent[k]
         h = min(t, len(H) - 1)
+        mixed = start[k + 1] - start[k] > 1 or beta0[k] > 0.0
         for i in range(n):  # moments about the prediction
             mean[i] = 0.0
             for c in range(n):
@@ -150,8 +151,7 @@ def _update(
                 for a in range(m):
                     shift[i] += K[i, a] * (z[j, a] - zhat[t, a])
                 mean[i] += beta[b] * shift[i]
-            _add_branch(P, t, H, h, R, j, K, A, AH, shift if beta[b] < 1.0 else alone, beta[b], P1, k)
-        mixed = start[k + 1] - start[k] > 1 or beta0[k] > 0.0
+            _add_branch(P, t, H, h, R, j, K, A, AH, shift if mixed else alone, beta[b], P1, k)
         for i in range(n):
             x1[k, i] = x[t, i] + mean[i]
             if mixed:

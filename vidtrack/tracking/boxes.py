@@ -39,3 +39,19 @@ def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
             if wide > 0 and high > 0 and wide * high > share[t] * area:
                 index[t], share[t] = j, wide * high / area
     return index, share
+
+
+def longer(box: Floats) -> Floats:
+    """(N,) longer sides of boxes (N, 4)."""
+    return np.maximum(box[:, 2], box[:, 3])
+
+
+def area(box: Floats) -> Floats:
+    """(N,) areas of boxes (N, 4)."""
+    return box[:, 2] * box[:, 3]
+
+
+def widened(box: Floats, share: float) -> Floats:
+    """Boxes (N, 4) with a margin of `share` of their longer side all around."""
+    margin = share * longer(box)
+    return np.column_stack([box[:, 0] - margin, box[:, 1] - margin, box[:, 2] + 2 * margin, box[:, 3] + 2 * margin])

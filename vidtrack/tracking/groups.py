@@ -16,7 +16,7 @@ from numba import njit
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
-from vidtrack.tracking.boxes import best_cover
+from vidtrack.tracking.boxes import area, best_cover
 
 UNKNOWN = 1e8
 """Variance of a coordinate that no edge tells about."""
@@ -43,33 +43,34 @@ class Groups:
             raise ConfigError(f"group cover is {self.cover}; it must lie in 0..1")
 
     def blob_of(self, predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Floats) -> Ints:
-        """(T,) the blob each track shares or leans on by its edges; -1 for those updated by a centroid, or not at all.
+        """(T,) the blob each track shares with others or lies on without having got it; -1 for all others.
 
         predicted (T, 4) boxes, taken (T,) measurement of each track or -1, blobs (M, 4) boxes.
         """
         shared = np.full(len(predicted), -1)
-        if not len(blobs):
-            return shared
         orphans = np.flatnonzero(confirmed & (taken < 0))
-        blob, share = best_cover(predicted[orphans], blobs)
-        blob[share < self.cover] = -1
-        shared[orphans] = blob
-        hosts = confirmed & (taken >= 0) & np.isin(taken, blob[blob >= 0])
-        shared[hosts] = taken[hosts]
+        hosts = confirmed & (taken >= 0)
+        claims = np.bincount(taken[hosts], minlength=len(blobs))  # a nearest neighbour may be everybody's
+        if len(orphans) and len(blobs):
+            blob, share = best_cover(predicted[orphans], blobs)
+            blob[share < self.cover] = -1
+            shared[orphans] = blob
+            np.add.at(claims, blob[blob >= 0], 1)
+        together = np.flatnonzero(hosts)[claims[taken[hosts]] > 1]
+        shared[together] = taken[together]
         return shared
 
     def changed(self, predicted: Floats, taken: Ints, blobs: Floats) -> np.ndarray:
         """(T,) tracks whose blob has another size than the vehicle."""
         ratio = np.ones(len(predicted))
         hit = taken >= 0
-        ratio[hit] = blobs[taken[hit], 2:].prod(axis=1) / predicted[hit, 2:].prod(axis=1)
+        ratio[hit] = area(blobs[taken[hit]]) / area(predicted[hit])
         return (ratio > self.growth) | (ratio < 1 / self.growth)
 
     def explained(self, predicted: Floats, shared: Ints, blobs: Floats) -> np.ndarray:
         """(M,) blobs at least half of whose area the tracks on them account for; the others hide somebody new."""
         on = shared >= 0
-        area = np.bincount(shared[on], predicted[on, 2:].prod(axis=1), minlength=len(blobs))
-        return area >= 0.5 * blobs[:, 2:].prod(axis=1)
+        return np.bincount(shared[on], area(predicted[on]), minlength=len(blobs)) >= 0.5 * area(blobs)
 
     def measure(
         self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray

@@ -24,7 +24,7 @@ class LifeCycle:
     confirm_travel  object sizes; nor before it has moved this far (swaying trees do not travel)
     coast_s         s; a confirmed track is deleted this long after its last evidence; None: by misses only
     hidden_s        s; the same for a track inside a blob that it shares, where nothing could be seen of it
-    coast_scans     or after this many scans in a row without evidence; None: by time only
+    coast_scans     or after this many scans without evidence in a row; None: by time only
     """
 
     confirm_hits: int = 3
@@ -42,8 +42,8 @@ class LifeCycle:
             )
         if self.coast_s is None and self.coast_scans is None:
             raise ConfigError("tracks would never be deleted: give coast_s or coast_scans")
-        if self.coast_scans is not None and not 0 <= self.coast_scans < 62:
-            raise ConfigError(f"coast_scans is {self.coast_scans}; it must lie in 0..61")
+        if self.coast_scans is not None and not 1 <= self.coast_scans <= 62:
+            raise ConfigError(f"coast_scans is {self.coast_scans}; it must lie in 1..62")
 
     def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
         """(T,) tentative rows that now deserve belief. xy (T, d) positions, size (T,) of the objects."""
@@ -65,7 +65,7 @@ class LifeCycle:
             patience = np.where(register.status == Status.MERGED, self.hidden_s, self.coast_s)
             gone |= t - register.updated_s > np.maximum(patience, self.coast_s)
         if self.coast_scans is not None:
-            gone |= register.history & ((1 << (self.coast_scans + 1)) - 1) == 0
+            gone |= register.history & ((1 << self.coast_scans) - 1) == 0
         return (register.status != Status.TENTATIVE) & gone
 
     def _hits(self, register: Register) -> np.ndarray:

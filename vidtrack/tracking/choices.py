@@ -1,0 +1,36 @@
+"""What a scan decided, in the tracks' own order: for the snapshot and for `--decisions`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.associate.gate import Pairs
+from vidtrack.scan import Choices, Decision, Floats, Ints
+
+
+def heaviest(decision: Decision) -> Ints:
+    """(K,) measurement of the largest weight in each row, -1 for none."""
+    best = np.full(len(decision.parent), -1)
+    order = np.argsort(decision.beta, kind="stable")
+    best[decision.row[order]] = decision.measurement[order]
+    return best
+
+
+def innovations(pairs: Pairs, taken: Ints) -> Floats:
+    """(T,) normalised innovation squared of the chosen pairs, NaN without one."""
+    nis = np.full(len(taken), np.nan)
+    chosen = pairs.measurement == taken[pairs.row]
+    nis[pairs.row[chosen]] = pairs.d2[chosen]
+    return nis
+
+
+def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices:
+    """Who was chosen, how far it was, and who came second."""
+    rows = len(ids)
+    weight, runner, runner_d2 = np.zeros(rows), np.full(rows, -1), np.full(rows, np.nan)
+    np.maximum.at(weight, decision.row, decision.beta)
+    others = np.flatnonzero(pairs.measurement != taken[pairs.row])
+    order = others[np.argsort(-pairs.d2[others], kind="stable")]
+    runner[pairs.row[order]] = pairs.measurement[order]
+    runner_d2[pairs.row[order]] = pairs.d2[order]
+    return Choices(ids.copy(), taken.copy(), weight, innovations(pairs, taken), pairs.limit.copy(), runner, runner_d2)

@@ -1,0 +1,93 @@
+"""The book of shared blobs: who lives on which, since when, and the update by edges that follows from it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.sensor import POSITION
+from vidtrack.scan import Decision, Event, Floats, Ints, Scan
+from vidtrack.tracking.border import Border
+from vidtrack.tracking.boxes import absolute
+from vidtrack.tracking.groups import Groups
+from vidtrack.tracking.register import Register
+
+ADULT = 5
+"""Updates after which a track's box is believed."""
+SLOW = 5.0
+"""A box follows a blob of another size this many times more slowly than its own."""
+
+Mask = np.ndarray
+
+
+class Sharing:
+    """Keeps tracks on the blobs they share. All blobs are (M, 4) boxes in the picture."""
+
+    def __init__(self, groups: Groups, border: Border, box_s: float) -> None:
+        self._groups = groups
+        self._border = border
+        self._box_s = box_s
+        self._made = 0
+
+    def claim(self, predicted: Floats, hits: Ints, taken: Ints, confirmed: Mask, blobs: Floats) -> tuple[Ints, Mask]:
+        """Which tracks lean on a blob by its edges, and which blobs nobody accounts for.
+
+        predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
+        Returns (T,) the blob or -1, and (M,) blobs that may belong to somebody new.
+        """
+        shared = self._groups.blob_of(predicted, taken, confirmed, blobs)
+        whole = confirmed & (hits > ADULT) & (shared < 0) & ~self._border.cut(predicted)
+        changed = whole & self._groups.changed(predicted, taken, blobs)
+        shared[changed] = taken[changed]
+        free = ~self._groups.explained(predicted, shared, blobs)
+        free[taken[(taken >= 0) & (shared < 0)]] = False
+        return shared, free
+
+    def follow(self, shared: Ints, bank: KalmanBank, register: Register, blobs: Floats, t: float, dt: float) -> None:
+        """Update the tracks that lean on blobs by the edges they can claim."""
+        rows = np.flatnonzero(shared >= 0)
+        if not len(rows):
+            return
+        position, velocity = list(bank.model.position), list(bank.model.velocity)
+        box, on = register.box[rows], shared[rows]
+        predicted = absolute(box, bank.x[rows][:, position])
+        before = predicted - np.pad(dt * bank.x[rows][:, velocity], ((0, 0), (0, 2)))
+        var = np.diagonal(bank.P[rows], axis1=1, axis2=2)[:, position]
+        cut = self._border.sides(blobs)
+        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut)
+
+        beta0 = np.ones(len(shared))
+        beta0[rows] = 0.0
+        edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
+        bank.update(edges, Scan(t, z, R[:, :, None] * np.eye(2)), POSITION)
+        register.history[rows[own > 0]] |= 1
+        register.updated_s[rows[own > 0]] = t
+
+        # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
+        xy = np.pad(bank.x[rows][:, position], ((0, 0), (0, 2)))
+        box = self._border.reaching(box + xy, self._border.sides(before) & cut[on]) - xy
+        alone = np.bincount(on)[on] == 1  # if its blob stays as it is, the vehicle is so
+        box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (blobs[on[alone]] - xy[alone] - box[alone])
+        register.box[rows] = box
+
+    def regroup(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
+        """A group keeps its number and its start for as long as any of its members stay together."""
+        if not ((shared >= 0).any() or (register.group >= 0).any()):
+            return
+        group = np.full(len(shared), -1)
+        blobs, count = np.unique(shared[shared >= 0], return_counts=True)
+        for blob in blobs[count > 1]:
+            members = np.flatnonzero(shared == blob)
+            number = register.group[members].max()
+            if number < 0 or (group == number).any():
+                number = self._made
+                self._made += 1
+            group[members] = number
+            joined = members[register.group[members] != number]
+            register.group_since_s[joined] = t
+            reason = f"tracks {', '.join(str(i) for i in register.id[members])} share one blob"
+            events.extend(Event(t, int(track), "merge", reason) for track in register.id[joined])
+        alone = np.flatnonzero((group < 0) & (register.group >= 0))
+        register.group_since_s[alone] = np.nan
+        events.extend(Event(t, int(track), "split", "alone on its blob again") for track in register.id[alone])
+        register.group = group
