@@ -14,7 +14,7 @@ from vidtrack.associate.shape import Shape
 from vidtrack.config import Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Scan, Status, Tracks
+from vidtrack.scan import Scan, Status, Tracks
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
@@ -93,15 +93,17 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
     """Each frame through detector and tracker.
 
     What the tracker expects in a frame reaches the detector before the frame is looked at: fragments are
-    joined inside a predicted box, and known vehicles are kept out of the scene.
+    joined inside a predicted box, and vehicles that drove here are kept out of the scene.
     """
     ended = perf_counter()
     for frame in frames:
         clock = [ended, perf_counter()]
-        known = expected_boxes(tracker, frame.time_s)
-        foreground = detector.apply(frame, known)
+        expected = tracker.predict(frame.time_s)
+        vehicles = expected.box[expected.status != Status.TENTATIVE]
+        driven = expected.box[has_driven(expected)]
+        foreground = detector.apply(frame, driven)
         clock.append(perf_counter())
-        blobs = join_fragments(find_blobs(foreground, settings.blobs), known)
+        blobs = join_fragments(find_blobs(foreground, settings.blobs), vehicles)
         scan = blobs.scan(frame.time_s)
         clock.append(perf_counter())
         tracks = tracker.step(scan)
@@ -121,7 +123,8 @@ def detection_steps(detections: Iterable[tuple[int, float, Scan]], tracker: Trac
         ended = perf_counter()
 
 
-def expected_boxes(tracker: Tracker, time_s: float) -> Floats:
-    """(K, 4) boxes of the confirmed tracks as predicted for `time_s`."""
-    expected = tracker.predict(time_s)
-    return expected.box[(expected.status != Status.TENTATIVE) & np.isfinite(expected.box).all(axis=1)]
+def has_driven(tracks: Tracks) -> np.ndarray:
+    """(T,) confirmed tracks that have come farther than their own size: what a vehicle leaves behind in the scene
+    never does, and is not to be protected from being forgotten."""
+    size = np.maximum(tracks.box[:, 2], tracks.box[:, 3])
+    return (tracks.status != Status.TENTATIVE) & (tracks.travel > size)

@@ -186,6 +186,7 @@ class Tracks:
     group          (T,) tracks that share one blob have the same number >= 0; -1 alone
     group_since_s  (T,) time the group was formed; NaN alone
     age_s          (T,) seconds since the track's first measurement
+    travel         (T,) distance from where the track began
     existence      (T,) probability that the track is a target
     measurement    (T,) index of the heaviest measurement of this scan; -1 for none
     nis            (T,) normalised innovation squared of this update; NaN for none
@@ -201,6 +202,7 @@ class Tracks:
     group: Ints
     group_since_s: Floats
     age_s: Floats
+    travel: Floats
     existence: Floats
     measurement: Ints
     nis: Floats

@@ -28,7 +28,8 @@ class Groups:
 
     cover  share of a track's predicted box that a blob must cover to carry it
     edge   standard deviation of a blob's edge, as a share of the member's box side
-    gate   standard deviations within which an edge is accepted as the member's
+    gate   standard deviations within which an edge is accepted as the member's; a third of it where the blob
+           hides somebody whose edge it may be
     growth a blob whose area is more than this many times the predicted box, or less than the inverse,
            is not the vehicle alone or not all of it
     """
@@ -73,20 +74,21 @@ class Groups:
         return np.bincount(shared[on], area(predicted[on]), minlength=len(blobs)) >= 0.5 * area(blobs)
 
     def measure(
-        self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray
+        self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, hides: np.ndarray
     ) -> tuple[Floats, Floats, Ints]:
         """Position (G, 2), variances (G, 2) and count of own edges (G,) for tracks on blobs.
 
         predicted (G, 4) boxes, box (G, 4) relative to the position, var (G, 2) predicted position variances,
         blob (G,) index of each track's blob, blobs (M, 4), cut (M, 4) sides of blobs that are the picture's
-        border and no edge of a vehicle.
+        border and no edge of a vehicle, hides (M,) blobs that the tracks on them do not account for.
         """
-        return _from_edges(predicted, box, var, blob, blobs, cut, self.edge, self.gate)
+        gate = np.where(hides, self.gate / 3, self.gate)
+        return _from_edges(predicted, box, var, blob, blobs, cut, gate, self.edge)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _from_edges(
-    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, edge: float, gate: float
+    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, gate: Floats, edge: float
 ) -> tuple[Floats, Floats, Ints]:
     """Each member's position from the four edges of its blob.
 
@@ -113,7 +115,7 @@ def _from_edges(
                         rival = min(rival, sign * (other - mine))
                 seen = blobs[blob[i], axis] + far * blobs[blob[i], 2 + axis]
                 offset = mine - extreme
-                if abs(seen - extreme) > gate * np.sqrt(noise + var[i, axis]):
+                if abs(seen - extreme) > gate[blob[i]] * np.sqrt(noise + var[i, axis]):
                     continue
                 variance = noise + offset * offset
                 total += (seen + offset - far * box[i, 2 + axis] - box[i, axis]) / variance

@@ -30,21 +30,21 @@ class Sharing:
         self._made = 0
 
     def claim(self, predicted: Floats, hits: Ints, taken: Ints, confirmed: Mask, blobs: Floats) -> tuple[Ints, Mask]:
-        """Which tracks lean on a blob by its edges, and which blobs nobody accounts for.
+        """Which tracks lean on a blob by its edges, and which blobs the tracks on them do not account for.
 
         predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
-        Returns (T,) the blob or -1, and (M,) blobs that may belong to somebody new.
+        Returns (T,) the blob or -1, and (M,) blobs that may hide somebody new.
         """
         shared = self._groups.blob_of(predicted, taken, confirmed, blobs)
         whole = confirmed & (hits > ADULT) & (shared < 0) & ~self._border.cut(predicted)
         changed = whole & self._groups.changed(predicted, taken, blobs)
         shared[changed] = taken[changed]
-        free = ~self._groups.explained(predicted, shared, blobs)
-        free[taken[(taken >= 0) & (shared < 0)]] = False
-        return shared, free
+        return shared, ~self._groups.explained(predicted, shared, blobs)
 
-    def follow(self, shared: Ints, bank: KalmanBank, register: Register, blobs: Floats, t: float, dt: float) -> None:
-        """Update the tracks that lean on blobs by the edges they can claim."""
+    def follow(
+        self, shared: Ints, hides: Mask, bank: KalmanBank, register: Register, blobs: Floats, t: float, dt: float
+    ) -> None:
+        """Update the tracks that lean on blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
         rows = np.flatnonzero(shared >= 0)
         if not len(rows):
             return
@@ -54,7 +54,7 @@ class Sharing:
         before = predicted - np.pad(dt * bank.x[rows][:, velocity], ((0, 0), (0, 2)))
         var = np.diagonal(bank.P[rows], axis1=1, axis2=2)[:, position]
         cut = self._border.sides(blobs)
-        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut)
+        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
 
         beta0 = np.ones(len(shared))
         beta0[rows] = 0.0
@@ -66,7 +66,7 @@ class Sharing:
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
         xy = np.pad(bank.x[rows][:, position], ((0, 0), (0, 2)))
         box = self._border.reaching(box + xy, self._border.sides(before) & cut[on]) - xy
-        alone = np.bincount(on)[on] == 1  # if its blob stays as it is, the vehicle is so
+        alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (blobs[on[alone]] - xy[alone] - box[alone])
         register.box[rows] = box
 

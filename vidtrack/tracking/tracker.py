@@ -90,8 +90,10 @@ class Tracker:
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
         pairs = self._gated(scan, sensor, blobs)
-        decision, shared, free = self._associated(pairs, len(scan), blobs)
-        self._update(decision, shared, scan, sensor, blobs, dt)
+        decision, shared, hides, free = self._associated(pairs, len(scan), blobs)
+        self._update(decision, scan, sensor, blobs, dt)
+        if self.sharing and blobs is not None:
+            self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
         taken = heaviest(decision)
         nis = innovations(pairs, taken)
         why = choices(self.register.id, pairs, decision, taken) if self.explain else None
@@ -147,31 +149,30 @@ class Tracker:
             return pairs
         return self.shape.weigh(pairs, self._boxes(), blobs)
 
-    def _associated(self, pairs: Pairs, count: int, blobs: Floats | None) -> tuple[Decision, Ints, Mask]:
+    def _associated(self, pairs: Pairs, count: int, blobs: Floats | None) -> tuple[Decision, Ints, Mask, Mask]:
         """Confirmed tracks choose first, then those on shared blobs claim them, then tentative tracks choose.
 
-        Returns the decision, the blob (T,) that each row leans on by its edges (-1: none), and the
-        measurements (M,) that may start a track.
+        Returns the decision, the blob (T,) that each row leans on by its edges (-1: none), the blobs (M,)
+        that hide more than their tracks account for, and the measurements (M,) that may start a track.
         """
         rows = len(self.register)
         confirmed = self.register.status != Status.TENTATIVE
         first = self.associate.decide(pairs.only(confirmed[pairs.row]), rows, count)
-        shared, free = np.full(rows, -1), np.ones(count, bool)
+        shared, hides = np.full(rows, -1), np.ones(count, bool)
         if self.sharing and blobs is not None:
-            shared, free = self.sharing.claim(self._boxes(), self.bank.hits, heaviest(first), confirmed, blobs)
+            shared, hides = self.sharing.claim(self._boxes(), self.bank.hits, heaviest(first), confirmed, blobs)
             first = first.without(shared >= 0)
+        free = hides.copy()
         free[first.measurement] = False
         open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
         second = self.associate.decide(pairs.only(open_to_all), rows, count)
         free[second.measurement] = False
         if not self.associate.gated_births:
             free[pairs.measurement] = False
-        return first.joined(second), shared, free
+        return first.joined(second), shared, hides, free
 
-    def _update(
-        self, decision: Decision, shared: Ints, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float
-    ) -> None:
-        """States by centroids or, on shared blobs, by edges; boxes follow."""
+    def _update(self, decision: Decision, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float) -> None:
+        """States by their measurements, boxes by theirs."""
         register = self.register
         self.bank.update(decision, scan, sensor)
         hit = decision.beta0 < 0.5
@@ -187,8 +188,6 @@ class Tracker:
         register.box[rows] = np.where(follow[:, None] == 1.0, new, old + follow[:, None] * (new - old))
         if self.model.per_size:
             self.bank.scale[rows] = longer(register.box[rows])
-        if self.sharing:
-            self.sharing.follow(shared, self.bank, register, blobs, scan.t, dt)
 
     def _believe(self, pairs: Pairs, taken: Ints, shared: Ints) -> None:
         """Existence probability: Bayes with the likelihood ratio of the hit or the miss."""
@@ -280,6 +279,7 @@ class Tracker:
             group=register.group.copy(),
             group_since_s=register.group_since_s.copy(),
             age_s=t - register.born_s,
+            travel=np.linalg.norm(x[:, self.model.position] - register.start, axis=1),
             existence=register.existence.copy(),
             measurement=taken,
             nis=nis,

@@ -118,8 +118,9 @@ def _bars(ax: Axes, share: dict[Way, dict[str, float]]) -> None:
 def _verdict(share: dict[Way, dict[str, float]], seeds: range, shown: int, told: dict[Way, str]) -> str:
     fail = {way: f"{1 - one['correct']:.3g}" for way, one in share.items()}
     return (
-        f"seed {seeds[shown]}: {told[NEAR]} by minimum distance, {told[REGION]} by confidence region (the paper: swap, "
-        f"correct); the share of {len(seeds)} videos in which an identity fails (gnn) is {fail[NEAR_UNSHARED]} and "
-        f"{fail[REGION_UNSHARED]} if the shared blob measures neither vehicle, but {fail[NEAR]} and {fail[REGION]} "
-        f"if it is taken for one of them, and {fail[DEFAULT]} by default, where merged blobs are recognised."
+        f"seed {seeds[shown]}, the one most like the paper: {told[NEAR]} by minimum distance, {told[REGION]} by "
+        f"confidence region (the paper: swap, correct); the share of {len(seeds)} videos in which an identity fails "
+        f"(gnn) is {fail[NEAR_UNSHARED]} and {fail[REGION_UNSHARED]} if the shared blob measures neither vehicle, but "
+        f"{fail[NEAR]} and {fail[REGION]} if it is taken for one of them, and {fail[DEFAULT]} by default, where merged "
+        f"blobs are recognised."
     )
