@@ -36,7 +36,7 @@ def junction(rng: Generator) -> Scene:
     while True:
         targets = (*_vehicles(rng), *_people(rng))
         if _can_be_followed(targets):
-            return Scene(SIZE, FPS, DURATION_S, _ground(), targets, _tree(rng), sun=(0.42, 0.3))
+            return Scene(SIZE, FPS, DURATION_S, _ground(), targets, _tree(rng), sun=(0.28, 0.2))
 
 
 def _vehicles(rng: Generator) -> list[Actor]:

@@ -28,7 +28,7 @@ class Groups:
 
     cover  share of a track's predicted box that a blob must cover to carry it
     edge   standard deviation of a blob's edge, as a share of the member's box side
-    gate   standard deviations within which an edge is accepted as the member's; a third of it where the blob
+    gate   standard deviations within which an edge is accepted as the member's; half of it where the blob
            hides somebody whose edge it may be
     growth a blob whose area is more than this many times the predicted box, or less than the inverse,
            is not the vehicle alone or not all of it
@@ -36,7 +36,7 @@ class Groups:
 
     cover: float = 0.5
     edge: float = 0.1
-    gate: float = 3.0
+    gate: float = 2.0
     growth: float = 2.5
 
     def __post_init__(self) -> None:
@@ -82,7 +82,7 @@ class Groups:
         blob (G,) index of each track's blob, blobs (M, 4), cut (M, 4) sides of blobs that are the picture's
         border and no edge of a vehicle, hides (M,) blobs that the tracks on them do not account for.
         """
-        gate = np.where(hides, self.gate / 3, self.gate)
+        gate = np.where(hides, self.gate / 2, self.gate)
         return _from_edges(predicted, box, var, blob, blobs, cut, gate, self.edge)
 
 
