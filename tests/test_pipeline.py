@@ -9,7 +9,7 @@ from command_line import SAMPLES
 from vidtrack import formats, score
 from vidtrack.config import Settings, TrackerSettings, load
 from vidtrack.errors import ConfigError, SourceError
-from vidtrack.pipeline import build_detector, build_tracker, expected_boxes, track, video_steps
+from vidtrack.pipeline import build_detector, build_tracker, has_driven, track, video_steps
 from vidtrack.run import Run
 from vidtrack.scan import Scan, Status
 from vidtrack.video.source import open_source
@@ -46,7 +46,7 @@ def test_the_crossing_vehicles_keep_their_identities(tmp_path):
     scores = score.evaluate(formats.read(tmp_path / "out"), formats.read(SAMPLES / "crossing.txt"), iou=0.3)
     assert scores["switches"] == 0
     assert scores["tracks"] == scores["truth_tracks"] == 2
-    assert scores["idf1"] > 0.95
+    assert scores["idf1"] > 0.9
 
 
 def test_steps_carry_everything_about_a_frame():
@@ -81,16 +81,16 @@ def test_a_mask_that_is_no_picture_is_refused(tmp_path):
         build_detector(load(assignments=[("source.mask", tmp_path / "mask.png")]))
 
 
-def test_only_tracks_that_are_believed_reach_the_detector():
+def test_only_vehicles_that_drove_protect_the_scene():
+    """A confirmed track three times its size from where it began has driven; what a car left behind has not."""
     tracker = build_tracker(TrackerSettings(), (320, 240))
-    box = np.array([[-10.0, -5.0, 20.0, 10.0]])
-    for k in range(12):
-        known = expected_boxes(tracker, 0.04 * k)
-        z = np.array([[50.0 + 4 * k, 80.0]])
-        assert len(known) == 0 if k < 4 else True
-        tracks = tracker.step(Scan(0.04 * k, z, np.eye(2), box=box))
-    assert tracks.status.tolist() == [Status.CONFIRMED]
-    np.testing.assert_allclose(expected_boxes(tracker, 0.04 * 12), [[88.0, 75.0, 20.0, 10.0]], atol=2)
+    box = np.tile([-10.0, -5.0, 20.0, 10.0], (2, 1))
+    driven = []
+    for k in range(20):
+        z = np.array([[50.0 + 4 * k, 80.0], [200.0 + 8 * (k > 0), 150.0]])
+        driven.append(has_driven(tracker.step(Scan(0.04 * k, z, np.eye(2), box=box))).tolist())
+    assert driven[14] == [False, False]
+    assert driven[-1] == [True, False]
 
 
 @pytest.mark.parametrize("method", ["nn", "gnn"])
@@ -102,4 +102,4 @@ def test_settings_reach_the_tracker(method, distance):
     tracker = build_tracker(settings.tracker)
     assert type(tracker.associate).__name__.lower() == method
     assert tracker.gate.distance == distance
-    assert tracker.groups is None
+    assert tracker.sharing is None

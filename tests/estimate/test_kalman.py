@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from vidtrack.estimate.kalman import KalmanBank, _propagate, _update
+from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.kernels import mixture_update, propagation
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Decision, Scan
@@ -139,6 +140,9 @@ def test_steady_state_gains_are_those_of_kalata(accel, sigma, T):
     np.testing.assert_allclose(gain, [alpha, beta / T], rtol=1e-9)
 
 
+PROPAGATE, UPDATE = propagation(4), mixture_update(2, 4)
+
+
 @njit
 def _many_steps(x, P, F, Q, H, z, R, steps):
     """Predict and update with the bank's own kernels; returns the smallest 2 x 2 minors seen on the way."""
@@ -146,8 +150,8 @@ def _many_steps(x, P, F, Q, H, z, R, steps):
     start, nobody, beta = np.arange(len(x) + 1), np.zeros(len(x)), np.ones(len(x))
     worst = np.inf
     for k in range(steps):
-        x, P = _propagate(x, P, F, Q)
-        x, P = _update(x, P, H, x[:, ::2].copy(), z, R, rows, start, (rows + k) % count, beta, nobody)
+        x, P = PROPAGATE(x, P, F, Q)
+        x, P = UPDATE(x, P, H, x[:, ::2].copy(), z, R, rows, start, (rows + k) % count, beta, nobody)
         for t in range(len(x)):
             worst = min(worst, P[t, 0, 0] * P[t, 1, 1] - P[t, 0, 1] * P[t, 1, 0])
     return x, P, worst

@@ -127,6 +127,7 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
         step = make_step(index, [(1, "c", x, 50), (2, "t", 5, 5)])
         counter.step(step.index, step.tracks)
         summary.step(step)
+    summary.interrupted = False
     summary.close()
     late = json.loads((tmp_path / "summary.json").read_text())
     assert (early["interrupted"], late["interrupted"]) == (True, False)
@@ -142,7 +143,6 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
 
 def test_a_stopped_run_says_so(tmp_path):
     summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING)
-    summary.interrupted = True
     summary.close()
     assert json.loads((tmp_path / "summary.json").read_text())["interrupted"] is True
 

@@ -128,8 +128,9 @@ def test_one_shared_blob_is_two_deaths_and_a_birth_without_groups():
 
 
 def measure(predicted, relative, var, on, blobs):
-    """Positions by the edges of blobs that no border cuts."""
-    return Groups().measure(predicted, relative, var, on, blobs, np.zeros((len(blobs), 4), bool))
+    """Positions by the edges of blobs that no border cuts and that hide nobody."""
+    whole, nobody = np.zeros((len(blobs), 4), bool), np.zeros(len(blobs), bool)
+    return Groups().measure(predicted, relative, var, on, blobs, whole, nobody)
 
 
 numbers = st.floats(-1e4, 1e4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -14,7 +15,8 @@ from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints, Scan
 
 Distance = Literal["mahalanobis", "decoupled", "euclidean"]
-_MODES = {"mahalanobis": 0, "decoupled": 1, "euclidean": 2}
+FULL, DECOUPLED, EUCLIDEAN = range(3)
+_MODES = {"mahalanobis": FULL, "decoupled": DECOUPLED, "euclidean": EUCLIDEAN}
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +91,8 @@ class Gate:
         own = np.zeros(len(zhat), np.int64) if run is None else run
         reach = _reach(cov, scan.R, limit, mode)
         grid = Grid.over(scan.z[:, :2], runs, reach)
-        row, measurement, d2, log_s = _gated(
-            zhat, cov, own, reach, limit, mode,
+        row, measurement, d2, log_s = _gated(zhat.shape[1], mode)(
+            zhat, cov, own, reach, limit,
             scan.z, scan.R, grid.order, grid.key, grid.origin, grid.cell, grid.shape,
         )  # fmt: skip
         start = np.searchsorted(row, np.arange(len(zhat) + 1))
@@ -104,14 +106,13 @@ def _quantile(probability: float, dim: int) -> float:
 
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
     """(T, 2) half sides of the box around each gate, on the first two axes."""
-    if mode == 2:
+    if mode == EUCLIDEAN:
         return np.repeat(np.sqrt(limit)[:, None], 2, axis=1)
     axes = min(2, cov.shape[1])
-    variance = np.diagonal(cov, axis1=1, axis2=2)[:, :axes]
-    widest = np.diagonal(R, axis1=1, axis2=2)[:, :axes].max(axis=0, initial=0.0)
+    widest = [R[:, a, a].max(initial=0.0) for a in range(axes)]
     with np.errstate(invalid="ignore"):  # a gate of one is infinite; of zero, empty
-        reach = np.sqrt(limit[:, None] * (variance + widest))
-    return np.broadcast_to(reach, (len(cov), 2)) if axes == 1 else reach
+        sides = [np.sqrt(limit * (cov[:, a, a] + widest[a])) for a in range(axes)]
+    return np.stack([sides[0], sides[-1]], axis=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +129,23 @@ class Grid:
     def over(cls, z: Floats, run: Ints, reach: Floats) -> Grid:
         """z (M, 1 or 2) points; the cell follows the mean gate, bounded to about one point a cell."""
         z = z if z.shape[1] == 2 else np.column_stack([z[:, 0], np.zeros(len(z))])
-        origin, extent = (z.min(axis=0), np.ptp(z, axis=0)) if len(z) else (np.zeros(2), np.zeros(2))
+        origin, extent = _extent(z)
         most = max(1.0, np.ceil(np.sqrt(len(z))) * 2)
         cell = np.maximum(np.maximum(_typical(reach), extent / most), 1e-9)
         shape = (extent / cell).astype(np.int64) + 1
         key = _keys(z, run, origin, cell, shape)
         order = np.argsort(key, kind="stable")
         return cls(order, key[order], origin, cell, shape)
+
+
+@njit(cache=True, nogil=True)
+def _extent(z: Floats) -> tuple[Floats, Floats]:
+    """Least coordinates (2,) of points (M, 2), and how far the others reach beyond."""
+    low, high = np.zeros(2), np.zeros(2)
+    for a in range(2):
+        if len(z):
+            low[a], high[a] = z[:, a].min(), z[:, a].max()
+    return low, high - low
 
 
 @njit(cache=True, nogil=True)
@@ -159,82 +170,76 @@ def _keys(z: Floats, run: Ints, origin: Floats, cell: Floats, shape: Ints) -> In
     return key
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _gated(
-    zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats, mode: int,
-    z: Floats, R: Floats, order: Ints, key: Ints, origin: Floats, cell: Floats, shape: Ints,
-) -> tuple[Ints, Ints, Floats, Floats]:  # fmt: skip
-    """Pairs inside the gate, found cell row by cell row, each track's measurements in ascending order."""
-    rows, m = zhat.shape
-    size = 4 * rows + 16
-    row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
-    d2, log_s = np.empty(size), np.empty(size)
-    n = 0
-    L, v = np.empty((m, m)), np.empty(m)
-    low, high = np.empty(2, np.int64), np.empty(2, np.int64)
-    for t in range(rows):
-        first = n
-        outside = len(key) == 0 or limit[t] == 0.0
-        for a in range(2):
-            at = zhat[t, a] if a < m else 0.0
-            below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
-            above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
-            outside |= not (below < shape[a] and above >= 0)
-            low[a] = max(0.0, min(below, shape[a] - 1.0))
-            high[a] = max(0.0, min(above, shape[a] - 1.0))
-        if outside:
-            continue
-        for line in range(low[1], high[1] + 1):
-            base = (own[t] * shape[1] + line) * shape[0]
-            at = np.searchsorted(key, base + low[0])
-            while at < len(key) and key[at] <= base + high[0]:
-                j = order[at]
-                at += 1
-                distance, log_det = _distance(zhat, cov, t, z, R, j, v, L, mode)
-                if not distance <= limit[t]:
-                    continue
-                if n == size:
-                    size *= 2
-                    row, measurement = _grown(row, size), _grown(measurement, size)
-                    d2, log_s = _grown(d2, size), _grown(log_s, size)
-                row[n], measurement[n], d2[n], log_s[n] = t, j, distance, log_det
-                n += 1
-        for k in range(first + 1, n):  # the grid's order depends on the cell size; results must not
-            while k > first and measurement[k - 1] > measurement[k]:
-                measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
-                d2[k - 1], d2[k] = d2[k], d2[k - 1]
-                log_s[k - 1], log_s[k] = log_s[k], log_s[k - 1]
-                k -= 1
-    return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), log_s[:n].copy()
+@lru_cache
+def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats]]:
+    """The kernel that finds the pairs inside the gate, cell row by cell row; m and mode are constants of it.
 
+    Each track's measurements come in ascending order.
+    """
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _distance(
-    zhat: Floats, cov: Floats, t: int, z: Floats, R: Floats, j: int, v: Floats, L: Floats, mode: int
-) -> tuple[float, float]:
-    """Squared distance of measurement j from row t and ln|S|, S = cov + R, by Cholesky; v and L are scratch."""
-    m = len(v)
-    total, det = 0.0, 1.0
-    for a in range(m):
-        v[a] = z[j, a] - zhat[t, a]
-        if mode == 2:
-            total += v[a] * v[a]
-    if mode == 2:
-        return total, 0.0
-    for a in range(m):
-        for b in range(a + 1):
-            entry = cov[t, a, b] + R[j, a, b]
-            if mode == 1 and a != b:
-                entry = 0.0
-            for c in range(b):
-                entry -= L[a, c] * L[b, c]
-            L[a, b] = np.sqrt(entry) if a == b else entry / L[b, b]
-        for c in range(a):
-            v[a] -= L[a, c] * v[c]
-        v[a] /= L[a, a]
-        total += v[a] * v[a]
-        det *= L[a, a]
-    return total, 2.0 * np.log(det)
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def gated(
+        zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats,
+        z: Floats, R: Floats, order: Ints, key: Ints, origin: Floats, cell: Floats, shape: Ints,
+    ) -> tuple[Ints, Ints, Floats, Floats]:  # fmt: skip
+        rows = len(zhat)
+        size = 4 * rows + 16
+        row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
+        d2, log_s = np.empty(size), np.empty(size)
+        n = 0
+        L, v = np.empty((m, m)), np.empty(m)
+        low, high = np.empty(2, np.int64), np.empty(2, np.int64)
+        for t in range(rows):
+            first = n
+            outside = len(key) == 0 or limit[t] == 0.0
+            for a in range(2):
+                at = zhat[t, a] if a < m else 0.0
+                below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
+                above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
+                outside |= not (below < shape[a] and above >= 0)
+                low[a] = max(0.0, min(below, shape[a] - 1.0))
+                high[a] = max(0.0, min(above, shape[a] - 1.0))
+            if outside:
+                continue
+            for line in range(low[1], high[1] + 1):
+                base = (own[t] * shape[1] + line) * shape[0]
+                at_key = np.searchsorted(key, base + low[0])
+                while at_key < len(key) and key[at_key] <= base + high[0]:
+                    j = order[at_key]
+                    at_key += 1
+                    distance, det = 0.0, 1.0
+                    for a in range(m):
+                        v[a] = z[j, a] - zhat[t, a]
+                        if mode == EUCLIDEAN:
+                            distance += v[a] * v[a]
+                            continue
+                        for b in range(a + 1):  # S = L L' and L^-1 v, row by row
+                            entry = 0.0 if mode == DECOUPLED and a != b else cov[t, a, b] + R[j, a, b]
+                            for c in range(b):
+                                entry -= L[a, c] * L[b, c]
+                            L[a, b] = np.sqrt(entry) if a == b else entry / L[b, b]
+                        for c in range(a):
+                            v[a] -= L[a, c] * v[c]
+                        v[a] /= L[a, a]
+                        distance += v[a] * v[a]
+                        det *= L[a, a]
+                    if not distance <= limit[t]:
+                        continue
+                    if n == size:
+                        size *= 2
+                        row, measurement = _grown(row, size), _grown(measurement, size)
+                        d2, log_s = _grown(d2, size), _grown(log_s, size)
+                    row[n], measurement[n], d2[n], log_s[n] = t, j, distance, 2.0 * np.log(det)
+                    n += 1
+            for k in range(first + 1, n):  # the grid's order depends on the cell size; results must not
+                while k > first and measurement[k - 1] > measurement[k]:
+                    measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
+                    d2[k - 1], d2[k] = d2[k], d2[k - 1]
+                    log_s[k - 1], log_s[k] = log_s[k], log_s[k - 1]
+                    k -= 1
+        return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), log_s[:n].copy()
+
+    return gated
 
 
 @njit(cache=True, nogil=True)

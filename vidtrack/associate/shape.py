@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from scipy.stats import chi2
 
 from vidtrack.associate.gate import Pairs
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +37,26 @@ class Shape:
         |ln(w h ratios)|^2 / sigma^2 together are below the gate plus the size's own chi-square quantile,
         and if the boxes overlap in both axes: nothing jumps clear of its own prediction.
         """
-        mine, theirs = predicted[pairs.row], boxes[pairs.measurement]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            off = np.log(theirs[:, 2:] / mine[:, 2:]) / self.sigma
-        size2 = np.nan_to_num((off * off).sum(axis=1), nan=0.0)
-        low = np.maximum(mine[:, :2], theirs[:, :2])
-        high = np.minimum(mine[:, :2] + mine[:, 2:], theirs[:, :2] + theirs[:, 2:])
-        touching = (high > low).all(axis=1) | np.isnan(mine[:, 0])
-        limit = pairs.limit[pairs.row] + chi2.ppf(self.probability, 2)
-        return replace(pairs, cost=pairs.cost + size2).only((pairs.d2 + size2 <= limit) & touching)
+        most = pairs.limit + float(chi2.ppf(self.probability, 2))
+        size2, stays = _compare(pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma)
+        return replace(pairs, cost=pairs.cost + size2).only(stays)
+
+
+@njit(cache=True, nogil=True)
+def _compare(
+    row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats, sigma: float
+) -> tuple[Floats, np.ndarray]:
+    """(N,) the pairs' size distances, and which of them stay; a track without a box yet takes any size."""
+    size2, stays = np.zeros(len(row)), np.ones(len(row), np.bool_)
+    for k in range(len(row)):
+        mine, theirs = predicted[row[k]], boxes[measurement[k]]
+        if np.isnan(mine[0]):
+            continue
+        touching = True
+        for axis in range(2):
+            near = max(mine[axis], theirs[axis])
+            far = min(mine[axis] + mine[axis + 2], theirs[axis] + theirs[axis + 2])
+            touching &= far > near
+            size2[k] += (np.log(theirs[axis + 2] / mine[axis + 2]) / sigma) ** 2
+        stays[k] = touching and d2[k] + size2[k] <= most[row[k]]
+    return size2, stays

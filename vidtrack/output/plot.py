@@ -43,12 +43,14 @@ class TrajectoryPlot:
         # Colour times opacity, and opacity: anti-aliased strokes then blend exactly.
         self._layer = np.zeros((shape[0] * self._zoom, shape[1] * self._zoom, 4), np.uint8)
         self._pen = Pen(self._layer)
+        self._stepped = False  # before the first frame there is no scene to ask for
         self._waiting: list[Tracks] = []
         self._id, self._xy = np.empty(0, np.int64), np.empty((0, 2))  # last drawn point of each living track
         self._ends: dict[int, Floats] = {}
 
     def step(self, step: Step) -> None:
         """Extend the trajectories by one frame's confirmed tracks; a coasted gap becomes a straight line."""
+        self._stepped = True
         self._waiting.append(step.tracks)
         if len(self._waiting) == _BATCH:
             self._draw()
@@ -76,7 +78,7 @@ class TrajectoryPlot:
         """Write the picture."""
         self._draw()
         size = (self._layer.shape[1], self._layer.shape[0])
-        scene = np.full((*self._shape, 3), 60, np.uint8) if self._scene is None else self._scene()
+        scene = self._scene() if self._scene and self._stepped else np.full((*self._shape, 3), 60, np.uint8)
         enlarged = cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC)
         clear = 1.0 - self._layer[:, :, 3:] / np.float32(255)
         picture = (enlarged * clear + self._layer[:, :, :3]).clip(0, 255).astype(np.uint8)

@@ -26,8 +26,7 @@ class Summary:
              decode_errors, reconnects, stalls, truncated
     counter  the counted lines, None without any
 
-    `interrupted` is True in the file until `close`, so a killed run says so; set `interrupted` before
-    closing a run that was stopped.
+    `interrupted` is True until the run clears it before `close`, so a killed or failed run says so.
     """
 
     def __init__(
@@ -38,7 +37,7 @@ class Summary:
         reading: Callable[[], Mapping[str, object]],
         counter: LineCounter | None = None,
     ) -> None:
-        self.interrupted = False
+        self.interrupted = True
         self._path = path
         self._source = source
         self._settings = settings.model_dump(mode="json")

@@ -18,6 +18,8 @@ from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
 from vidtrack.tracking.boxes import area, best_cover
 
+ONE_SIDED = 4.0
+"""Standard deviations an edge is off, while the opposite one is within one, when part of a vehicle is hidden."""
 UNKNOWN = 1e8
 """Variance of a coordinate that no edge tells about."""
 
@@ -62,11 +64,17 @@ class Groups:
         return shared
 
     def changed(self, predicted: Floats, taken: Ints, blobs: Floats) -> np.ndarray:
-        """(T,) tracks whose blob has another size than the vehicle."""
-        ratio = np.ones(len(predicted))
-        hit = taken >= 0
-        ratio[hit] = area(blobs[taken[hit]]) / area(predicted[hit])
-        return (ratio > self.growth) | (ratio < 1 / self.growth)
+        """(T,) tracks whose blob has another size than the vehicle, or one edge where it was and the other far off."""
+        changed = np.zeros(len(predicted), bool)
+        hit = np.flatnonzero(taken >= 0)
+        box, blob = predicted[hit], blobs[taken[hit]]
+        ratio = area(blob) / area(box)
+        sigma = np.hypot(self.edge * box[:, 2:], 1.0)
+        near = np.abs(blob[:, :2] - box[:, :2]) / sigma
+        far = np.abs(blob[:, :2] + blob[:, 2:] - box[:, :2] - box[:, 2:]) / sigma
+        halved = (np.minimum(near, far) < 1) & (np.maximum(near, far) > ONE_SIDED)
+        changed[hit] = (ratio > self.growth) | (ratio < 1 / self.growth) | halved[:, 0] | halved[:, 1]
+        return changed
 
     def explained(self, predicted: Floats, shared: Ints, blobs: Floats) -> np.ndarray:
         """(M,) blobs at least half of whose area the tracks on them account for; the others hide somebody new."""

@@ -55,7 +55,7 @@ class Register:
         return ids
 
     def keep(self, rows: np.ndarray) -> None:
-        """Drop all rows but these."""
+        """Drop all rows but these indices."""
         for name in ("id", "status", "born_s", "updated_s", "history", "start", "box", "group", "group_since_s",
                      "existence", "run"):  # fmt: skip
             setattr(self, name, getattr(self, name)[rows])

@@ -254,7 +254,8 @@ class Tracker:
         """(T, 4) the tracks' boxes in the picture."""
         return absolute(self.register.box, self.bank.x[:, self.model.position])
 
-    def _keep(self, rows: Mask) -> None:
+    def _keep(self, kept: Mask) -> None:
+        rows = np.flatnonzero(kept)
         self.bank.keep(rows)
         self.register.keep(rows)
 
