@@ -36,6 +36,7 @@ def make_tracks(t, rows, **extra):
         group=np.where(merged, 3, -1),
         group_since_s=np.where(merged, t, np.nan),
         age_s=np.full(count, t),
+        travel=np.zeros(count),
         existence=np.full(count, 0.9),
         measurement=np.where(measured, np.cumsum(measured) - 1, -1),
         nis=np.where(measured, 1.5, np.nan),

@@ -98,6 +98,7 @@ def _tracks(t: float, rows: dict[str, np.ndarray]) -> Tracks:
         group=rows["group_id"],
         group_since_s=unknown,
         age_s=unknown,
+        travel=unknown,
         existence=unknown,
         measurement=np.full(count, -1),
         nis=rows["nis"],
