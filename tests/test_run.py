@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import SAMPLES
 
-from vidtrack.config import load
+from vidtrack.config import Settings, load
 from vidtrack.errors import ConfigError, OutputError, SourceError
 from vidtrack.run import Run
 
@@ -41,18 +41,18 @@ def test_every_step_is_seen_and_written(tmp_path):
 
 def test_a_run_left_by_an_error_is_complete_up_to_there(tmp_path):
     def use_half():
-        with Run(CROSSING, SHORT, tmp_path / "out") as run:
+        with Run(CROSSING, Settings(), tmp_path / "out") as run:
             for step in run:
-                if step.index == 15:
+                if step.index == 75:
                     raise RuntimeError("ours")
 
     with pytest.raises(RuntimeError, match="ours"):
         use_half()
     found = summary(tmp_path / "out")
     assert found["interrupted"] is True
-    assert found["frames"] == 16
+    assert found["frames"] == 76
     frames = pq.read_table(tmp_path / "out" / "tracks.parquet")["frame"].to_pylist()
-    assert max(frames) <= 15
+    assert max(frames) <= 75
     assert len((tmp_path / "out" / "tracks.csv").read_text().splitlines()) == len(frames) + 1
 
 
@@ -64,14 +64,14 @@ def test_a_run_that_is_never_started_leaves_empty_results(tmp_path):
 
 
 def test_extras_are_written_where_they_were_asked_for(tmp_path):
-    settings = load(assignments=["source.end_s=1.5", ("output.lines", ["gate:30,0,30,240"])])
+    settings = load(assignments=["source.end_s=8", ("output.lines", ["gate:180,0,180,240"])])
     with Run(CROSSING, settings, tmp_path / "out", masks=tmp_path / "masks", decisions=True) as run:
         count = sum(1 for _ in run)
     assert sorted(path.name for path in (tmp_path / "masks").iterdir()) == [f"{k:06d}.png" for k in range(count)]
     assert (tmp_path / "out" / "decisions.csv").stat().st_size > 0
     rows = (tmp_path / "out" / "counts.csv").read_text().splitlines()[1:]
     assert summary(tmp_path / "out")["counts"]
-    assert len(rows) == 1
+    assert len(rows) == 1  # the vehicle that goes right
 
 
 def test_the_same_video_gives_the_same_tables(tmp_path):

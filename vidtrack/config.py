@@ -158,7 +158,7 @@ class TrackerSettings(_Group):
     """vehicles that share one blob stay several tracks"""
     group_cover: float = Field(0.5, gt=0, le=1)
     """share of a vehicle's predicted box that a blob must cover to carry it"""
-    box_s: float = Field(0.2, gt=0)
+    box_s: float = Field(0.3, gt=0)
     """s; time constant with which a track's box follows the blobs' boxes"""
 
     @field_validator("confirm_window")

@@ -216,8 +216,11 @@ def test_repair_changes_nothing_in_a_finished_run(tmp_path):
     summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING)
     table = TrackTable(tmp_path)
     for index in range(4):
-        table.step(make_step(index, [(1, "c", 1.5 * index, 2)]))
+        step = make_step(index, [(1, "c", 1.5 * index, 2)])
+        table.step(step)
+        summary.step(step)
     table.close()
+    summary.interrupted = False
     summary.close()
     before = pq.read_table(tmp_path / "tracks.parquet"), (tmp_path / "summary.json").read_text()
     assert repair(tmp_path) == 4

@@ -61,7 +61,7 @@ class Tracker:
         births: bool = True,
         detection_probability: float = 0.9,
         clutter_density: float = 1e-5,
-        box_s: float = 0.2,
+        box_s: float = 0.3,
         explain: bool = False,
     ) -> None:
         self.model = model or ConstantVelocity()
