@@ -201,7 +201,7 @@ def main() -> None:
     steps: dict[int, list[float]] = {count: [] for count in (10, 100, 1000, MOST)}
     for seed in range(options.rounds):
         for count in steps:
-            steps[count].append(median(run_ours(OURS, traffic(count, 4 * WARM_UP, seed)).seconds[WARM_UP:]))
+            steps[count].append(median(run_ours(traffic(count, 4 * WARM_UP, seed)).seconds[WARM_UP:]))
     for count, seconds in steps.items():
         ratio = median(np.divide(seconds, steps[1000]))
         print(f"{count:6d} objects {1e3 * median(seconds):9.3f} ms  {ratio:7.3f} times 1000 objects")

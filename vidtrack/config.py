@@ -147,7 +147,7 @@ class TrackerSettings(_Group):
     confirm_window: int = Field(4, ge=1, le=63)
     """N: scans of the window"""
     confirm_s: float = Field(0.2, ge=0)
-    """s; no track is confirmed before this age"""
+    """s; no track of a video is confirmed before this age"""
     confirm_travel: float = Field(0.3, ge=0)
     """object sizes; nor before it has moved this far from where it began"""
     coast_s: float = Field(1.0, ge=0)

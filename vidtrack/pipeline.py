@@ -59,7 +59,7 @@ def build_tracker(
     """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height).
 
     whole  each box is one whole object, from a detector that tells objects apart: boxes may overlap but are
-           never shared, and their size is evidence
+           never shared, their size is evidence, and M hits of N confirm a track without it having to travel
     """
     return Tracker(
         model=ConstantVelocity(
@@ -75,8 +75,8 @@ def build_tracker(
         life=LifeCycle(
             confirm_hits=settings.confirm_hits,
             confirm_window=settings.confirm_window,
-            confirm_s=settings.confirm_s,
-            confirm_travel=settings.confirm_travel,
+            confirm_s=0.0 if whole else settings.confirm_s,
+            confirm_travel=0.0 if whole else settings.confirm_travel,
             coast_s=settings.coast_s,
             hidden_s=settings.hidden_s,
             coast_scans=None,

@@ -19,14 +19,18 @@ class Shape:
 
     sigma        standard deviation of the logarithm of width and height between a track and its measurement
     probability  share of a vehicle's own boxes that position and size together admit
+    overlap      least intersection over union of a box with the prediction: nothing jumps clear of it
     """
 
-    sigma: float = 0.2
+    sigma: float = 0.15
     probability: float = 0.99
+    overlap: float = 0.3
 
     def __post_init__(self) -> None:
         if not self.sigma > 0:
             raise ConfigError(f"shape sigma is {self.sigma}; it must be above zero")
+        if not 0 <= self.overlap < 1:
+            raise ConfigError(f"shape overlap is {self.overlap}; it must be at least 0 and below 1")
         if not 0 < self.probability < 1:
             raise ConfigError(f"shape probability is {self.probability}; it must lie between 0 and 1")
 
@@ -35,28 +39,32 @@ class Shape:
 
         predicted (T, 4) and boxes (M, 4) in the picture. A pair stays if its d2 and its size distance
         |ln(w h ratios)|^2 / sigma^2 together are below the gate plus the size's own chi-square quantile,
-        and if the boxes overlap in both axes: nothing jumps clear of its own prediction.
+        and if the boxes overlap enough.
         """
         most = pairs.limit + float(chi2.ppf(self.probability, 2))
-        size2, stays = _compare(pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma)
+        size2, stays = _compare(
+            pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma, self.overlap
+        )
         return replace(pairs, cost=pairs.cost + size2).only(stays)
 
 
 @njit(cache=True, nogil=True)
 def _compare(
-    row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats, sigma: float
-) -> tuple[Floats, np.ndarray]:
+    row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
+    sigma: float, overlap: float,
+) -> tuple[Floats, np.ndarray]:  # fmt: skip
     """(N,) the pairs' size distances, and which of them stay; a track without a box yet takes any size."""
     size2, stays = np.zeros(len(row)), np.ones(len(row), np.bool_)
     for k in range(len(row)):
         mine, theirs = predicted[row[k]], boxes[measurement[k]]
         if np.isnan(mine[0]):
             continue
-        touching = True
+        common = 1.0
         for axis in range(2):
             near = max(mine[axis], theirs[axis])
             far = min(mine[axis] + mine[axis + 2], theirs[axis] + theirs[axis + 2])
-            touching &= far > near
+            common *= max(0.0, far - near)
             size2[k] += (np.log(theirs[axis + 2] / mine[axis + 2]) / sigma) ** 2
-        stays[k] = touching and d2[k] + size2[k] <= most[row[k]]
+        union = mine[2] * mine[3] + theirs[2] * theirs[3] - common
+        stays[k] = common >= overlap * union and d2[k] + size2[k] <= most[row[k]]
     return size2, stays
