@@ -7,6 +7,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
+import cv2
+
 from vidtrack.config import Settings
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
@@ -58,6 +60,9 @@ class Run:
             tracker = build_tracker(settings.tracker, bounds, whole=stored, explain=explain)
             detector = None
             if isinstance(opened, Source):
+                if settings.detector.kind == "disturbance":  # its few steps in OpenCV are short: the threads would spin
+                    stack.callback(cv2.setNumThreads, cv2.getNumThreads())
+                    cv2.setNumThreads(1)
                 detector = build_detector(settings)
                 self._steps = video_steps(opened, detector, tracker, settings)
             else:

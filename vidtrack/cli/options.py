@@ -37,9 +37,9 @@ def start_log(verbose: int, quiet: bool) -> None:
     logging.addLevelName(logging.WARNING, "warning")
     logging.addLevelName(logging.INFO, "info")
     logger = logging.getLogger("vidtrack")
+    handler.setLevel(level)
     logger.handlers = [handler]
-    logger.setLevel(level)
-    logger.propagate = False
+    logger.setLevel(min(level, logging.WARNING))
 
 
 def settings_options(function: Function) -> Function:

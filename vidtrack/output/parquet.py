@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 
-_PART_ROWS = 100_000
+_PART_ROWS = 20_000  # 3 MB
 _PART_S = 60.0
 
 

@@ -79,9 +79,11 @@ class TrajectoryPlot:
         self._draw()
         size = (self._layer.shape[1], self._layer.shape[0])
         scene = self._scene() if self._scene and self._stepped else np.full((*self._shape, 3), 60, np.uint8)
-        enlarged = cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC)
-        clear = 1.0 - self._layer[:, :, 3:] / np.float32(255)
-        picture = (enlarged * clear + self._layer[:, :, :3]).clip(0, 255).astype(np.uint8)
+        picture = np.array(cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+        drawn = self._layer[:, :, 3] > 0
+        ink = self._layer[drawn]
+        clear = 1.0 - ink[:, 3:] / np.float32(255)
+        picture[drawn] = (picture[drawn] * clear + ink[:, :3]).clip(0, 255)
         pen = Pen(picture)
         zoom = self._zoom
         draw_lines(pen, [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines])

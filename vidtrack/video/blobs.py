@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
 from vidtrack.video.foreground import Foreground
-from vidtrack.video.runs import connect, find_runs
+from vidtrack.video.runs import components, connect, find_runs, join
 
 _SPREAD = 1.2  # predicted boxes are taken this much larger about their centres before fragments are sought in them
 
@@ -48,23 +47,23 @@ class Blobs:
         vehicles jitter by 0.1 to 0.25 px at 240 to 360 rows; the defaults are above that, because shadow and parts
         that look like the road come and go slowly.
         """
-        base = (self.settings.jitter_px * self.step) ** 2
-        R = base * np.eye(2) + self.settings.jitter_share**2 * self.cov
-        box = self.box - np.pad(self.centroid, ((0, 0), (0, 2)))
+        R = self.settings.jitter_share**2 * self.cov
+        R[:, [0, 1], [0, 1]] += (self.settings.jitter_px * self.step) ** 2
+        box = self.box.copy()
+        box[:, :2] -= self.centroid
         return Scan(time_s, self.centroid, R, box=box, amplitude=self.amplitude)
 
 
 def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
     """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel."""
     mask, step = foreground.mask, foreground.step
-    n, mean, cov, box, amplitude = _measure(mask, foreground.strength)
-    large = n >= settings.min_area_share * mask.size
+    n, mean, cov, box, amplitude = _measure(mask, foreground.strength, settings.min_area_share * mask.size)
     return Blobs(
-        centroid=(mean[large] + 0.5) * step - 0.5,
-        cov=cov[large] * step**2,
-        box=box[large] * float(step),
-        area=n[large] * step**2,
-        amplitude=amplitude[large],
+        centroid=(mean + 0.5) * step - 0.5,
+        cov=cov * step**2,
+        box=box * step,
+        area=n * step**2,
+        amplitude=amplitude,
         step=step,
         settings=settings,
     )
@@ -76,24 +75,9 @@ def join_fragments(blobs: Blobs, predicted: Floats) -> Blobs:
     A blob that has to do with no or with several predicted boxes stays as it is. So do pieces farther apart than
     `join_gap`: two vehicles that entered as one blob drift apart inside the box that was predicted for both.
     """
-    overlap = _share_inside(blobs.box, _enlarged(predicted))
-    most = blobs.settings.join_overlap
-    own = (overlap >= most) & ((overlap > 1 - most).sum(axis=1, keepdims=True) == 1)
-    of_one = own.any(axis=1)
-    if of_one.sum() < 2:
-        return blobs
-    vehicle = np.where(of_one, own.argmax(axis=1), -1 - np.arange(len(blobs)))
-    reach = np.zeros(len(blobs))
-    reach[of_one] = blobs.settings.join_gap * predicted[vehicle[of_one], 2:].max(axis=1)
-    close = (vehicle[:, None] == vehicle) & (_gap(blobs.box) <= reach[:, None])
-    count, group = connected_components(close, directed=False)
+    most, gap = blobs.settings.join_overlap, blobs.settings.join_gap
+    group, count = _fragments(blobs.box, predicted, most, gap)
     return blobs if count == len(blobs) else _joined(blobs, group, count)
-
-
-def _gap(box: Floats) -> Floats:
-    """(B, B) distance between boxes along the axis that separates them more; negative where they overlap."""
-    low, high = box[:, :2], box[:, :2] + box[:, 2:]
-    return np.maximum(low[:, None] - high[None], low[None] - high[:, None]).max(axis=2)
 
 
 def _joined(blobs: Blobs, group: Ints, count: int) -> Blobs:
@@ -122,21 +106,54 @@ def _joined(blobs: Blobs, group: Ints, count: int) -> Blobs:
     )
 
 
-def _share_inside(box: Floats, other: Floats) -> Floats:
-    """(B, K) share of each box's area that lies in each of the others."""
-    low = np.maximum(box[:, None, :2], other[None, :, :2])
-    high = np.minimum(box[:, None, :2] + box[:, None, 2:], other[None, :, :2] + other[None, :, 2:])
-    return np.prod(np.maximum(high - low, 0), axis=2) / np.prod(box[:, None, 2:], axis=2)
-
-
-def _enlarged(box: Floats) -> Floats:
-    grown = _SPREAD * box[:, 2:]
-    return np.hstack([box[:, :2] - (grown - box[:, 2:]) / 2, grown])
+@numba.njit(cache=True, nogil=True)
+def _fragments(box, predicted, most, gap):  # type: ignore[no-untyped-def]
+    """Group of each box (B,) and the number of groups: close pieces of the same predicted vehicle are in one."""
+    parent = np.arange(len(box))
+    vehicle = np.empty(len(box), np.int64)
+    for i in range(len(box)):
+        vehicle[i] = _only_vehicle(box[i], predicted, most)
+        for j in range(i):
+            if vehicle[i] >= 0 and vehicle[j] == vehicle[i]:
+                longer = max(predicted[vehicle[i], 2], predicted[vehicle[i], 3])
+                if _gap(box[i], box[j]) <= gap * longer:
+                    join(parent, i, j)
+    return components(parent)
 
 
 @numba.njit(cache=True, nogil=True)
-def _measure(mask, strength):  # type: ignore[no-untyped-def]
-    """Of each component, in mask pixels: count (B,), mean x, y (B, 2), covariance (B, 2, 2), box, mean strength."""
+def _only_vehicle(box, predicted, most):  # type: ignore[no-untyped-def]
+    """The predicted box in which most of this box (4,) lies; -1 if there is none, or others have a part in it."""
+    vehicle, sharers = -1, 0
+    for k in range(len(predicted)):
+        share = _share_inside(box, predicted[k])
+        sharers += share > 1 - most
+        if share >= most and vehicle < 0:
+            vehicle = k
+    return vehicle if sharers == 1 else -1
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _share_inside(box, other):  # type: ignore[no-untyped-def]
+    """Share of a box's area that lies in the other one, spread."""
+    common = 1.0
+    for axis in range(2):
+        size = _SPREAD * other[axis + 2]
+        low = other[axis] - (size - other[axis + 2]) / 2
+        common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
+    return common / (box[2] * box[3])
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _gap(a, b):  # type: ignore[no-untyped-def]
+    """Distance between two boxes along the axis that separates them more; negative where they overlap."""
+    across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
+    return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))
+
+
+@numba.njit(cache=True, nogil=True)
+def _measure(mask, strength, least):  # type: ignore[no-untyped-def]
+    """Of each component of at least so many pixels: count (B,), mean x, y (B, 2), covariance (B, 2, 2), box, strength."""
     row, start, stop = find_runs(mask, False)
     label, blobs = connect(row, start, stop, 1)
     n = np.zeros(blobs)
@@ -159,16 +176,16 @@ def _measure(mask, strength):  # type: ignore[no-untyped-def]
         high[i, 0], high[i, 1] = max(high[i, 0], b), max(high[i, 1], y + 1)
         for x in range(a, b):
             amplitude[i] += strength[y, x]
-    mean = np.empty((blobs, 2))
-    cov = np.empty((blobs, 2, 2))
-    box = np.empty((blobs, 4))
-    for i in range(blobs):
+    large = np.flatnonzero(n >= least)
+    mean = np.empty((len(large), 2))
+    cov = np.empty((len(large), 2, 2))
+    box = np.empty((len(large), 4))
+    for j, i in enumerate(large):
         mx, my = first[i, 0] / n[i], first[i, 1] / n[i]
-        mean[i, 0], mean[i, 1] = mx, my
-        cov[i, 0, 0] = second[i, 0] / n[i] - mx * mx + 1 / 12  # a pixel has an extent of its own
-        cov[i, 1, 1] = second[i, 2] / n[i] - my * my + 1 / 12
-        cov[i, 0, 1] = cov[i, 1, 0] = second[i, 1] / n[i] - mx * my
-        box[i, 0], box[i, 1] = low[i, 0], low[i, 1]
-        box[i, 2], box[i, 3] = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1]
-        amplitude[i] /= n[i]
-    return n, mean, cov, box, amplitude
+        mean[j, 0], mean[j, 1] = mx, my
+        cov[j, 0, 0] = second[i, 0] / n[i] - mx * mx + 1 / 12  # a pixel has an extent of its own
+        cov[j, 1, 1] = second[i, 2] / n[i] - my * my + 1 / 12
+        cov[j, 0, 1] = cov[j, 1, 0] = second[i, 1] / n[i] - mx * my
+        box[j, 0], box[j, 1] = low[i, 0], low[i, 1]
+        box[j, 2], box[j, 3] = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1]
+    return n[large], mean, cov, box, amplitude[large] / n[large]

@@ -40,12 +40,23 @@ def eights(mask):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always")
 def next_nonzero(pixels, words, x, end):  # type: ignore[no-untyped-def]
-    """First place in x..end where pixels (N,) is not 0, end if none; `words` skips eight zeros at a time."""
+    """First place in x..end where pixels (N,) is not 0, end if none; `words` skips 64 or eight zeros at a time."""
     while x < end and pixels[x] == 0:
         x += 1
-        while x & 7 == 0 and x < end and x >> 3 < len(words) and words[x >> 3] == 0:
-            x += 8
+        if x & 7 == 0:
+            k = x >> 3
+            while k << 3 < end and k + 8 <= len(words) and _none(words[k : k + 8]):
+                k += 8
+            while k << 3 < end and k < len(words) and words[k] == 0:
+                k += 1
+            x = k << 3
     return min(x, end)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _none(eight):  # type: ignore[no-untyped-def]
+    """Whether these eight words are all 0."""
+    return eight[0] | eight[1] | eight[2] | eight[3] | eight[4] | eight[5] | eight[6] | eight[7] == 0
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
@@ -81,11 +92,17 @@ def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
             above += 1
         other = above
         while other < k and row[other] == row[k] - 1 and start[other] < stop[k] + diagonal:
-            _join(parent, k, other)
+            join(parent, k, other)
             other += 1
-    label = np.empty(n, np.int64)
+    return components(parent)
+
+
+@numba.njit(cache=True, nogil=True)
+def components(parent):  # type: ignore[no-untyped-def]
+    """Component of each element (N,) of a forest that `join` grew, numbered by their first elements, and their number."""
+    label = np.empty(len(parent), np.int64)
     count = 0
-    for k in range(n):  # a root is the first run of its component, so it is numbered before the others ask
+    for k in range(len(parent)):  # a root is the first of its component, so it is numbered before the others ask
         if parent[k] == k:
             label[k] = count
             count += 1
@@ -95,17 +112,18 @@ def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _root(parent, k):  # type: ignore[no-untyped-def]
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
-@numba.njit(cache=True, nogil=True)
-def _join(parent, a, b):  # type: ignore[no-untyped-def]
+def join(parent, a, b):  # type: ignore[no-untyped-def]
+    """Make one component of those of a and b; parent (N,) int64 begins as 0, 1, 2, ..."""
     a, b = _root(parent, a), _root(parent, b)
     if a < b:
         parent[b] = a
     else:
         parent[a] = b
+
+
+@numba.njit(cache=True, nogil=True)
+def _root(parent, k):  # type: ignore[no-untyped-def]
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k

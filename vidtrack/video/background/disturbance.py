@@ -16,16 +16,17 @@ from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Scene, absorb, adopt, learn, start
+from vidtrack.video.background.scene import Scene, absorb, adopt, learn, spare, start
 from vidtrack.video.background.shadow import SHADOW, mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
+from vidtrack.video.memory import keep_freed_memory
 
 _FIRST_S = 0.1  # plain averaging after a start
 _UNSURE_S = 10.0  # after a start ghosts are many: for so long
 _UNSURE_GHOST_S = 0.3  # they need only so much cover
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
-_KNOWN_S = 0.1  # shorter than all of these, and not 0: that is for pixels that are seen free
+_KNOWN_S = np.float32(0.1)  # shorter than all of these, and not 0: that is for pixels that are seen free
 
 
 class Disturbance:
@@ -45,6 +46,7 @@ class Disturbance:
         s = self._settings
         picture = smooth(self._view.reduce(frame))
         if self._scene is None:
+            keep_freed_memory()
             self._scene = self._start(picture, frame.time_s)
         scene = self._scene
         dt, self._time_s = frame.time_s - self._time_s, frame.time_s
@@ -61,7 +63,7 @@ class Disturbance:
             return self._view.foreground(np.zeros_like(mask), strength)
         if s.holes:
             fill_holes(mask)
-        self._spare(scene, known)
+        spare(scene.covered_s, known / self._view.step, _KNOWN_S)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
         self._learn(picture, scene, mask, hit, dt)
@@ -114,14 +116,6 @@ class Disturbance:
         if self._time_s - self._start_s < _FIRST_S:
             weight = max(weight, 1 / self._frames)
         learn(picture, scene, covered, np.float32(weight), np.float32(-math.expm1(-dt / s.noise_s)), np.float32(dt))
-
-    def _spare(self, scene: Scene, known: Floats) -> None:
-        """Let the cover of known vehicles never last as long as ghosts and absorption need."""
-        left, top, width, height = np.asarray(known, dtype=float).reshape(-1, 4).T / self._view.step
-        edges = np.stack([left, top, left + width + 1, top + height + 1], axis=1).clip(0).astype(int)
-        for x0, y0, x1, y1 in edges:
-            inside = scene.covered_s[y0:y1, x0:x1]
-            np.minimum(inside, _KNOWN_S, out=inside)
 
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
         """Take for scene what has stood for absorb_s, and lasting shadow."""

@@ -79,6 +79,16 @@ def absorb(picture, scene, hit, absorb_s, shadow_s):  # type: ignore[no-untyped-
                 _adopt(picture, scene, y, x)
 
 
+@numba.njit(cache=True, nogil=True)
+def spare(covered_s, box, longest_s):  # type: ignore[no-untyped-def]
+    """Let the cover inside the boxes (K, 4) left, top, width, height never last longer than longest_s."""
+    h, w = covered_s.shape
+    for left, top, width, height in box:
+        for y in range(max(int(top), 0), min(int(top + height + 1), h)):
+            for x in range(max(int(left), 0), min(int(left + width + 1), w)):
+                covered_s[y, x] = min(covered_s[y, x], longest_s)
+
+
 @numba.njit(cache=True, nogil=True, inline="always")
 def _adopt(picture, scene, y, x):  # type: ignore[no-untyped-def]
     scene.former[y, x] = scene.luma[y, x]
