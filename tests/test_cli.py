@@ -1,5 +1,6 @@
 """The command line: what it says, what it returns, and what it leaves behind when it is stopped."""
 
+import errno
 import json
 import logging
 import signal
@@ -292,6 +293,16 @@ def test_a_full_disk_ends_the_run_with_1_and_valid_results(tmp_path):
     whole, short = rows_of(tmp_path / "whole"), rows_of(tmp_path / "short")
     assert short == whole[: len(short)]
     json.loads((tmp_path / "short" / "summary.json").read_text())
+
+
+def test_what_the_disk_refuses_elsewhere_is_one_line_and_1(vidtrack, monkeypatch):
+    def write(clip, folder, frames):
+        raise OSError(errno.ENOSPC, "No space left on device", str(folder / "video.avi"))
+
+    monkeypatch.setattr("vidtrack.simulate.write", write)
+    code, _, err = vidtrack("simulate", "crossing", "-o", "out", "--quiet")
+    assert code == 1
+    assert err == "vidtrack: cannot read or write out/video.avi: No space left on device\n"
 
 
 def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):

@@ -188,3 +188,14 @@ def test_whatever_is_typed_is_a_setting_or_a_config_error(name, value):
 def test_settings_cannot_be_changed():
     with pytest.raises(ValueError, match="frozen"):
         Settings().tracker.coast_s = 3.0
+
+
+def test_a_value_for_a_group_is_refused_in_plain_words():
+    with pytest.raises(ConfigError, match=r"tracker = 5: this is a group"):
+        load(assignments=["tracker=5"])
+
+
+def test_any_path_survives_the_way_through_a_file(tmp_path):
+    settings = load(assignments=[("source.mask", "Größe 😀.png")])
+    (tmp_path / "settings.toml").write_text(as_toml(settings), encoding="utf-8")
+    assert load(tmp_path / "settings.toml") == settings

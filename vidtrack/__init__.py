@@ -47,14 +47,11 @@ _HOME = {
     "load_settings": "config",
     "track": "pipeline",
 }
-__all__ = sorted(_HOME)  # noqa: PLE0605
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used: `vidtrack --help` needs none of them.
-
-    `track` is a sub-package too; the function wins once it has been asked for.
-    """
+    """Import a public name when it is first used: `vidtrack --help` needs none of them."""
     if name not in _HOME:
         raise AttributeError(f"module vidtrack has no attribute {name}")
     module = import_module(f"vidtrack.{_HOME[name]}")

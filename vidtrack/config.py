@@ -31,7 +31,7 @@ class SourceSettings(_Group):
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s where the input carries no times or wrong ones; None: the video's own, seqinfo.ini's, else 25"""
     scale: float | None = Field(None, gt=0, le=1)
-    """processed size over source size; None: 1 up to 580 rows, then 1 over the smallest integer that gets there"""
+    """processed size over source size, rounded to 1, 1/2, 1/3, ...; None: 1 up to 580 rows, then 1 over the smallest integer that gets there"""
     mask: Path | None = None
     """picture whose white part is kept; None: everything"""
 
@@ -254,6 +254,8 @@ def _complaint(detail: Any) -> str:
         near = difflib.get_close_matches(name, list(names()), n=1, cutoff=0.4)
         hint = f"; did you mean {near[0]}?" if near else "; see vidtrack config --explain"
         return f"unknown setting {name}{hint}"
+    if detail["type"] == "model_type":
+        return f"setting {name} = {detail['input']!r}: this is a group; give one of its settings, {name}.NAME"
     return f"setting {name} = {detail['input']!r}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
 
 
@@ -288,7 +290,7 @@ def _toml_group(group: BaseModel, path: str, explain: bool) -> list[str]:
 def _toml_value(value: Any) -> str:
     if isinstance(value, Path):
         value = str(value)
-    return json.dumps(value)  # TOML spells booleans, numbers, strings and lists as JSON does
+    return json.dumps(value, ensure_ascii=False)  # TOML spells booleans, numbers, strings and lists as JSON does
 
 
 def _range(info: FieldInfo) -> str:

@@ -17,7 +17,7 @@ class OutputError(Error):
     """Results cannot be written where they were asked for."""
 
 
-class StoppedEarly(Error):
+class StoppedEarly(Error):  # noqa: N818
     """A run had to stop, for example on a full disk; what was written before stays valid."""
 
     exit_code = 1

@@ -7,8 +7,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
-import cv2
-
 from vidtrack.config import Settings
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
@@ -24,6 +22,7 @@ from vidtrack.output.threaded import Threaded
 from vidtrack.pipeline import build_detector, build_tracker, detection_steps, video_steps
 from vidtrack.traffic.lines import LineCounter, parse_lines
 from vidtrack.video.detections import Detections, is_detections, open_detections
+from vidtrack.video.resources import keep_freed_memory, opencv_single_threaded
 from vidtrack.video.source import Source, open_source
 
 
@@ -60,9 +59,9 @@ class Run:
             tracker = build_tracker(settings.tracker, bounds, whole=stored, explain=explain)
             detector = None
             if isinstance(opened, Source):
-                if settings.detector.kind == "disturbance":  # its few steps in OpenCV are short: the threads would spin
-                    stack.callback(cv2.setNumThreads, cv2.getNumThreads())
-                    cv2.setNumThreads(1)
+                keep_freed_memory()
+                if settings.detector.kind not in ("mog2", "knn"):  # they are OpenCV's, and long enough for its threads
+                    stack.enter_context(opencv_single_threaded())
                 detector = build_detector(settings)
                 self._steps = video_steps(opened, detector, tracker, settings)
             else:

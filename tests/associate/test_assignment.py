@@ -64,7 +64,15 @@ def pairs(d2, limit, log_s=0.0):
     row, measurement = np.nonzero(d2 <= limit)
     start = np.searchsorted(row, np.arange(len(d2) + 1))
     spread = np.broadcast_to(log_s, d2.shape)[row, measurement]
-    return Pairs(row, measurement, d2[row, measurement], spread.astype(float), d2[row, measurement] + spread, np.full(len(d2), limit), start)
+    return Pairs(
+        row,
+        measurement,
+        d2[row, measurement],
+        spread.astype(float),
+        d2[row, measurement] + spread,
+        np.full(len(d2), limit),
+        start,
+    )
 
 
 def taken(rule, pairs, measurements):

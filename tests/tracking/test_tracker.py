@@ -271,3 +271,17 @@ def test_a_vehicle_that_stops_and_goes_on_stays_one():
     seen = play(default_tracker(), scene, 8.0, jitter=0.4)
     assert len(confirmed_ids(seen)) == 1
     assert not events(seen, "delete")
+
+
+def test_nothing_can_be_added():
+    tracker = Tracker()
+    tracker.step(Scan(0.0, np.array([[0.0, 0.0], [50.0, 50.0]]), EYE))
+    assert len(tracker.add(0.0, np.empty((0, 4)), np.empty((0, 4, 4)))) == 0
+    assert (tracker.register.status == Status.TENTATIVE).all()
+
+
+def test_no_prediction_into_the_past():
+    tracker = Tracker()
+    tracker.step(Scan(1.0, np.zeros((1, 2)), EYE))
+    with pytest.raises(ScanError, match="before the last scan"):
+        tracker.predict(0.5)

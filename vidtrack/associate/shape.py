@@ -48,12 +48,15 @@ class Shape:
         return replace(pairs, cost=pairs.cost + size2).only(stays)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _compare(
     row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
     sigma: float, overlap: float,
 ) -> tuple[Floats, np.ndarray]:  # fmt: skip
-    """(N,) the pairs' size distances, and which of them stay; a track without a box yet takes any size."""
+    """(N,) the pairs' size distances, and which of them stay.
+
+    A track without a box yet takes any size; a box of no size fits nothing.
+    """
     size2, stays = np.zeros(len(row)), np.ones(len(row), np.bool_)
     for k in range(len(row)):
         mine, theirs = predicted[row[k]], boxes[measurement[k]]

@@ -69,6 +69,9 @@ def main() -> None:
         code = _complain("interrupted", 130)
     except Terminated:
         code = _complain("terminated", 143)
+    except OSError as error:  # where no part of the program could say more: the disk is full, a folder is read-only
+        place = f" {error.filename}" if error.filename else ""
+        code = _complain(f"cannot read or write{place}: {error.strerror or error}", 1)
     sys.exit(code)
 
 

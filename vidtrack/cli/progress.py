@@ -33,10 +33,9 @@ def _bar(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Ite
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(name, total=expected, rate=0.0)
-        began, done, told = time.monotonic(), 0, 0.0
-        for item in items:
+        began, told = time.monotonic(), 0.0
+        for done, item in enumerate(items, start=1):
             yield item
-            done += 1
             elapsed = time.monotonic() - began
             if elapsed - told > 0.1:
                 bar.update(task, completed=done, rate=done / elapsed)

@@ -39,9 +39,11 @@ Examples:
 @click.option("--decisions", is_flag=True, help="Write why each track got what it got.")
 @click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
 @click.option("--end", type=float, metavar="S", help="Stop at this time [s].")
-@click.option("--scale", type=float, metavar="F", help="Detect in a picture reduced to this share.")
+@click.option(
+    "--scale", type=float, metavar="F", help="Detect in a picture reduced to this share, rounded to 1/2, 1/3, ..."
+)
 @click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="Only where this picture is white.")
-@click.option("--fps", type=float, metavar="N", help="Frames/s of inputs that carry no time.")
+@click.option("--fps", type=float, metavar="N", help="True frames/s, where the input carries no times or wrong ones.")
 def command(
     source: str,
     output: Path | None,
@@ -70,7 +72,9 @@ def command(
 
     start_log(verbose, quiet)
     settings = load(config_file, [*assignments, *_assignments(chosen)])
-    with Run(source, settings, output, force=force, rerun=rerun, video=video, masks=save_masks, decisions=decisions) as run:
+    with Run(
+        source, settings, output, force=force, rerun=rerun, video=video, masks=save_masks, decisions=decisions
+    ) as run:
         for _ in stoppable(progress(run, run.frames, run.name, quiet)):
             pass  # the sinks have seen it
     click.echo(run.folder)

@@ -25,7 +25,7 @@ def command(run: Path, save: str | None, video: bool) -> None:
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
     while tracking, with --rerun.
     """
-    from contextlib import ExitStack, closing, suppress
+    from contextlib import ExitStack, closing
 
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
@@ -40,8 +40,10 @@ def command(run: Path, save: str | None, video: bool) -> None:
         sink = stack.enter_context(closing(RerunSink(save or "spawn", finished.shape, finished.settings, lines)))
         frames = None
         if video:
-            with suppress(SourceError):
+            try:
                 frames = stack.enter_context(open_source(finished.source, finished.settings.source))
+            except SourceError as error:
+                click.echo(f"vidtrack: {error}; the background of tracks.png is shown instead", err=True)
         if frames is None:
             sink.background(replay.background(finished))
         for step in replay.steps(finished, frames):

@@ -108,20 +108,20 @@ class Tracker:
         return self._snapshot(scan.t, self.bank.x, self.bank.P, taken, nis, tuple(events), why)
 
     def predict(self, t: float) -> Tracks:
-        """All tracks as expected at time t >= the last scan's; changes nothing."""
-        x, P = self.bank.ahead(0.0 if self.t is None else t - self.t)
+        """All tracks as expected at time t; changes nothing. Raises ScanError for a time before the last scan's."""
+        x, P = self.bank.ahead(self._since_last(t))
         return self._snapshot(t, x, P, np.full(len(x), -1), np.full(len(x), np.nan))
 
     def add(self, t: float, x: Floats, P: Floats, run: Ints | None = None, box: Floats | None = None) -> Ints:
         """Put in confirmed tracks with known states x (B, n), P (B, n, n); returns their ids."""
-        count = len(x)
+        first, count = len(self.bank), len(x)
         position = list(self.model.position)
         self.bank.append(x[:, position], P[:, position][:, :, position], np.ones(count))
-        self.bank.x[-count:], self.bank.P[-count:] = x, P
+        self.bank.x[first:], self.bank.P[first:] = x, P
         boxes = np.full((count, 4), np.nan) if box is None else box
         runs = np.zeros(count, np.int64) if run is None else run
         ids = self.register.append(t, x[:, position], boxes, BIRTH_EXISTENCE, runs)
-        self.register.status[-count:] = Status.CONFIRMED
+        self.register.status[first:] = Status.CONFIRMED
         self.t = t if self.t is None else self.t
         return ids
 
@@ -130,9 +130,7 @@ class Tracker:
         t = scan.t
         if len(scan) and scan.sensor is None and scan.z.shape[1] != self.model.dim:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
-        dt = 0.0 if self.t is None else t - self.t
-        if dt < 0:
-            raise ScanError(f"scan at {t:.6g} s is older than the last one at {self.t:.6g} s; sort the scans by time")
+        dt = self._since_last(t)
         self.bank.predict(dt)
         self.t = t
         lost = self.life.lost(self.register, t)
@@ -140,6 +138,12 @@ class Tracker:
             for track, seen in zip(self.register.id[lost], self.register.updated_s[lost], strict=True):
                 events.append(Event(t, int(track), "delete", f"no evidence since {seen:.2f} s"))
             self._keep(~lost)
+        return dt
+
+    def _since_last(self, t: float) -> float:
+        dt = 0.0 if self.t is None else t - self.t
+        if dt < 0:
+            raise ScanError(f"{t:.6g} s is before the last scan at {self.t:.6g} s; sort the scans by time")
         return dt
 
     def _gated(self, scan: Scan, sensor: Sensor, blobs: Floats | None) -> Pairs:
@@ -176,7 +180,7 @@ class Tracker:
         register = self.register
         self.bank.update(decision, scan, sensor)
         hit = decision.beta0 < 0.5
-        register.history = (register.history << 1 | hit) & ((1 << 62) - 1)
+        register.history = (register.history << 1 | hit) & ((1 << 63) - 1)
         register.updated_s[hit] = scan.t
         if blobs is None or scan.box is None:
             return

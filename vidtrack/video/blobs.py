@@ -153,7 +153,7 @@ def _gap(a, b):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _measure(mask, strength, least):  # type: ignore[no-untyped-def]
-    """Of each component of at least so many pixels: count (B,), mean x, y (B, 2), covariance (B, 2, 2), box, strength."""
+    """Of each component of at least so many pixels: count (B,), mean (B, 2), covariance (B, 2, 2), box, strength."""
     row, start, stop = find_runs(mask, False)
     label, blobs = connect(row, start, stop, 1)
     n = np.zeros(blobs)

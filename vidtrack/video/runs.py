@@ -99,7 +99,7 @@ def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def components(parent):  # type: ignore[no-untyped-def]
-    """Component of each element (N,) of a forest that `join` grew, numbered by their first elements, and their number."""
+    """Component of each element (N,) after `join`, numbered by their first elements, and their number."""
     label = np.empty(len(parent), np.int64)
     count = 0
     for k in range(len(parent)):  # a root is the first of its component, so it is numbered before the others ask

@@ -20,7 +20,6 @@ from vidtrack.video.background.scene import Scene, absorb, adopt, learn, spare, 
 from vidtrack.video.background.shadow import SHADOW, mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
-from vidtrack.video.memory import keep_freed_memory
 
 _FIRST_S = 0.1  # plain averaging after a start
 _UNSURE_S = 10.0  # after a start ghosts are many: for so long
@@ -46,7 +45,6 @@ class Disturbance:
         s = self._settings
         picture = smooth(self._view.reduce(frame))
         if self._scene is None:
-            keep_freed_memory()
             self._scene = self._start(picture, frame.time_s)
         scene = self._scene
         dt, self._time_s = frame.time_s - self._time_s, frame.time_s
