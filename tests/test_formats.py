@@ -168,3 +168,8 @@ def test_what_is_not_there_is_a_source_error(tmp_path):
         formats.read(tmp_path / "nothing.txt")
     with pytest.raises(SourceError, match=r"holds no mot\.txt or tracks"):
         formats.read(tmp_path)
+
+
+def test_a_run_without_tracks_can_be_scored_by_its_boxes(tmp_path):
+    written(tmp_path, TRACKS.splitlines()[0] + "\n", "tracks.csv")
+    assert formats.read(tmp_path).box.shape == (0, 4)

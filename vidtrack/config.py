@@ -31,7 +31,7 @@ class SourceSettings(_Group):
     fps: float | None = Field(None, gt=0, le=1000)
     """frames/s where the input carries no times or wrong ones; None: the video's own, seqinfo.ini's, else 25"""
     scale: float | None = Field(None, gt=0, le=1)
-    """processed size over source size, rounded to 1, 1/2, 1/3, ...; None: 1 up to 580 rows, then 1 over the smallest integer that gets there"""
+    """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 580 rows"""
     mask: Path | None = None
     """picture whose white part is kept; None: everything"""
 

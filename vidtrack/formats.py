@@ -228,7 +228,7 @@ def _from_columns(columns: pa.Table, path: str, place: Place) -> Table:
         cov = _covariance(numbers(*sigma), numbers("corr_xy")[:, 0] if "corr_xy" in names else np.zeros(len(xy)))
     conf = numbers("conf")[:, 0] if "conf" in names else np.ones(len(xy))
     nis = numbers("nis")[:, 0] if "nis" in names else None
-    if box is not None and np.isnan(box).all():
+    if box is not None and len(box) and np.isnan(box).all():
         box = None
     return Table(frame, identity, xy, box, conf, cov, nis, unit)
 

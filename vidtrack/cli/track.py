@@ -39,9 +39,7 @@ Examples:
 @click.option("--decisions", is_flag=True, help="Write why each track got what it got.")
 @click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
 @click.option("--end", type=float, metavar="S", help="Stop at this time [s].")
-@click.option(
-    "--scale", type=float, metavar="F", help="Detect in a picture reduced to this share, rounded to 1/2, 1/3, ..."
-)
+@click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 1/2, 1/3, ...")
 @click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="Only where this picture is white.")
 @click.option("--fps", type=float, metavar="N", help="True frames/s, where the input carries no times or wrong ones.")
 def command(
