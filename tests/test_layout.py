@@ -30,6 +30,7 @@ FLOORS = (
     "scan",
     "config",
     "errors",
+    "compiled",
 )
 """From the top: a file may import its own floor and those below it."""
 

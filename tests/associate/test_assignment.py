@@ -68,6 +68,7 @@ def pairs(d2, limit, log_s=0.0):
         row,
         measurement,
         d2[row, measurement],
+        d2[row, measurement],
         spread.astype(float),
         d2[row, measurement] + spread,
         np.full(len(d2), limit),

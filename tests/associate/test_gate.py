@@ -20,20 +20,18 @@ def covariances(rng, count, dim, size):
 
 
 def brute_force(zhat, cov, scan, distance):
-    """d2 (T, M) and ln|S| (T, M) straight from the definition."""
+    """d2, NIS and ln|S| (T, M each) straight from the definition."""
     v = scan.z[None] - zhat[:, None]
-    if distance == "euclidean":
-        return (v**2).sum(axis=2), np.zeros(v.shape[:2])
     S = cov[:, None] + scan.R[None]
-    if distance == "decoupled":
-        S = S * np.eye(S.shape[2])
-    d2 = np.einsum("tma,tmab,tmb->tm", v, np.linalg.inv(S), v)
-    return d2, np.linalg.slogdet(S)[1]
+    nis = np.einsum("tma,tmab,tmb->tm", v, np.linalg.inv(S), v)
+    variance = np.diagonal(S, axis1=2, axis2=3)
+    d2 = {"mahalanobis": nis, "decoupled": (v**2 / variance).sum(axis=2), "euclidean": (v**2).sum(axis=2)}
+    return d2[distance], nis, np.linalg.slogdet(S)[1]
 
 
 def check(zhat, cov, scan, gate, run=None):
     pairs = gate.pairs(zhat, cov, scan, run)
-    d2, log_s = brute_force(zhat, cov, scan, gate.distance)
+    d2, nis, log_s = brute_force(zhat, cov, scan, gate.distance)
     limit = gate.limit(zhat.shape[1])
     inside = d2 <= limit
     if run is not None:
@@ -44,6 +42,7 @@ def check(zhat, cov, scan, gate, run=None):
     np.testing.assert_array_equal(found[sure], inside[sure])
     assert found.sum() == len(pairs), "a pair came twice"
     np.testing.assert_allclose(pairs.d2, d2[pairs.row, pairs.measurement], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(pairs.nis, nis[pairs.row, pairs.measurement], rtol=1e-8, atol=1e-9)
     np.testing.assert_allclose(pairs.log_s, log_s[pairs.row, pairs.measurement], rtol=1e-9, atol=1e-9)
     order = pairs.row * (inside.shape[1] + 1) + pairs.measurement
     assert (np.diff(order) > 0).all(), "pairs come by track, then by measurement"

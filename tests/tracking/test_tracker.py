@@ -285,3 +285,16 @@ def test_no_prediction_into_the_past():
     tracker.step(Scan(1.0, np.zeros((1, 2)), EYE))
     with pytest.raises(ScanError, match="before the last scan"):
         tracker.predict(0.5)
+
+
+@pytest.mark.parametrize("distance", ["mahalanobis", "decoupled", "euclidean"])
+def test_nis_and_existence_mean_the_same_whatever_the_gate_compares(distance):
+    """A target with matched noise: the normalised innovation squared averages its dimension, and it surely exists."""
+    rng = np.random.default_rng(1)
+    tracker = Tracker(gate=Gate(0.9999, distance), model=ConstantVelocity(accel=0.5, speed=5.0))
+    R = 4.0 * np.array([[1.0, 0.6], [0.6, 1.0]])
+    noise = rng.multivariate_normal([0, 0], R, 400)
+    seen = [tracker.step(Scan(0.1 * k, 100 + noise[k : k + 1], R)) for k in range(400)]
+    assert [int(tracks.id[0]) for tracks in seen] == [1] * 400
+    assert 1.5 < np.mean([tracks.nis[0] for tracks in seen[20:]]) < 2.5
+    assert seen[-1].existence[0] > 0.99

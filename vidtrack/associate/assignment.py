@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats, Ints
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def assign(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) -> Ints:
     """Column of each row, -1 for none, of least total cost.
 

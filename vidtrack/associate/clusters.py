@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Ints
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
     """(rows,) smallest row of each row's connected component in the gate graph; union-find with path halving."""
     root = np.arange(rows)
@@ -28,7 +29,7 @@ def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints
     return root
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def find(root: Ints, t: int) -> int:
     """Representative of t."""
     while root[t] != t:

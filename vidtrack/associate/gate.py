@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from scipy.stats import chi2
 
+from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints, Scan
 
@@ -25,9 +26,9 @@ class Pairs:
 
     row, measurement (N,)
     d2     (N,) squared distance the gate compares: v' S^-1 v, eq. (8), or |v|^2
-    log_s  (N,) ln|S| of the pair (zero for euclidean)
-    cost   (N,) d2 + log_s and what attributes add: twice the negative log likelihood but for a constant,
-           so that pairs of different tracks can be ranked
+    nis    (N,) v' S^-1 v whatever the gate compares, and log_s (N,) ln|S|: the pair's likelihood
+    cost   (N,) what an association minimises: d2, plus log_s but for the euclidean distance, so that pairs of
+           different tracks can be ranked, plus what attributes add
     limit  (T,) the gate: largest d2 admitted in each row
     start  (T + 1,) pairs of row t are start[t]..start[t+1]
     """
@@ -35,6 +36,7 @@ class Pairs:
     row: Ints
     measurement: Ints
     d2: Floats
+    nis: Floats
     log_s: Floats
     cost: Floats
     limit: Floats
@@ -47,7 +49,16 @@ class Pairs:
         """The pairs of a mask (N,)."""
         row = self.row[mask]
         start = np.searchsorted(row, np.arange(len(self.limit) + 1))
-        return Pairs(row, self.measurement[mask], self.d2[mask], self.log_s[mask], self.cost[mask], self.limit, start)
+        return Pairs(
+            row,
+            self.measurement[mask],
+            self.d2[mask],
+            self.nis[mask],
+            self.log_s[mask],
+            self.cost[mask],
+            self.limit,
+            start,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +102,13 @@ class Gate:
         own = np.zeros(len(zhat), np.int64) if run is None else run
         reach = _reach(cov, scan.R, limit, mode)
         grid = Grid.over(scan.z[:, :2], runs, reach)
-        row, measurement, d2, log_s = _gated(zhat.shape[1], mode)(
+        row, measurement, d2, nis, log_s = _gated(zhat.shape[1], mode)(
             zhat, cov, own, reach, limit,
             scan.z, scan.R, grid.order, grid.key, grid.origin, grid.cell, grid.shape,
         )  # fmt: skip
         start = np.searchsorted(row, np.arange(len(zhat) + 1))
-        return Pairs(row, measurement, d2, log_s, d2 + log_s, limit, start)
+        cost = d2 if mode == EUCLIDEAN else d2 + log_s
+        return Pairs(row, measurement, d2, nis, log_s, cost, limit, start)
 
 
 @lru_cache
@@ -138,7 +150,7 @@ class Grid:
         return cls(order, key[order], origin, cell, shape)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _extent(z: Floats) -> tuple[Floats, Floats]:
     """Least coordinates (2,) of points (M, 2), and how far the others reach beyond."""
     low, high = np.zeros(2), np.zeros(2)
@@ -148,7 +160,7 @@ def _extent(z: Floats) -> tuple[Floats, Floats]:
     return low, high - low
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _typical(reach: Floats) -> Floats:
     """(2,) mean of the finite half sides, one where there is none."""
     total, count = np.zeros(2), 0
@@ -159,7 +171,7 @@ def _typical(reach: Floats) -> Floats:
     return total / count if count else np.ones(2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=CACHE, nogil=True, error_model="numpy")
 def _keys(z: Floats, run: Ints, origin: Floats, cell: Floats, shape: Ints) -> Ints:
     """(M,) number of each point's cell: runs apart, rows of cells apart, columns in sequence."""
     key = np.empty(len(z), np.int64)
@@ -171,21 +183,21 @@ def _keys(z: Floats, run: Ints, origin: Floats, cell: Floats, shape: Ints) -> In
 
 
 @lru_cache
-def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats]]:
+def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats]]:
     """The kernel that finds the pairs inside the gate, cell row by cell row; m and mode are constants of it.
 
     Each track's measurements come in ascending order.
     """
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def gated(
         zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats,
         z: Floats, R: Floats, order: Ints, key: Ints, origin: Floats, cell: Floats, shape: Ints,
-    ) -> tuple[Ints, Ints, Floats, Floats]:  # fmt: skip
+    ) -> tuple[Ints, Ints, Floats, Floats, Floats]:  # fmt: skip
         rows = len(zhat)
         size = 4 * rows + 16
         row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
-        d2, log_s = np.empty(size), np.empty(size)
+        d2, nis, log_s = np.empty(size), np.empty(size), np.empty(size)
         n = 0
         L, v = np.empty((m, m)), np.empty(m)
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
@@ -207,42 +219,49 @@ def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats]
                 while at_key < len(key) and key[at_key] <= base + high[0]:
                     j = order[at_key]
                     at_key += 1
-                    distance, det = 0.0, 1.0
-                    for a in range(m):
+                    distance, whitened, det = 0.0, 0.0, 1.0
+                    for a in range(m):  # S = L L' and L^-1 v, row by row
                         v[a] = z[j, a] - zhat[t, a]
+                        variance = cov[t, a, a] + R[j, a, a]
                         if mode == EUCLIDEAN:
                             distance += v[a] * v[a]
-                            continue
-                        for b in range(a + 1):  # S = L L' and L^-1 v, row by row
-                            entry = 0.0 if mode == DECOUPLED and a != b else cov[t, a, b] + R[j, a, b]
+                        elif mode == DECOUPLED:
+                            distance += v[a] * v[a] / variance
+                        for b in range(a):
+                            entry = cov[t, a, b] + R[j, a, b]
                             for c in range(b):
                                 entry -= L[a, c] * L[b, c]
-                            L[a, b] = np.sqrt(entry) if a == b else entry / L[b, b]
-                        for c in range(a):
-                            v[a] -= L[a, c] * v[c]
+                            L[a, b] = entry / L[b, b]
+                            variance -= L[a, b] * L[a, b]
+                            v[a] -= L[a, b] * v[b]
+                        L[a, a] = np.sqrt(variance)
                         v[a] /= L[a, a]
-                        distance += v[a] * v[a]
+                        whitened += v[a] * v[a]
                         det *= L[a, a]
+                    if mode == FULL:
+                        distance = whitened
                     if not distance <= limit[t]:
                         continue
                     if n == size:
                         size *= 2
                         row, measurement = _grown(row, size), _grown(measurement, size)
-                        d2, log_s = _grown(d2, size), _grown(log_s, size)
-                    row[n], measurement[n], d2[n], log_s[n] = t, j, distance, 2.0 * np.log(det)
+                        d2, nis, log_s = _grown(d2, size), _grown(nis, size), _grown(log_s, size)
+                    row[n], measurement[n], d2[n] = t, j, distance
+                    nis[n], log_s[n] = whitened, 2.0 * np.log(det)
                     n += 1
             for k in range(first + 1, n):  # the grid's order depends on the cell size; results must not
                 while k > first and measurement[k - 1] > measurement[k]:
                     measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
                     d2[k - 1], d2[k] = d2[k], d2[k - 1]
+                    nis[k - 1], nis[k] = nis[k], nis[k - 1]
                     log_s[k - 1], log_s[k] = log_s[k], log_s[k - 1]
                     k -= 1
-        return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), log_s[:n].copy()
+        return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), nis[:n].copy(), log_s[:n].copy()
 
     return gated
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _grown(array: np.ndarray, size: int) -> np.ndarray:
     """The same numbers with room for more."""
     wider = np.empty(size, array.dtype)

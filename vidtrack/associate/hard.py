@@ -11,6 +11,7 @@ from numba import njit
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.gate import Pairs
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Decision, Floats, Ints
 
 
@@ -75,7 +76,7 @@ def one_hot(taken: Ints) -> Decision:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
     taken = np.full(len(start) - 1, -1)
     for t in range(len(taken)):
@@ -86,7 +87,7 @@ def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
     return taken
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _largest(cluster: Ints, row: Ints, value: Floats) -> Floats:
     """(T,) largest value over the pairs of each row's cluster; zero without pairs."""
     most = np.full(len(cluster), -np.inf)

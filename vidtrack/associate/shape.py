@@ -9,6 +9,7 @@ from numba import njit
 from scipy.stats import chi2
 
 from vidtrack.associate.gate import Pairs
+from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
 
@@ -48,7 +49,7 @@ class Shape:
         return replace(pairs, cost=pairs.cost + size2).only(stays)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=CACHE, nogil=True, error_model="numpy")
 def _compare(
     row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
     sigma: float, overlap: float,

@@ -67,9 +67,9 @@ SECTIONS = {
     short_help="Score tracks against truth.",
     epilog="""\b
 Examples:
-  vidtrack eval runs/junction samples/junction/gt.txt
+  vidtrack eval runs/junction samples/junction.txt --iou 0.3
   vidtrack eval mot.txt gt.txt --iou 0.3 --json scores.json
-  vidtrack eval runs/radar truth.csv --max-distance 50 --cutoff 200 --json -""",
+  vidtrack eval tracks.csv truth.csv --points --max-distance 50 --json -""",
 )
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("truth", type=click.Path(path_type=Path))

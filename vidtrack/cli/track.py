@@ -64,17 +64,24 @@ def command(
     tracking draws no random numbers.
     """
     from vidtrack.cli.progress import progress
-    from vidtrack.cli.signals import stoppable
+    from vidtrack.cli.signals import Terminated, stoppable
+    from vidtrack.compiled import first_run
     from vidtrack.config import load
     from vidtrack.run import Run
 
     start_log(verbose, quiet)
     settings = load(config_file, [*assignments, *_assignments(chosen)])
+    if first_run() and not quiet:
+        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
     with Run(
         source, settings, output, force=force, rerun=rerun, video=video, masks=save_masks, decisions=decisions
     ) as run:
-        for _ in stoppable(progress(run, run.frames, run.name, quiet)):
-            pass  # the sinks have seen it
+        try:
+            for _ in stoppable(progress(run, run.frames, run.name, quiet)):
+                pass  # the sinks have seen it
+        except (KeyboardInterrupt, Terminated):
+            click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
+            raise
     click.echo(run.folder)
 
 

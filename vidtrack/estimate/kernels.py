@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats, Ints
 
 Propagation = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -23,7 +24,7 @@ Update = Callable[..., tuple[Floats, Floats]]
 def propagation(n: int) -> Propagation:
     """F x and F P F' + Q (paper 004, eqs. 6 and 7) for states of n components, symmetric by construction."""
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def propagate(x: Floats, P: Floats, F: Floats, Q: Floats) -> tuple[Floats, Floats]:
         x1, P1, FP = np.empty_like(x), np.empty_like(P), np.empty((n, n))
         for t in range(len(x)):
@@ -53,7 +54,7 @@ def propagation(n: int) -> Propagation:
 def projection(m: int, n: int) -> Projection:
     """H P H' (T, m, m) for all rows; H (T, m, n) or (1, m, n)."""
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def project(P: Floats, H: Floats) -> Floats:
         out, HP = np.empty((len(P), m, m)), np.empty((m, n))
         for t in range(len(P)):
@@ -89,7 +90,7 @@ def mixture_update(m: int, n: int) -> Update:
     A - (A H' - K R) K'.
     """
 
-    @njit(cache=True, nogil=True, error_model="numpy")
+    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def update(
         x: Floats, P: Floats, H: Floats, zhat: Floats, z: Floats, R: Floats,
         parent: Ints, start: Ints, measurement: Ints, beta: Floats, beta0: Floats,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats
 
@@ -96,7 +97,7 @@ class ConstantVelocity:
         return x, P
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _accelerations(x: Floats, scale: Floats, settled: Settled, accel: float, cross: float, time: Floats) -> Floats:
     """Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2."""
     rows, n = x.shape
@@ -120,7 +121,7 @@ def _accelerations(x: Floats, scale: Floats, settled: Settled, accel: float, cro
     return Q
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=CACHE, nogil=True)
 def _heading_known(x: Floats, P: Floats, hits: np.ndarray, warmup: int, heading: float) -> Settled:
     known = np.empty(len(x), np.bool_)
     for t in range(len(x)):

@@ -28,7 +28,7 @@ class Confirmed:
     memory stays bounded whatever the tracker does.
     """
 
-    def __init__(self, *sinks: Sink, hold_s: float = 10.0) -> None:
+    def __init__(self, *sinks: Sink, hold_s: float = 2.0) -> None:
         self._sinks = sinks
         self._hold_s = hold_s
         self._held: deque[_Held] = deque()

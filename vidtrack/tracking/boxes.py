@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats, Ints
 
 
@@ -13,7 +14,7 @@ def absolute(box: Floats, xy: Floats) -> Floats:
     return np.column_stack([box[:, :2] + xy[:, :2], box[:, 2:]])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=CACHE, nogil=True, error_model="numpy")
 def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
     """For each inner box (T, 4) the outer box (M, 4) that covers the largest share of it: index or -1, share.
 

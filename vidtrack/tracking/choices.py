@@ -20,7 +20,7 @@ def innovations(pairs: Pairs, taken: Ints) -> Floats:
     """(T,) normalised innovation squared of the chosen pairs, NaN without one."""
     nis = np.full(len(taken), np.nan)
     chosen = pairs.measurement == taken[pairs.row]
-    nis[pairs.row[chosen]] = pairs.d2[chosen]
+    nis[pairs.row[chosen]] = pairs.nis[chosen]
     return nis
 
 
@@ -29,8 +29,11 @@ def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices
     rows = len(ids)
     weight, runner, runner_d2 = np.zeros(rows), np.full(rows, -1), np.full(rows, np.nan)
     np.maximum.at(weight, decision.row, decision.beta)
-    others = np.flatnonzero(pairs.measurement != taken[pairs.row])
+    chosen = pairs.measurement == taken[pairs.row]
+    d2 = np.full(rows, np.nan)
+    d2[pairs.row[chosen]] = pairs.d2[chosen]
+    others = np.flatnonzero(~chosen)
     order = others[np.argsort(-pairs.d2[others], kind="stable")]
     runner[pairs.row[order]] = pairs.measurement[order]
     runner_d2[pairs.row[order]] = pairs.d2[order]
-    return Choices(ids.copy(), taken.copy(), weight, innovations(pairs, taken), pairs.limit.copy(), runner, runner_d2)
+    return Choices(ids.copy(), taken.copy(), weight, d2, pairs.limit.copy(), runner, runner_d2)

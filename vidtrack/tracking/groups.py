@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
 from vidtrack.tracking.boxes import area, best_cover
@@ -94,7 +95,7 @@ class Groups:
         return _from_edges(predicted, box, var, blob, blobs, cut, gate, self.edge)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=CACHE, nogil=True, error_model="numpy")
 def _from_edges(
     predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, gate: Floats, edge: float
 ) -> tuple[Floats, Floats, Ints]:

@@ -197,7 +197,7 @@ class Tracker:
         """Existence probability: Bayes with the likelihood ratio of the hit or the miss."""
         ratio = np.full(len(taken), 1 - self.detection_probability * self.gate.probability)
         chosen = np.flatnonzero(pairs.measurement == taken[pairs.row])
-        log_n = -0.5 * (pairs.d2[chosen] + pairs.log_s[chosen] + self.model.dim * np.log(2 * np.pi))
+        log_n = -0.5 * (pairs.nis[chosen] + pairs.log_s[chosen] + self.model.dim * np.log(2 * np.pi))
         ratio[pairs.row[chosen]] = self.detection_probability * np.exp(log_n) / self.clutter_density
         ratio[shared >= 0] = 1.0
         odds = self.register.existence / (1 - self.register.existence) * ratio

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
 from vidtrack.video.foreground import Foreground
@@ -106,7 +107,7 @@ def _joined(blobs: Blobs, group: Ints, count: int) -> Blobs:
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _fragments(box, predicted, most, gap):  # type: ignore[no-untyped-def]
     """Group of each box (B,) and the number of groups: close pieces of the same predicted vehicle are in one."""
     parent = np.arange(len(box))
@@ -121,7 +122,7 @@ def _fragments(box, predicted, most, gap):  # type: ignore[no-untyped-def]
     return components(parent)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _only_vehicle(box, predicted, most):  # type: ignore[no-untyped-def]
     """The predicted box in which most of this box (4,) lies; -1 if there is none, or others have a part in it."""
     vehicle, sharers = -1, 0
@@ -133,7 +134,7 @@ def _only_vehicle(box, predicted, most):  # type: ignore[no-untyped-def]
     return vehicle if sharers == 1 else -1
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _share_inside(box, other):  # type: ignore[no-untyped-def]
     """Share of a box's area that lies in the other one, spread."""
     common = 1.0
@@ -144,14 +145,14 @@ def _share_inside(box, other):  # type: ignore[no-untyped-def]
     return common / (box[2] * box[3])
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _gap(a, b):  # type: ignore[no-untyped-def]
     """Distance between two boxes along the axis that separates them more; negative where they overlap."""
     across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
     return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _measure(mask, strength, least):  # type: ignore[no-untyped-def]
     """Of each component of at least so many pixels: count (B,), mean (B, 2), covariance (B, 2, 2), box, strength."""
     row, start, stop = find_runs(mask, False)

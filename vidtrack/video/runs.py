@@ -5,8 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 
-@numba.njit(cache=True, nogil=True)
+
+@numba.njit(cache=CACHE, nogil=True)
 def find_runs(mask, background):  # type: ignore[no-untyped-def]
     """Maximal horizontal runs of pixels that are not 0, or for `background` those that are: row, start, stop.
 
@@ -32,13 +34,13 @@ def find_runs(mask, background):  # type: ignore[no-untyped-def]
     return row[:n], start[:n], stop[:n]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def eights(mask):  # type: ignore[no-untyped-def]
     """The pixels of mask (h, w) uint8 as words of eight, without what is left over."""
     return mask.ravel()[: mask.size // 8 * 8].view(np.uint64)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def next_nonzero(pixels, words, x, end):  # type: ignore[no-untyped-def]
     """First place in x..end where pixels (N,) is not 0, end if none; `words` skips 64 or eight zeros at a time."""
     while x < end and pixels[x] == 0:
@@ -53,13 +55,13 @@ def next_nonzero(pixels, words, x, end):  # type: ignore[no-untyped-def]
     return min(x, end)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _none(eight):  # type: ignore[no-untyped-def]
     """Whether these eight words are all 0."""
     return eight[0] | eight[1] | eight[2] | eight[3] | eight[4] | eight[5] | eight[6] | eight[7] == 0
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def next_zero(pixels, x, end):  # type: ignore[no-untyped-def]
     """First place in x..end where pixels (N,) is 0, end if none."""
     while x < end and pixels[x] != 0:
@@ -67,7 +69,7 @@ def next_zero(pixels, x, end):  # type: ignore[no-untyped-def]
     return x
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _grown(values, used, room):  # type: ignore[no-untyped-def]
     bigger = np.empty(room, values.dtype)
     for i in range(used):
@@ -75,7 +77,7 @@ def _grown(values, used, room):  # type: ignore[no-untyped-def]
     return bigger
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
     """Component of each run and their number; runs of neighbouring rows touch if they overlap.
 
@@ -97,7 +99,7 @@ def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
     return components(parent)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def components(parent):  # type: ignore[no-untyped-def]
     """Component of each element (N,) after `join`, numbered by their first elements, and their number."""
     label = np.empty(len(parent), np.int64)
@@ -111,7 +113,7 @@ def components(parent):  # type: ignore[no-untyped-def]
     return label, count
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def join(parent, a, b):  # type: ignore[no-untyped-def]
     """Make one component of those of a and b; parent (N,) int64 begins as 0, 1, 2, ..."""
     a, b = _root(parent, a), _root(parent, b)
@@ -121,7 +123,7 @@ def join(parent, a, b):  # type: ignore[no-untyped-def]
         parent[a] = b
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _root(parent, k):  # type: ignore[no-untyped-def]
     while parent[k] != k:
         parent[k] = parent[parent[k]]

@@ -8,8 +8,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+
+@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
 def disturbance(picture, scene, floor, noise_factor, chroma_threshold, strength, hit):  # type: ignore[no-untyped-def]
     """strength = sqrt((dY / TY)^2 + (dCb / TC)^2 + (dCr / TC)^2) and hit = strength > 1, both (h, w).
 
@@ -31,27 +33,27 @@ def disturbance(picture, scene, floor, noise_factor, chroma_threshold, strength,
         _above_one(strength[y], hit[y])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _add_square(plane, scene, scale, total):  # type: ignore[no-untyped-def]
     for x in range(len(total)):
         d = (np.float32(plane[x]) - scene[x]) * scale
         total[x] += d * d
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _widen(half, wide):  # type: ignore[no-untyped-def]
     for x in range(len(wide)):
         wide[x] = half[x // 2]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
 def _distance(luma, scene, noise, chroma, floor, factor, strength):  # type: ignore[no-untyped-def]
     for x in range(len(strength)):
         d = (np.float32(luma[x]) - scene[x]) / max(floor, factor * noise[x])
         strength[x] = np.sqrt(d * d + chroma[x])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _above_one(strength, hit):  # type: ignore[no-untyped-def]
     for x in range(len(hit)):
         hit[x] = np.uint8(strength[x] > np.float32(1))

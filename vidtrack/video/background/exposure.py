@@ -5,13 +5,15 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
+
 _POINTS = 1500  # wanted on the grid
 _DARK, _BRIGHT = np.float32(24), np.float32(235)  # grey levels between which a ratio means something
 _CLIPPED = np.float32(250)
 _STEP = np.float32(0.02)  # a smaller change is left to learning
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
 def follow_gain(picture, scene, black):  # type: ignore[no-untyped-def]
     """Multiply the scene's luminance by the camera's gain against it, if that is more than learning follows."""
     g = gain(picture.luma, scene, black)
@@ -21,13 +23,13 @@ def follow_gain(picture, scene, black):  # type: ignore[no-untyped-def]
                 _amplify(plane[y], g, black)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _amplify(row, g, black):  # type: ignore[no-untyped-def]
     for x in range(len(row)):
         row[x] = min(black + g * (row[x] - black), np.float32(255))
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
 def gain(luma, scene, black):  # type: ignore[no-untyped-def]
     """Median of (Y - black) / (B - black) over the points that were not covered before; 1 if they are too few.
 

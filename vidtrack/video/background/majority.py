@@ -5,8 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 
-@numba.njit(cache=True, nogil=True)
+
+@numba.njit(cache=CACHE, nogil=True)
 def majority(hit, window, mask):  # type: ignore[no-untyped-def]
     """mask = 255 where more than half of the window x window pixels around have hit == 1, else 0.
 
@@ -31,25 +33,25 @@ def majority(hit, window, mask):  # type: ignore[no-untyped-def]
         _more_than(total, need, mask[y])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _add(hit, column):  # type: ignore[no-untyped-def]
     for x in range(len(hit)):
         column[x] = np.uint8(column[x] + np.uint8(hit[x] == 1))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _subtract(hit, column):  # type: ignore[no-untyped-def]
     for x in range(len(hit)):
         column[x] = np.uint8(column[x] - np.uint8(hit[x] == 1))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _accumulate(column, total):  # type: ignore[no-untyped-def]
     for x in range(len(total)):
         total[x] = np.uint8(total[x] + column[x])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _more_than(total, need, mask):  # type: ignore[no-untyped-def]
     for x in range(len(mask)):
         mask[x] = np.uint8(255) if total[x] > need else np.uint8(0)

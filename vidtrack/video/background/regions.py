@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 from vidtrack.video.runs import connect, find_runs
 
 _REACH = 3  # px to either side of a border over which contrast is taken
@@ -13,14 +14,14 @@ _RETURNED = 0.6  # share of a blob's pixels that are as they were before
 _MARGIN = np.float32(1.3)  # against healing what is really there: a dark vehicle on a road with marks
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def paint(mask, row, start, stop, value):  # type: ignore[no-untyped-def]
     """Set mask (h, w) uint8 to value on the runs."""
     for k in range(len(row)):
         mask[row[k], start[k] : stop[k]] = value
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def fill_holes(mask):  # type: ignore[no-untyped-def]
     """Set to 255 the background regions (4-connected) that do not reach the picture's edge. mask (h, w) uint8."""
     h, w = mask.shape
@@ -34,7 +35,7 @@ def fill_holes(mask):  # type: ignore[no-untyped-def]
     paint(mask, row[hole], start[hole], stop[hole], 255)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
     """Runs (row, start, stop) of the blobs that are in the scene and no longer in the picture.
 
@@ -66,7 +67,7 @@ def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
     return row[chosen], start[chosen], stop[chosen]
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _contrast(luma, y, x):  # type: ignore[no-untyped-def]
     across = abs(np.float32(luma[y, x + _REACH]) - np.float32(luma[y, x - _REACH]))
     return across + abs(np.float32(luma[y + _REACH, x]) - np.float32(luma[y - _REACH, x]))

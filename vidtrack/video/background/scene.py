@@ -8,6 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.compiled import CACHE
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.shadow import SHADOW
 
@@ -41,7 +42,7 @@ def start(picture: Picture) -> Scene:
     return Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), np.zeros(shape, np.float32), np.full(shape, NEVER))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no-untyped-def]
     """One step of the running averages where covered (h, w) uint8 is 0; elsewhere the seconds are counted.
 
@@ -60,7 +61,7 @@ def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no
             _learn_mean(picture.cr[y // 2], scene.cr[y // 2], half, weight)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def adopt(picture, scene, row, start, stop):  # type: ignore[no-untyped-def]
     """Take the picture for the scene on the runs (row, start, stop), as if it had just begun there."""
     for k in range(len(row)):
@@ -68,7 +69,7 @@ def adopt(picture, scene, row, start, stop):  # type: ignore[no-untyped-def]
             _adopt(picture, scene, row[k], x)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def absorb(picture, scene, hit, absorb_s, shadow_s):  # type: ignore[no-untyped-def]
     """Take the picture for the scene where it was covered for absorb_s, or is shadow and was covered for shadow_s."""
     h, w = hit.shape
@@ -79,7 +80,7 @@ def absorb(picture, scene, hit, absorb_s, shadow_s):  # type: ignore[no-untyped-
                 _adopt(picture, scene, y, x)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def spare(covered_s, box, longest_s):  # type: ignore[no-untyped-def]
     """Let the cover inside the boxes (K, 4) left, top, width, height never last longer than longest_s."""
     h, w = covered_s.shape
@@ -89,7 +90,7 @@ def spare(covered_s, box, longest_s):  # type: ignore[no-untyped-def]
                 covered_s[y, x] = min(covered_s[y, x], longest_s)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _adopt(picture, scene, y, x):  # type: ignore[no-untyped-def]
     scene.former[y, x] = scene.luma[y, x]
     scene.luma[y, x] = picture.luma[y, x]
@@ -100,7 +101,7 @@ def _adopt(picture, scene, y, x):  # type: ignore[no-untyped-def]
         scene.cr[y // 2, x // 2] = picture.cr[y // 2, x // 2]
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _learn_noise(luma, scene, noise, covered, weight):  # type: ignore[no-untyped-def]
     for x in range(len(noise)):
         v = noise[x]
@@ -109,20 +110,20 @@ def _learn_noise(luma, scene, noise, covered, weight):  # type: ignore[no-untype
         noise[x] = v + w * (deviation - v)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _learn_mean(plane, scene, covered, weight):  # type: ignore[no-untyped-def]
     for x in range(len(scene)):
         w = weight if covered[x] == 0 else np.float32(0)
         scene[x] += w * (np.float32(plane[x]) - scene[x])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _count(covered, seconds, dt):  # type: ignore[no-untyped-def]
     for x in range(len(seconds)):
         seconds[x] = seconds[x] + dt if covered[x] != 0 else np.float32(0)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=CACHE, nogil=True)
 def _every_second(row, half):  # type: ignore[no-untyped-def]
     for x in range(len(half)):
         half[x] = row[2 * x]

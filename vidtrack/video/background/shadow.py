@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 from vidtrack.video.runs import find_runs
 
 SHADOW = 2  # value of a hit that is shadow
@@ -15,7 +16,7 @@ _REACH = 2  # px to either side over which luminance differences are taken
 _NEUTRAL = np.float32(128)  # chroma of grey
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
 def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's, times one factor r.
 
@@ -34,14 +35,14 @@ def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
                 hit[y, x] = SHADOW
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _same_colour(picture, scene, y, x, r):  # type: ignore[no-untyped-def]
     blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * (scene.cb[y, x] - _NEUTRAL)
     red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * (scene.cr[y, x] - _NEUTRAL)
     return max(abs(blue), abs(red)) < _CHROMA
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=CACHE, nogil=True, inline="always")
 def _texture_error(luma, scene, y, x, r):  # type: ignore[no-untyped-def]
     h, w = luma.shape
     up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
