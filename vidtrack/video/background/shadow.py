@@ -11,7 +11,7 @@ from vidtrack.video.runs import find_runs
 SHADOW = 2  # value of a hit that is shadow
 _DARKEST, _LIGHTEST = np.float32(0.4), np.float32(0.97)  # share of the scene's light
 _CHROMA = np.float32(6)  # grey levels by which each chroma plane may miss the factor
-_TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.08)  # grey levels, and share of the scene's light
+_TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light
 _REACH = 2  # px to either side over which luminance differences are taken
 _NEUTRAL = np.float32(128)  # chroma of grey
 
