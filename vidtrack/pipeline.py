@@ -124,7 +124,9 @@ def detection_steps(detections: Iterable[tuple[int, float, Scan]], tracker: Trac
 
 
 def has_driven(tracks: Tracks) -> np.ndarray:
-    """(T,) confirmed tracks that have come farther than three times their size: what a vehicle leaves behind in the scene
-    never does, and is not to be protected from being forgotten."""
+    """(T,) confirmed tracks that have come farther than three times their size.
+
+    What a vehicle leaves behind in the scene never does, and is not to be protected from being forgotten.
+    """
     size = np.maximum(tracks.box[:, 2], tracks.box[:, 3])
     return (tracks.status != Status.TENTATIVE) & (tracks.travel > 3 * size)

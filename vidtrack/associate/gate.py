@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from scipy.stats import chi2
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import CACHE, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints, Scan
 
@@ -189,7 +189,6 @@ def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats,
     Each track's measurements come in ascending order.
     """
 
-    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def gated(
         zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats,
         z: Floats, R: Floats, order: Ints, key: Ints, origin: Floats, cell: Floats, shape: Ints,
@@ -258,7 +257,7 @@ def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats,
                     k -= 1
         return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), nis[:n].copy(), log_s[:n].copy()
 
-    return gated
+    return specialised(gated, m, mode)
 
 
 @njit(cache=CACHE, nogil=True)

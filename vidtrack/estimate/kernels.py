@@ -10,9 +10,8 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import specialised
 from vidtrack.scan import Floats, Ints
 
 Propagation = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -24,7 +23,6 @@ Update = Callable[..., tuple[Floats, Floats]]
 def propagation(n: int) -> Propagation:
     """F x and F P F' + Q (paper 004, eqs. 6 and 7) for states of n components, symmetric by construction."""
 
-    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def propagate(x: Floats, P: Floats, F: Floats, Q: Floats) -> tuple[Floats, Floats]:
         x1, P1, FP = np.empty_like(x), np.empty_like(P), np.empty((n, n))
         for t in range(len(x)):
@@ -47,14 +45,13 @@ def propagation(n: int) -> Propagation:
                     P1[t, j, i] = total
         return x1, P1
 
-    return propagate
+    return specialised(propagate, n)
 
 
 @lru_cache
 def projection(m: int, n: int) -> Projection:
     """H P H' (T, m, m) for all rows; H (T, m, n) or (1, m, n)."""
 
-    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def project(P: Floats, H: Floats) -> Floats:
         out, HP = np.empty((len(P), m, m)), np.empty((m, n))
         for t in range(len(P)):
@@ -74,7 +71,7 @@ def projection(m: int, n: int) -> Projection:
                     out[t, b, a] = total
         return out
 
-    return project
+    return specialised(project, m, n)
 
 
 @lru_cache
@@ -90,7 +87,6 @@ def mixture_update(m: int, n: int) -> Update:
     A - (A H' - K R) K'.
     """
 
-    @njit(cache=CACHE, nogil=True, error_model="numpy")
     def update(
         x: Floats, P: Floats, H: Floats, zhat: Floats, z: Floats, R: Floats,
         parent: Ints, start: Ints, measurement: Ints, beta: Floats, beta0: Floats,
@@ -172,4 +168,4 @@ def mixture_update(m: int, n: int) -> Update:
                         P1[k, i, c] -= mean[i] * mean[c]
         return x1, P1
 
-    return update
+    return specialised(update, m, n)
