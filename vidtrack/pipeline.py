@@ -15,6 +15,7 @@ from vidtrack.config import Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
 from vidtrack.scan import Scan, Status, Tracks
+from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
@@ -128,5 +129,4 @@ def has_driven(tracks: Tracks) -> np.ndarray:
 
     What a vehicle leaves behind in the scene never does, and is not to be protected from being forgotten.
     """
-    size = np.maximum(tracks.box[:, 2], tracks.box[:, 3])
-    return (tracks.status != Status.TENTATIVE) & (tracks.travel > 3 * size)
+    return (tracks.status != Status.TENTATIVE) & (tracks.travel > 3 * longer(tracks.box))

@@ -91,10 +91,10 @@ class Tracker:
         dt = self._predict(scan, events)
         pairs = self._gated(scan, sensor, blobs)
         decision, shared, hides, free = self._associated(pairs, len(scan), blobs)
-        self._update(decision, scan, sensor, blobs, dt)
+        taken = heaviest(decision)
+        self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
             self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
-        taken = heaviest(decision)
         nis = innovations(pairs, taken)
         why = choices(self.register.id, pairs, decision, taken) if self.explain else None
         self._believe(pairs, taken, shared)
@@ -175,7 +175,9 @@ class Tracker:
             free[pairs.measurement] = False
         return first.joined(second), shared, hides, free
 
-    def _update(self, decision: Decision, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float) -> None:
+    def _update(
+        self, decision: Decision, taken: Ints, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float
+    ) -> None:
         """States by their measurements, boxes by theirs."""
         register = self.register
         self.bank.update(decision, scan, sensor)
@@ -185,10 +187,9 @@ class Tracker:
         if blobs is None or scan.box is None:
             return
         rows = np.flatnonzero(hit)
-        taken = heaviest(decision)[rows]
-        old, new = register.box[rows], scan.box[taken]
+        old, new = register.box[rows], scan.box[taken[rows]]
         follow = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / self.bank.hits[rows])
-        follow[np.isnan(old[:, 0]) | self.border.cut(blobs[taken])] = 1.0
+        follow[np.isnan(old[:, 0]) | self.border.cut(blobs[taken[rows]])] = 1.0
         register.box[rows] = np.where(follow[:, None] == 1.0, new, old + follow[:, None] * (new - old))
         if self.model.per_size:
             self.bank.scale[rows] = longer(register.box[rows])
