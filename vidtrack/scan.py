@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,8 @@ class Scan:
     z          (M, m) measurements, pixels or metres (radians for angles)
     R          (M, m, m) their covariances; (m, m) is taken for all of them
     sensor     the measurement model; None is "z is the position"
+    noise      (m, m) covariance that a measurement not made would have had: what a miss tells depends on it.
+               Taken from R where that is one for all, else the mean of R; None in an empty scan without either
     box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre)
     amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class
     run        (M,) Monte Carlo run of each measurement; pairs form within equal runs only
@@ -52,6 +54,7 @@ class Scan:
     score: Floats | None = None
     label: Ints | None = None
     run: Ints | None = None
+    noise: Floats | None = None
 
     def __post_init__(self) -> None:
         z = np.ascontiguousarray(self.z, dtype=float)
@@ -59,13 +62,20 @@ class Scan:
             raise ScanError(f"z must be (M, m), not {z.shape}; a single measurement is z[None]")
         count, dim = z.shape
         R = np.asarray(self.R, dtype=float)
+        noise = None if self.noise is None else np.ascontiguousarray(self.noise, dtype=float)
         if R.shape == (dim, dim):
+            noise = R.copy() if noise is None else noise
             R = np.broadcast_to(R, (count, dim, dim))
         if R.shape != (count, dim, dim):
             raise ScanError(f"R must be ({count}, {dim}, {dim}) or ({dim}, {dim}) to match z, not {R.shape}")
         if not np.isfinite(self.t):
             raise ScanError(f"the scan's time is {self.t}; it must be a finite number of seconds")
         _refuse_bad_measurements(z, R)
+        if noise is None and count:
+            noise = R.mean(axis=0)
+        if noise is not None and noise.shape != (dim, dim):
+            raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
+        object.__setattr__(self, "noise", noise)
         object.__setattr__(self, "t", float(self.t))
         object.__setattr__(self, "z", z)
         object.__setattr__(self, "R", np.ascontiguousarray(R))
@@ -124,6 +134,9 @@ class Decision:
     parent     (K,) the row each successor continues; 0..T-1 for one-scan methods
     row, measurement, beta   (B,) sparse weights over (successor, measurement), sorted by row
     beta0      (K,) weight of "not detected"; with the betas of its row it sums to one
+    inflation  (K,) how much a miss widens the row: the missed branch has P + inflation K S K' (PDA, PSNF); None: not
+    spread     whether the scatter of the weighted measurements widens the row; generalized nearest neighbour uses
+               their mean as if it were one measurement
     """
 
     parent: Ints
@@ -131,23 +144,33 @@ class Decision:
     measurement: Ints
     beta: Floats
     beta0: Floats
+    inflation: Floats | None = None
+    spread: bool = True
 
     def without(self, rows: NDArray[np.bool_]) -> Decision:
-        """The same decision with these rows (K,) missed."""
+        """The same decision with these rows (K,) missed, which tells nothing about them."""
         stay = ~rows[self.row]
         beta0 = np.where(rows, 1.0, self.beta0)
-        return Decision(self.parent, self.row[stay], self.measurement[stay], self.beta[stay], beta0)
+        inflation = None if self.inflation is None else np.where(rows, 0.0, self.inflation)
+        return replace(
+            self,
+            row=self.row[stay],
+            measurement=self.measurement[stay],
+            beta=self.beta[stay],
+            beta0=beta0,
+            inflation=inflation,
+        )
 
     def joined(self, other: Decision) -> Decision:
         """Both decisions about disjoint sets of rows as one."""
         row = np.concatenate([self.row, other.row])
         order = np.argsort(row, kind="stable")
-        return Decision(
-            self.parent,
-            row[order],
-            np.concatenate([self.measurement, other.measurement])[order],
-            np.concatenate([self.beta, other.beta])[order],
-            self.beta0 + other.beta0 - 1.0,
+        return replace(
+            self,
+            row=row[order],
+            measurement=np.concatenate([self.measurement, other.measurement])[order],
+            beta=np.concatenate([self.beta, other.beta])[order],
+            beta0=self.beta0 + other.beta0 - 1.0,
         )
 
 

@@ -9,6 +9,8 @@ from scipy.optimize import linear_sum_assignment
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.gate import Pairs
 from vidtrack.associate.hard import GNN, NN
+from vidtrack.associate.problem import Problem
+from vidtrack.scan import Scan
 
 FORBIDDEN = 1e6
 
@@ -70,6 +72,7 @@ def pairs(d2, limit, log_s=0.0):
         d2[row, measurement],
         d2[row, measurement],
         spread.astype(float),
+        -0.5 * (d2[row, measurement] + spread + 2 * np.log(2 * np.pi)),
         d2[row, measurement] + spread,
         np.full(len(d2), limit),
         start,
@@ -77,7 +80,11 @@ def pairs(d2, limit, log_s=0.0):
 
 
 def taken(rule, pairs, measurements):
-    decision = rule.decide(pairs, len(pairs.limit), measurements)
+    rows = len(pairs.limit)
+    scan = Scan(0.0, np.zeros((measurements, 2)), np.eye(2))
+    decision = rule.decide(
+        Problem(pairs, scan, np.zeros((rows, 2, 2)), np.full(rows, 0.9), np.full(rows, 1e-5), np.full(rows, 0.99))
+    )
     result = np.full(len(pairs.limit), -1)
     result[decision.row] = decision.measurement
     np.testing.assert_array_equal(decision.beta0, result < 0)

@@ -8,6 +8,7 @@ from scipy.stats import chi2
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN
+from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Scan
 
@@ -160,11 +161,11 @@ def crossing(turn, distance, rule):
     """d2 (2, 2) and the measurement each track takes, of the crossing turned by `turn`."""
     R = 0.5 * np.eye(2)
     scan = Scan(0.0, Z @ turn.T, R)
-    pairs = Gate(0.99999, distance).pairs(ZHAT @ turn.T, turn @ S @ turn.T - R, scan)
+    problem = Problem.gated(Gate(0.99999, distance), ZHAT @ turn.T, turn @ S @ turn.T - R, scan)
     taken = np.full(2, -1)
-    decision = rule.decide(pairs, 2, 2)
+    decision = rule.decide(problem)
     taken[decision.row] = decision.measurement
-    return pairs.d2.reshape(2, 2), taken.tolist()
+    return problem.pairs.d2.reshape(2, 2), taken.tolist()
 
 
 @pytest.mark.parametrize("rule", [NN(), GNN()])

@@ -8,21 +8,22 @@ from vidtrack.associate.shape import Shape
 BOX = np.array([[10.0, 10.0, 30.0, 20.0]])
 
 
+def one_pair(d2, limit):
+    """A gated pair of track 0 and measurement 0."""
+    one, none = np.zeros(1, np.int64), np.zeros(1)
+    d2 = np.array([d2])
+    return Pairs(one, one, d2, d2, none, none, d2, np.array([limit]), np.array([0, 1]))
+
+
 def stays(predicted, box, d2=0.0, limit=9.0):
     """Whether one gated pair survives the comparison of its boxes."""
-    one = np.zeros(1, np.int64)
-    pairs = Pairs(
-        one, one, np.array([d2]), np.array([d2]), np.zeros(1), np.array([d2]), np.array([limit]), np.array([0, 1])
-    )
-    return len(Shape().weigh(pairs, np.array(predicted, float), np.array(box, float))) == 1
+    return len(Shape().weigh(one_pair(d2, limit), np.array(predicted, float), np.array(box, float))) == 1
 
 
 def test_the_same_box_fits_and_costs_nothing():
-    one = np.zeros(1, np.int64)
-    pairs = Pairs(
-        one, one, np.array([2.0]), np.array([2.0]), np.zeros(1), np.array([2.0]), np.array([9.0]), np.array([0, 1])
-    )
-    np.testing.assert_array_equal(Shape().weigh(pairs, BOX, BOX).cost, [2.0])
+    weighed = Shape().weigh(one_pair(2.0, 9.0), BOX, BOX)
+    np.testing.assert_array_equal(weighed.cost, [2.0])
+    np.testing.assert_array_equal(weighed.log_l, [0.0])
 
 
 def test_another_size_does_not_fit():

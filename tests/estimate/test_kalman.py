@@ -151,7 +151,9 @@ def _many_steps(x, P, F, Q, H, z, R, steps):
     worst = np.inf
     for k in range(steps):
         x, P = PROPAGATE(x, P, F, Q)
-        x, P = UPDATE(x, P, H, x[:, ::2].copy(), z, R, rows, start, (rows + k) % count, beta, nobody)
+        x, P = UPDATE(
+            x, P, H, x[:, ::2].copy(), z, R, rows, start, (rows + k) % count, beta, nobody, nobody, True, R[0]
+        )
         for t in range(len(x)):
             worst = min(worst, P[t, 0, 0] * P[t, 1, 1] - P[t, 0, 1] * P[t, 1, 0])
     return x, P, worst

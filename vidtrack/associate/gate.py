@@ -9,15 +9,16 @@ from typing import Literal
 
 import numpy as np
 from numba import njit
-from scipy.stats import chi2
+from scipy.special import gammainc, gammaincinv
 
 from vidtrack.compiled import CACHE, specialised
 from vidtrack.errors import ConfigError
+from vidtrack.estimate.kernels import TURN
 from vidtrack.scan import Floats, Ints, Scan
 
-Distance = Literal["mahalanobis", "decoupled", "euclidean"]
-FULL, DECOUPLED, EUCLIDEAN = range(3)
-_MODES = {"mahalanobis": FULL, "decoupled": DECOUPLED, "euclidean": EUCLIDEAN}
+Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
+FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)
+_MODES = {"mahalanobis": FULL, "decoupled": DECOUPLED, "box": BOX, "euclidean": EUCLIDEAN}
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +26,9 @@ class Pairs:
     """Gated (track, measurement) pairs, sorted by track.
 
     row, measurement (N,)
-    d2     (N,) squared distance the gate compares: v' S^-1 v, eq. (8), or |v|^2
-    nis    (N,) v' S^-1 v whatever the gate compares, and log_s (N,) ln|S|: the pair's likelihood
+    d2     (N,) squared distance the gate compares: v' S^-1 v, eq. (8), largest v^2 / S of an axis, or |v|^2
+    nis    (N,) v' S^-1 v whatever the gate compares, and log_s (N,) ln|S|
+    log_l  (N,) log-likelihood of the pair, ln N(v; 0, S) plus what attributes add
     cost   (N,) what an association minimises: d2, plus log_s but for the euclidean distance, so that pairs of
            different tracks can be ranked, plus what attributes add
     limit  (T,) the gate: largest d2 admitted in each row
@@ -38,6 +40,7 @@ class Pairs:
     d2: Floats
     nis: Floats
     log_s: Floats
+    log_l: Floats
     cost: Floats
     limit: Floats
     start: Ints
@@ -55,6 +58,7 @@ class Pairs:
             self.d2[mask],
             self.nis[mask],
             self.log_s[mask],
+            self.log_l[mask],
             self.cost[mask],
             self.limit,
             start,
@@ -67,7 +71,8 @@ class Gate:
 
     probability  share of true measurements inside; the limit on d2 is its chi-square quantile
     distance     mahalanobis: v' S^-1 v with the full S; decoupled: per-axis variances only, eq. (8) with
-                 the innovation variance; euclidean: |v|^2, the baseline that ignores the confidence region
+                 the innovation variance; box: each axis by itself, `probability` of each (.9973 is 3 sigma);
+                 euclidean: |v|^2, the baseline that ignores the confidence region
     radius       px or m, gate of the euclidean distance
     """
 
@@ -87,33 +92,81 @@ class Gate:
         """Largest admitted squared distance in `dim` dimensions."""
         if self.distance == "euclidean":
             return self.radius**2
-        return _quantile(self.probability, dim)
+        return quantile(self.probability, 1 if self.distance == "box" else dim)
 
-    def pairs(self, zhat: Floats, cov: Floats, scan: Scan, run: Ints | None = None) -> Pairs:
+    def limits(self, cov: Floats, scan: Scan) -> Floats:
+        """(T,) largest admitted squared distance of each row."""
+        return np.full(len(cov), self.limit(cov.shape[1]))
+
+    def inside(self, limit: Floats, dim: int) -> Floats:
+        """(T,) P_G, the share of a target's own measurements that gates of these limits admit.
+
+        Exact for mahalanobis; a box takes its axes for independent, the others count as `probability`.
+        """
+        if self.distance == "mahalanobis":
+            return gammainc(dim / 2, limit / 2)
+        return np.full(len(limit), self.probability ** (dim if self.distance == "box" else 1))
+
+    def pairs(
+        self, zhat: Floats, cov: Floats, scan: Scan, run: Ints | None = None, angles: tuple[int, ...] = ()
+    ) -> Pairs:
         """All pairs inside the gate; those of different Monte Carlo runs never meet.
 
         zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each
         measurement's own R. Candidates come from a grid over the first two axes, so the cost follows
-        the number of pairs and not T times M.
+        the number of pairs and not T times M. `angles` are components in -pi..pi that wrap.
         """
-        limit = np.full(len(zhat), self.limit(zhat.shape[1]))
+        limit = self.limits(cov, scan)
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
         reach = _reach(cov, scan.R, limit, mode)
         grid = Grid.over(scan.z[:, :2], runs, reach)
-        row, measurement, d2, nis, log_s = _gated(zhat.shape[1], mode)(
+        row, measurement, d2, nis, log_s = _gated(zhat.shape[1], mode, angles)(
             zhat, cov, own, reach, limit,
             scan.z, scan.R, grid.order, grid.key, grid.origin, grid.cell, grid.shape,
         )  # fmt: skip
         start = np.searchsorted(row, np.arange(len(zhat) + 1))
+        log_l = -0.5 * (nis + log_s + zhat.shape[1] * np.log(TURN))
         cost = d2 if mode == EUCLIDEAN else d2 + log_s
-        return Pairs(row, measurement, d2, nis, log_s, cost, limit, start)
+        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
+
+
+@dataclass(frozen=True, slots=True)
+class LikelihoodGate(Gate):
+    """The maximum-likelihood gate: a pair is admitted if it is likelier than a miss and a new target (SPEC 001).
+
+    v' S^-1 v <= 2 ln(P_D / ((1 - P_D) new_density (2 pi)^(M/2) |S|^(1/2))), S of the scan's mean R.
+
+    detection_probability, new_density [per unit of measurement space]   P_D and the density of new targets
+    """
+
+    detection_probability: float = 0.9
+    new_density: float = 1e-5
+
+    def __post_init__(self) -> None:
+        Gate.__post_init__(self)
+        if not 0 < self.detection_probability <= 1:
+            raise ConfigError(f"detection probability is {self.detection_probability}; it must be above 0, at most 1")
+        if not self.new_density > 0:
+            raise ConfigError(f"density of new targets is {self.new_density}; it must be above zero")
+        if self.distance != "mahalanobis":
+            raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
+
+    def limits(self, cov: Floats, scan: Scan) -> Floats:
+        """(T,) the gate of each row: zero where no measurement could be likely enough."""
+        dim = cov.shape[1]
+        S = cov if scan.noise is None else cov + scan.noise
+        with np.errstate(divide="ignore"):  # P_D of one: everything is likelier than a miss
+            odds = np.log(self.detection_probability) - np.log(1 - self.detection_probability)
+        log_s = np.linalg.slogdet(S)[1]
+        return np.maximum(0.0, 2 * (odds - np.log(self.new_density)) - dim * np.log(TURN) - log_s)
 
 
 @lru_cache
-def _quantile(probability: float, dim: int) -> float:
-    return float(chi2.ppf(probability, dim))
+def quantile(probability: float, dim: int) -> float:
+    """Chi-square quantile."""
+    return float(2 * gammaincinv(dim / 2, probability))
 
 
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
@@ -183,11 +236,13 @@ def _keys(z: Floats, run: Ints, origin: Floats, cell: Floats, shape: Ints) -> In
 
 
 @lru_cache
-def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats]]:
-    """The kernel that finds the pairs inside the gate, cell row by cell row; m and mode are constants of it.
+def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats]]:
+    """The kernel that finds the pairs inside the gate, cell row by cell row; its arguments are constants of it.
 
     Each track's measurements come in ascending order.
     """
+    wraps = tuple(a in angles for a in range(m))
+    turns = 1 if any(a in angles for a in range(2)) else 0
 
     def gated(
         zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats,
@@ -200,54 +255,66 @@ def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats,
         n = 0
         L, v = np.empty((m, m)), np.empty(m)
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
+        seen = np.full(len(z) if turns else 0, -1)
         for t in range(rows):
             first = n
-            outside = len(key) == 0 or limit[t] == 0.0
-            for a in range(2):
-                at = zhat[t, a] if a < m else 0.0
-                below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
-                above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
-                outside |= not (below < shape[a] and above >= 0)
-                low[a] = max(0.0, min(below, shape[a] - 1.0))
-                high[a] = max(0.0, min(above, shape[a] - 1.0))
-            if outside:
+            if len(key) == 0 or limit[t] == 0.0:
                 continue
-            for line in range(low[1], high[1] + 1):
-                base = (own[t] * shape[1] + line) * shape[0]
-                at_key = np.searchsorted(key, base + low[0])
-                while at_key < len(key) and key[at_key] <= base + high[0]:
-                    j = order[at_key]
-                    at_key += 1
-                    distance, whitened, det = 0.0, 0.0, 1.0
-                    for a in range(m):  # S = L L' and L^-1 v, row by row
-                        v[a] = z[j, a] - zhat[t, a]
-                        variance = cov[t, a, a] + R[j, a, a]
-                        if mode == EUCLIDEAN:
-                            distance += v[a] * v[a]
-                        elif mode == DECOUPLED:
-                            distance += v[a] * v[a] / variance
-                        for b in range(a):
-                            entry = cov[t, a, b] + R[j, a, b]
-                            for c in range(b):
-                                entry -= L[a, c] * L[b, c]
-                            L[a, b] = entry / L[b, b]
-                            variance -= L[a, b] * L[a, b]
-                            v[a] -= L[a, b] * v[b]
-                        L[a, a] = np.sqrt(variance)
-                        v[a] /= L[a, a]
-                        whitened += v[a] * v[a]
-                        det *= L[a, a]
-                    if mode == FULL:
-                        distance = whitened
-                    if not distance <= limit[t]:
-                        continue
-                    if n == size:
-                        size *= 2
-                        row, measurement = _grown(row, size), _grown(measurement, size)
-                        d2, nis, log_s = _grown(d2, size), _grown(nis, size), _grown(log_s, size)
-                    row[n], measurement[n], d2[n] = t, j, distance
-                    nis[n], log_s[n] = whitened, 2.0 * np.log(det)
-                    n += 1
+            for turn in range(-turns, turns + 1):
+                outside = False
+                for a in range(2):
+                    at = zhat[t, a] + turn * TURN * wraps[a] if a < m else 0.0
+                    below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
+                    above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
+                    outside |= not (below < shape[a] and above >= 0)
+                    low[a] = max(0.0, min(below, shape[a] - 1.0))
+                    high[a] = max(0.0, min(above, shape[a] - 1.0))
+                if outside:
+                    continue
+                for line in range(low[1], high[1] + 1):
+                    base = (own[t] * shape[1] + line) * shape[0]
+                    at_key = np.searchsorted(key, base + low[0])
+                    while at_key < len(key) and key[at_key] <= base + high[0]:
+                        j = order[at_key]
+                        at_key += 1
+                        if turns:  # a gate wider than a turn meets a measurement from both sides
+                            if seen[j] == t:
+                                continue
+                            seen[j] = t
+                        distance, whitened, det = 0.0, 0.0, 1.0
+                        for a in range(m):  # S = L L' and L^-1 v, row by row
+                            v[a] = z[j, a] - zhat[t, a]
+                            if wraps[a]:
+                                v[a] -= TURN * np.round(v[a] / TURN)
+                            variance = cov[t, a, a] + R[j, a, a]
+                            if mode == EUCLIDEAN:
+                                distance += v[a] * v[a]
+                            elif mode == DECOUPLED:
+                                distance += v[a] * v[a] / variance
+                            elif mode == BOX:
+                                distance = max(distance, v[a] * v[a] / variance)
+                            for b in range(a):
+                                entry = cov[t, a, b] + R[j, a, b]
+                                for c in range(b):
+                                    entry -= L[a, c] * L[b, c]
+                                L[a, b] = entry / L[b, b]
+                                variance -= L[a, b] * L[a, b]
+                                v[a] -= L[a, b] * v[b]
+                            L[a, a] = np.sqrt(variance)
+                            v[a] /= L[a, a]
+                            whitened += v[a] * v[a]
+                            det *= L[a, a]
+                        if mode == FULL:
+                            distance = whitened
+                        if not distance <= limit[t]:
+                            continue
+                        if n == size:
+                            size *= 2
+                            row, measurement = _grown(row, size), _grown(measurement, size)
+                            d2, nis, log_s = _grown(d2, size), _grown(nis, size), _grown(log_s, size)
+                        row[n], measurement[n], d2[n] = t, j, distance
+                        nis[n], log_s[n] = whitened, 2.0 * np.log(det)
+                        n += 1
             for k in range(first + 1, n):  # the grid's order depends on the cell size; results must not
                 while k > first and measurement[k - 1] > measurement[k]:
                     measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
@@ -257,7 +324,7 @@ def _gated(m: int, mode: int) -> Callable[..., tuple[Ints, Ints, Floats, Floats,
                     k -= 1
         return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), nis[:n].copy(), log_s[:n].copy()
 
-    return specialised(gated, m, mode)
+    return specialised(gated, m, mode, *angles)
 
 
 @njit(cache=CACHE, nogil=True)

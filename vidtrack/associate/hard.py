@@ -10,7 +10,7 @@ from numba import njit
 
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
-from vidtrack.associate.gate import Pairs
+from vidtrack.associate.problem import Problem
 from vidtrack.compiled import CACHE
 from vidtrack.scan import Decision, Floats, Ints
 
@@ -23,8 +23,8 @@ class Associator(Protocol):
 
     gated_births: ClassVar[bool]
 
-    def decide(self, pairs: Pairs, rows: int, measurements: int) -> Decision:
-        """Weights of the measurements for each of `rows` tracks."""
+    def decide(self, problem: Problem) -> Decision:
+        """Weights of the measurements for each track."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,9 @@ class NN:
 
     gated_births: ClassVar[bool] = False
 
-    def decide(self, pairs: Pairs, rows: int, measurements: int) -> Decision:
+    def decide(self, problem: Problem) -> Decision:
         """Smallest cost in each row."""
+        pairs = problem.pairs
         return one_hot(_nearest(pairs.start, pairs.measurement, pairs.cost))
 
 
@@ -53,9 +54,10 @@ class GNN:
 
     gated_births: ClassVar[bool] = True
 
-    def decide(self, pairs: Pairs, rows: int, measurements: int) -> Decision:
+    def decide(self, problem: Problem) -> Decision:
         """Optimal assignment, cluster by cluster."""
-        cluster = clusters(pairs.row, pairs.measurement, rows, measurements)
+        pairs, measurements = problem.pairs, problem.measurements
+        cluster = clusters(pairs.row, pairs.measurement, problem.rows, measurements)
         miss = pairs.limit + _largest(cluster, pairs.row, pairs.cost - pairs.d2)
         finite = np.isfinite(miss)
         miss[~finite] = (

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
-from scipy.stats import chi2
 
-from vidtrack.associate.gate import Pairs
+from vidtrack.associate.gate import Pairs, quantile
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
@@ -36,17 +35,17 @@ class Shape:
             raise ConfigError(f"shape probability is {self.probability}; it must lie between 0 and 1")
 
     def weigh(self, pairs: Pairs, predicted: Floats, boxes: Floats) -> Pairs:
-        """The pairs that size allows, with the size's distance added to their cost.
+        """The pairs that size allows, with the size's distance in their cost and likelihood.
 
         predicted (T, 4) and boxes (M, 4) in the picture. A pair stays if its d2 and its size distance
         |ln(w h ratios)|^2 / sigma^2 together are below the gate plus the size's own chi-square quantile,
         and if the boxes overlap enough.
         """
-        most = pairs.limit + float(chi2.ppf(self.probability, 2))
+        most = pairs.limit + quantile(self.probability, 2)
         size2, stays = _compare(
             pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma, self.overlap
         )
-        return replace(pairs, cost=pairs.cost + size2).only(stays)
+        return replace(pairs, cost=pairs.cost + size2, log_l=pairs.log_l - 0.5 * size2).only(stays)
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")

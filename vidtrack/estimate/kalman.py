@@ -48,10 +48,14 @@ class KalmanBank:
         zhat = sensor.h(self.x, self.model.position)
         H = sensor.H(self.x, self.model.position)
         start = np.searchsorted(decision.row, np.arange(len(decision.parent) + 1))
-        update = mixture_update(*H.shape[1:])
+        rows, m = len(decision.parent), H.shape[1]
+        update = mixture_update(*H.shape[1:], sensor.angles)
+        known = decision.inflation is not None and scan.noise is not None
+        inflation = decision.inflation if known else np.zeros(rows)
         self.x, self.P = update(
             self.x, self.P, H, zhat, scan.z, scan.R,
             decision.parent, start, decision.measurement, decision.beta, decision.beta0,
+            inflation, decision.spread, scan.noise if known else np.eye(m),
         )  # fmt: skip
         self.hits = self.hits[decision.parent] + (decision.beta0 < 0.5)
         self.scale = self.scale[decision.parent]

@@ -18,6 +18,8 @@ Propagation = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats], Floats]
 Update = Callable[..., tuple[Floats, Floats]]
 
+TURN = 2 * np.pi
+
 
 @lru_cache
 def propagation(n: int) -> Propagation:
@@ -75,36 +77,41 @@ def projection(m: int, n: int) -> Projection:
 
 
 @lru_cache
-def mixture_update(m: int, n: int) -> Update:
+def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
     """The moment-matched mixture of the missed branch (weight beta0) and one Kalman update per weight.
 
     The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), zhat (T, m), z (M, m), R (M, m, m), and of
-    the decision parent (K,), the bounds start (K + 1,) of each successor's weights, measurement (B,), beta (B,)
-    and beta0 (K,); it gives x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
+    the decision parent (K,), the bounds start (K + 1,) of each successor's weights, measurement (B,), beta (B,),
+    beta0 (K,), inflation (K,) and spread; it gives x (K, n) and P (K, n, n). A single weight of one is the Kalman
+    update itself. `angles` are components whose innovation is taken the short way round.
 
     K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance is Joseph's
     (I - K H) P (I - K H)' + K R K', positive definite whatever the rounding, as A = P - K H P and then
-    A - (A H' - K R) K'.
+    A - (A H' - K R) K'. The missed branch is widened by inflation * K S K', with S of `noise` (m, m).
     """
+    wraps = tuple(a in angles for a in range(m))
 
     def update(
         x: Floats, P: Floats, H: Floats, zhat: Floats, z: Floats, R: Floats,
         parent: Ints, start: Ints, measurement: Ints, beta: Floats, beta0: Floats,
+        inflation: Floats, spread: bool, noise: Floats,
     ) -> tuple[Floats, Floats]:  # fmt: skip
         rows = len(parent)
         x1, P1 = np.empty((rows, n)), np.empty((rows, n, n))
         K, L, A, AH = np.empty((n, m)), np.empty((m, m)), np.empty((n, n)), np.empty((n, m))
-        shift, mean = np.empty(n), np.empty(n)
+        shift, mean, v = np.empty(n), np.empty(n), np.empty(m)
         for k in range(rows):
             t = parent[k]
             h = min(t, len(H) - 1)
-            mixed = start[k + 1] - start[k] > 1 or beta0[k] > 0.0
+            mixed = spread and (start[k + 1] - start[k] > 1 or beta0[k] > 0.0)
             for i in range(n):  # moments about the prediction
                 mean[i] = 0.0
                 for c in range(n):
                     P1[k, i, c] = beta0[k] * P[t, i, c]
-            for b in range(start[k], start[k + 1]):
-                j, weight = measurement[b], beta[b]
+            widening = beta0[k] * inflation[k]
+            for b in range(start[k] - (widening > 0.0), start[k + 1]):
+                missed = b < start[k]
+                j, weight = (0, widening) if missed else (measurement[b], beta[b])
                 for i in range(n):  # P H'
                     for a in range(m):
                         total = 0.0
@@ -113,25 +120,36 @@ def mixture_update(m: int, n: int) -> Update:
                         K[i, a] = total
                 for a in range(m):  # S = L L'
                     for c in range(a + 1):
-                        total = R[j, a, c]
+                        total = noise[a, c] if missed else R[j, a, c]
                         for d in range(n):
                             total += H[h, a, d] * K[d, c]
                         for e in range(c):
                             total -= L[a, e] * L[c, e]
                         L[a, c] = np.sqrt(total) if a == c else total / L[c, c]
-                for i in range(n):  # K = P H' S^-1
+                for i in range(n):  # K L = P H' L^-T
                     for a in range(m):
                         for c in range(a):
                             K[i, a] -= L[a, c] * K[i, c]
                         K[i, a] /= L[a, a]
+                if missed:  # K S K' = (K L) (K L)'
+                    for i in range(n):
+                        for c in range(n):
+                            for a in range(m):
+                                P1[k, i, c] += weight * K[i, a] * K[c, a]
+                    continue
+                for i in range(n):  # K = P H' S^-1
                     for a in range(m - 1, -1, -1):
                         for c in range(a + 1, m):
                             K[i, a] -= L[c, a] * K[i, c]
                         K[i, a] /= L[a, a]
+                for a in range(m):
+                    v[a] = z[j, a] - zhat[t, a]
+                    if wraps[a]:
+                        v[a] -= TURN * np.round(v[a] / TURN)
                 for i in range(n):
                     total = 0.0
                     for a in range(m):
-                        total += K[i, a] * (z[j, a] - zhat[t, a])
+                        total += K[i, a] * v[a]
                     shift[i] = total
                     mean[i] += weight * total
                     for c in range(n):
@@ -168,4 +186,4 @@ def mixture_update(m: int, n: int) -> Update:
                         P1[k, i, c] -= mean[i] * mean[c]
         return x1, P1
 
-    return specialised(update, m, n)
+    return specialised(update, m, n, *angles)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -11,7 +11,13 @@ from vidtrack.scan import Floats
 
 
 class Sensor(Protocol):
-    """A measurement model z = h(x) + noise."""
+    """A measurement model z = h(x) + noise.
+
+    angles  components of z that are angles: their differences are taken the short way round. At most one of
+            the first two may be one; its values lie in -pi..pi.
+    """
+
+    angles: ClassVar[tuple[int, ...]]
 
     def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
         """(T, m) expected measurements of states x (T, n) whose positions are in columns `position`."""
@@ -26,6 +32,8 @@ class Sensor(Protocol):
 @dataclass(frozen=True, slots=True)
 class Position:
     """The measurement is the position itself, in the state's own coordinates."""
+
+    angles: ClassVar[tuple[int, ...]] = ()
 
     def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
         """(T, d) the positions."""

@@ -5,15 +5,34 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.associate.gate import Pairs
+from vidtrack.associate.problem import Problem
 from vidtrack.scan import Choices, Decision, Floats, Ints
 
 
 def heaviest(decision: Decision) -> Ints:
-    """(K,) measurement of the largest weight in each row, -1 for none."""
+    """(K,) measurement of the largest weight in each row, -1 where a miss is likelier than not."""
     best = np.full(len(decision.parent), -1)
     order = np.argsort(decision.beta, kind="stable")
     best[decision.row[order]] = decision.measurement[order]
+    best[decision.beta0 >= 0.5] = -1
     return best
+
+
+def evidence(problem: Problem, decision: Decision) -> Floats:
+    """(T,) log-likelihood ratio, target against none, of what each row got.
+
+    A shared-out row: 1 - P_D P_G + sum of P_D N / clutter = (1 - P_D P_G) / beta0, the PDA's normaliser. A row
+    with one measurement for certain: P_D N / clutter of that one.
+    """
+    with np.errstate(divide="ignore"):
+        ratio = np.log(problem.missed) - np.log(decision.beta0)
+    sure = np.flatnonzero(decision.beta == 1.0)
+    taken = np.full(problem.rows, -1)
+    taken[decision.row[sure]] = decision.measurement[sure]
+    pairs = problem.pairs
+    chosen = pairs.measurement == taken[pairs.row]
+    ratio[pairs.row[chosen]] = problem.log_ratio[chosen]
+    return np.nan_to_num(ratio, nan=0.0)
 
 
 def innovations(pairs: Pairs, taken: Ints) -> Floats:

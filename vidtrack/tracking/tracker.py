@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
+from scipy.special import expit, logit
 
-from vidtrack.associate.gate import Gate, Pairs
+from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
+from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ScanError
 from vidtrack.estimate.kalman import KalmanBank
@@ -16,13 +19,17 @@ from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.scan import Choices, Decision, Event, Floats, Ints, Scan, Status, Tracks
 from vidtrack.tracking.border import Border
 from vidtrack.tracking.boxes import absolute, area, best_cover, longer, widened
-from vidtrack.tracking.choices import choices, heaviest, innovations
+from vidtrack.tracking.choices import choices, evidence, heaviest, innovations
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.register import Register
 from vidtrack.tracking.sharing import Sharing
 
 BIRTH_EXISTENCE = 0.5
+CLAIMED = 0.1
+"""A measurement that tracks claim with more weight than this in sum starts no track."""
+BELIEF = 20.0
+"""Largest log-odds of a track's existence."""
 EXIT_S = 0.2
 """A track on its way over the border is given up after so long without evidence."""
 FRAGMENT, NEAR, SMALL = 0.6, 0.5, 0.3
@@ -41,6 +48,7 @@ class Tracker:
     life       confirmation and deletion
     groups     how tracks share merged blobs (scans with boxes only); None: they do not
     shape      how the size of boxes counts in the association; None: it does not
+    estimator  the filters' bank, made from the model
     bounds     (width, height) of the picture; a track that leaves it is deleted; None: no border
     births     whether measurements that belong to no track start one
     detection_probability, clutter_density [per px^2 or m^2]   for the existence probability
@@ -57,6 +65,7 @@ class Tracker:
         groups: Groups | None = None,
         shape: Shape | None = None,
         *,
+        estimator: Callable[[ConstantVelocity], KalmanBank] = KalmanBank,
         bounds: tuple[float, float] | None = None,
         births: bool = True,
         detection_probability: float = 0.9,
@@ -74,7 +83,7 @@ class Tracker:
         self.clutter_density = clutter_density
         self.box_s = box_s
         self.explain = explain
-        self.bank = KalmanBank(self.model)
+        self.bank = estimator(self.model)
         self.register = Register(self.model.dim)
         self.border = Border(*bounds) if bounds else Border()
         self.sharing = Sharing(groups, self.border, box_s) if groups else None
@@ -89,15 +98,15 @@ class Tracker:
         sensor = scan.sensor or POSITION
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
-        pairs = self._gated(scan, sensor, blobs)
-        decision, shared, hides, free = self._associated(pairs, len(scan), blobs)
+        problem = self._problem(scan, sensor, blobs)
+        decision, shared, hides, free = self._associated(problem, blobs)
         taken = heaviest(decision)
         self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
             self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
-        nis = innovations(pairs, taken)
-        why = choices(self.register.id, pairs, decision, taken) if self.explain else None
-        self._believe(pairs, taken, shared)
+        nis = innovations(problem.pairs, taken)
+        why = choices(self.register.id, problem.pairs, decision, taken) if self.explain else None
+        self._believe(problem, decision, shared)
         kept = self._delete(scan.t, events)
         if self.sharing:
             self.sharing.regroup(shared[kept], self.register, scan.t, events)
@@ -146,31 +155,34 @@ class Tracker:
             raise ScanError(f"{t:.6g} s is before the last scan at {self.t:.6g} s; sort the scans by time")
         return dt
 
-    def _gated(self, scan: Scan, sensor: Sensor, blobs: Floats | None) -> Pairs:
+    def _problem(self, scan: Scan, sensor: Sensor, blobs: Floats | None) -> Problem:
+        """Which measurements each track may take, and how likely each is."""
         zhat, cov = self.bank.predicted_measurement(sensor)
-        pairs = self.gate.pairs(zhat, cov, scan, self.register.run)
+        problem = Problem.gated(
+            self.gate, zhat, cov, scan, self.detection_probability, self.clutter_density,
+            run=self.register.run, angles=sensor.angles,
+        )  # fmt: skip
         if self.shape is None or blobs is None:
-            return pairs
-        return self.shape.weigh(pairs, self._boxes(), blobs)
+            return problem
+        return replace(problem, pairs=self.shape.weigh(problem.pairs, self._boxes(), blobs))
 
-    def _associated(self, pairs: Pairs, count: int, blobs: Floats | None) -> tuple[Decision, Ints, Mask, Mask]:
+    def _associated(self, problem: Problem, blobs: Floats | None) -> tuple[Decision, Ints, Mask, Mask]:
         """Confirmed tracks choose first, then those on shared blobs claim them, then tentative tracks choose.
 
         Returns the decision, the blob (T,) that each row leans on by its edges (-1: none), the blobs (M,)
         that hide more than their tracks account for, and the measurements (M,) that may start a track.
         """
-        rows = len(self.register)
+        pairs, rows, count = problem.pairs, problem.rows, problem.measurements
         confirmed = self.register.status != Status.TENTATIVE
-        first = self.associate.decide(pairs.only(confirmed[pairs.row]), rows, count)
+        first = self.associate.decide(problem.only(confirmed[pairs.row]))
         shared, hides = np.full(rows, -1), np.ones(count, bool)
         if self.sharing and blobs is not None:
             shared, hides = self.sharing.claim(self._boxes(), self.bank.hits, heaviest(first), confirmed, blobs)
             first = first.without(shared >= 0)
-        free = hides.copy()
-        free[first.measurement] = False
+        free = hides & ~claimed(first, count)
         open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
-        second = self.associate.decide(pairs.only(open_to_all), rows, count)
-        free[second.measurement] = False
+        second = self.associate.decide(problem.only(open_to_all))
+        free &= ~claimed(second, count)
         if not self.associate.gated_births:
             free[pairs.measurement] = False
         return first.joined(second), shared, hides, free
@@ -194,15 +206,12 @@ class Tracker:
         if self.model.per_size:
             self.bank.scale[rows] = longer(register.box[rows])
 
-    def _believe(self, pairs: Pairs, taken: Ints, shared: Ints) -> None:
-        """Existence probability: Bayes with the likelihood ratio of the hit or the miss."""
-        ratio = np.full(len(taken), 1 - self.detection_probability * self.gate.probability)
-        chosen = np.flatnonzero(pairs.measurement == taken[pairs.row])
-        log_n = -0.5 * (pairs.nis[chosen] + pairs.log_s[chosen] + self.model.dim * np.log(2 * np.pi))
-        ratio[pairs.row[chosen]] = self.detection_probability * np.exp(log_n) / self.clutter_density
-        ratio[shared >= 0] = 1.0
-        odds = self.register.existence / (1 - self.register.existence) * ratio
-        self.register.existence = np.clip(odds / (1 + odds), 1e-9, 1 - 1e-9)
+    def _believe(self, problem: Problem, decision: Decision, shared: Ints) -> None:
+        """Existence probability: Bayes with the likelihood ratio of what each track got."""
+        log_ratio = evidence(problem, decision)
+        log_ratio[shared >= 0] = 0.0
+        log_odds = np.clip(logit(self.register.existence) + log_ratio, -BELIEF, BELIEF)
+        self.register.existence = expit(log_odds)
 
     def _delete(self, t: float, events: list[Event]) -> Mask:
         """Drop the rows that are not believed any more; returns the mask of those kept."""
@@ -295,6 +304,11 @@ class Tracker:
             events=events,
             choices=why,
         )
+
+
+def claimed(decision: Decision, measurements: int) -> Mask:
+    """(M,) measurements that tracks claim."""
+    return np.bincount(decision.measurement, decision.beta, measurements) > CLAIMED
 
 
 def _deaths(t: float, ids: Ints, reason: str) -> Iterable[Event]:

@@ -64,4 +64,4 @@ def compare(z: float) -> tuple[Floats, Floats]:
     scan = Scan(0.0, np.array([[z]]), R)
     near = Gate(distance="euclidean").pairs(PREDICTED, cov, scan)
     region = Gate(probability=1.0).pairs(PREDICTED, cov, scan)
-    return np.sqrt(near.d2), np.exp(-0.5 * (region.d2 + region.log_s + np.log(2 * np.pi)))
+    return np.sqrt(near.d2), np.exp(region.log_l)

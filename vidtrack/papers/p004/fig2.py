@@ -6,6 +6,7 @@ import numpy as np
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import NN
+from vidtrack.associate.problem import Problem
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
@@ -25,10 +26,10 @@ def reproduce(runs: int | None, seed: int) -> Result:
     S = cov + R
     along, across = np.sqrt(np.diag(S))
     z = zhat + np.array([[1.7 * along, 0.3 * across], [-0.2 * along, -2.9 * across]])
-    near, region = (
-        Gate(0.9999, kind).pairs(zhat[None], cov[None], Scan(0.0, z, R)) for kind in ("euclidean", "mahalanobis")
-    )
-    chosen = [int(NN().decide(pairs, 1, 2).measurement[0]) for pairs in (near, region)]
+    scan = Scan(0.0, z, R)
+    problems = [Problem.gated(Gate(0.9999, kind), zhat[None], cov[None], scan) for kind in ("euclidean", "mahalanobis")]
+    near, region = (problem.pairs for problem in problems)
+    chosen = [int(NN().decide(problem).measurement[0]) for problem in problems]
     drawing, (ax,) = style.figure(panel=(6.8, 3.6))
     for probability, alpha in ((0.5, 0.9), (0.8, 0.75), (REGION, 0.6), (0.99, 0.4)):
         style.region(ax, zhat, S, probability, color=style.BLUE, alpha=alpha)

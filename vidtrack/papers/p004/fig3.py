@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vidtrack.associate.gate import Distance, Gate, Pairs
+from vidtrack.associate.gate import Distance, Gate
 from vidtrack.associate.hard import GNN, NN
+from vidtrack.associate.problem import Problem
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
@@ -53,14 +54,14 @@ class Frame:
 
     def d2(self, distance: Distance) -> Floats:
         """(2, 2) squared distances of targets (rows) to measurements, by the tracker's gate."""
-        return self._pairs(distance).d2.reshape(2, 2)
+        return self._problem(distance).pairs.d2.reshape(2, 2)
 
     def taken(self, distance: Distance, method: type[NN] | type[GNN]) -> list[int]:
         """Measurement of each target, by the tracker's association."""
-        return [int(j) for j in method().decide(self._pairs(distance), 2, 2).measurement]
+        return [int(j) for j in method().decide(self._problem(distance)).measurement]
 
-    def _pairs(self, distance: Distance) -> Pairs:
-        return Gate(probability=1.0, distance=distance).pairs(self.zhat, self.cov, Scan(0.0, self.z, R))
+    def _problem(self, distance: Distance) -> Problem:
+        return Problem.gated(Gate(1.0, distance), self.zhat, self.cov, Scan(0.0, self.z, R))
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
