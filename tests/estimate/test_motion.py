@@ -19,7 +19,8 @@ def noise(model, dt, velocity=(3.0, 4.0), settled=KNOWN, scale=ONE):
     """Q (n, n) of one row that moves at `velocity`."""
     x = np.zeros((1, 4))
     x[0, [1, 3]] = velocity
-    return model.process_noise(dt, x, scale, settled)[0]
+    hits = np.where(settled, 100, 0)
+    return model.process_noise(dt, x, np.zeros((1, 4, 4)), hits, scale)[0]
 
 
 @given(dt=st.floats(1e-3, 10.0), angle=st.floats(-np.pi, np.pi))
@@ -27,7 +28,7 @@ def test_noise_of_two_steps_is_that_of_one_long_step(dt, angle):
     """The same scene at 10 and at 30 frames/s must be equally uncertain: Q(2 dt) = F Q F' + Q."""
     model = ConstantVelocity(accel=2.0, cross=0.7, hold_s=0.5)
     heading = 5 * np.array([np.cos(angle), np.sin(angle)])
-    F, Q = model.transition(dt), noise(model, dt, heading)
+    F, Q = model.transition(dt, np.zeros((1, 4)))[0], noise(model, dt, heading)
     np.testing.assert_allclose(F @ Q @ F.T + Q, noise(model, 2 * dt, heading), rtol=1e-9, atol=1e-12 * dt)
 
 
@@ -76,7 +77,7 @@ def follow(model, velocity, updates, sigma=0.1):
 def stretched(bank):
     """Whether the bank's next prediction trusts the heading."""
     _, P = bank.ahead(0.1)
-    F = bank.model.transition(0.1)
+    F = bank.model.transition(0.1, bank.x)[0]
     Q = P[0] - F @ bank.P[0] @ F.T
     return Q[1, 1] > 1.5 * Q[3, 3]
 

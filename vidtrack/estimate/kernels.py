@@ -14,7 +14,7 @@ import numpy as np
 from vidtrack.compiled import specialised
 from vidtrack.scan import Floats, Ints
 
-Propagation = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
+Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats], Floats]
 Update = Callable[..., tuple[Floats, Floats]]
 
@@ -23,26 +23,30 @@ TURN = 2 * np.pi
 
 @lru_cache
 def propagation(n: int) -> Propagation:
-    """F x and F P F' + Q (paper 004, eqs. 6 and 7) for states of n components, symmetric by construction."""
+    """F x and J P J' + Q (paper 004, eqs. 6 and 7) for states of n components, symmetric by construction.
 
-    def propagate(x: Floats, P: Floats, F: Floats, Q: Floats) -> tuple[Floats, Floats]:
-        x1, P1, FP = np.empty_like(x), np.empty_like(P), np.empty((n, n))
+    F and its Jacobian J (1, n, n) for all rows or (T, n, n), the same array for linear motion; Q (T, n, n).
+    """
+
+    def propagate(x: Floats, P: Floats, F: Floats, J: Floats, Q: Floats) -> tuple[Floats, Floats]:
+        x1, P1, JP = np.empty_like(x), np.empty_like(P), np.empty((n, n))
         for t in range(len(x)):
+            f = min(t, len(F) - 1)
             for i in range(n):
                 total = 0.0
                 for k in range(n):
-                    total += F[i, k] * x[t, k]
+                    total += F[f, i, k] * x[t, k]
                 x1[t, i] = total
                 for j in range(n):
                     total = 0.0
                     for k in range(n):
-                        total += F[i, k] * P[t, k, j]
-                    FP[i, j] = total
+                        total += J[f, i, k] * P[t, k, j]
+                    JP[i, j] = total
             for i in range(n):
                 for j in range(i, n):
                     total = Q[t, i, j]
                     for k in range(n):
-                        total += FP[i, k] * F[j, k]
+                        total += JP[i, k] * J[f, j, k]
                     P1[t, i, j] = total
                     P1[t, j, i] = total
         return x1, P1
@@ -80,11 +84,12 @@ def projection(m: int, n: int) -> Projection:
 def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
     """The moment-matched mixture of the missed branch (weight beta0) and one Kalman update per weight.
 
-    The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), zhat (T, m), z (M, m), R (M, m, m), and of
-    the decision parent (K,), the bounds start (K + 1,) of each successor's weights, measurement (B,), beta (B,),
-    beta0 (K,), inflation (K,) and spread; it gives x (K, n) and P (K, n, n). A single weight of one is the Kalman
-    update itself. `angles` are components whose innovation is taken the short way round.
+    The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m), zhat (T, m),
+    z (M, m), R (M, m, m), and of the decision parent (K,), the bounds start (K + 1,) of each successor's weights,
+    measurement (B,), beta (B,), beta0 (K,), inflation (K,) and spread; it gives x (K, n) and P (K, n, n). A single
+    weight of one is the Kalman update itself. `angles` are components whose innovation is taken the short way round.
 
+    S = H P H' + excess + R; the excess is what the linearisation H leaves out of the measurement's spread.
     K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance is Joseph's
     (I - K H) P (I - K H)' + K R K', positive definite whatever the rounding, as A = P - K H P and then
     A - (A H' - K R) K'. The missed branch is widened by inflation * K S K', with S of `noise` (m, m).
@@ -92,7 +97,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
     wraps = tuple(a in angles for a in range(m))
 
     def update(
-        x: Floats, P: Floats, H: Floats, zhat: Floats, z: Floats, R: Floats,
+        x: Floats, P: Floats, H: Floats, excess: Floats, zhat: Floats, z: Floats, R: Floats,
         parent: Ints, start: Ints, measurement: Ints, beta: Floats, beta0: Floats,
         inflation: Floats, spread: bool, noise: Floats,
     ) -> tuple[Floats, Floats]:  # fmt: skip
@@ -102,7 +107,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
         shift, mean, v = np.empty(n), np.empty(n), np.empty(m)
         for k in range(rows):
             t = parent[k]
-            h = min(t, len(H) - 1)
+            h, s = min(t, len(H) - 1), min(t, len(excess) - 1)
             mixed = spread and (start[k + 1] - start[k] > 1 or beta0[k] > 0.0)
             for i in range(n):  # moments about the prediction
                 mean[i] = 0.0
@@ -120,7 +125,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
                         K[i, a] = total
                 for a in range(m):  # S = L L'
                     for c in range(a + 1):
-                        total = noise[a, c] if missed else R[j, a, c]
+                        total = excess[s, a, c] + (noise[a, c] if missed else R[j, a, c])
                         for d in range(n):
                             total += H[h, a, d] * K[d, c]
                         for e in range(c):
@@ -161,13 +166,13 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
                             total += H[h, a, d] * P[t, d, c]
                         for i in range(n):
                             A[i, c] -= K[i, a] * total
-                for i in range(n):  # A H' - K R
+                for i in range(n):  # A H' - K (excess + R)
                     for a in range(m):
                         total = 0.0
                         for d in range(n):
                             total += A[i, d] * H[h, a, d]
                         for c in range(m):
-                            total -= K[i, c] * R[j, c, a]
+                            total -= K[i, c] * (excess[s, c, a] + R[j, c, a])
                         AH[i, a] = total
                 for i in range(n):
                     for c in range(i, n):

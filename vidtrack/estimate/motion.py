@@ -1,4 +1,4 @@
-"""Motion models: how a state moves and how uncertain it grows while nobody looks."""
+"""Nearly constant velocity, the model of vehicles in pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from numba import njit
 
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
+from vidtrack.estimate.model import at_rest, positions, velocities
+from vidtrack.scan import Floats, Ints
 
 Settled = np.ndarray  # (T,) bool: rows whose heading may shape the process noise
 
@@ -48,27 +49,37 @@ class ConstantVelocity:
                 raise ConfigError(f"ConstantVelocity: {name} is {value}; it must be above zero")
 
     @property
+    def states(self) -> int:
+        """n, components of the state."""
+        return 2 * self.dim
+
+    @property
     def position(self) -> tuple[int, ...]:
         """Columns of the state that are positions."""
-        return tuple(range(0, 2 * self.dim, 2))
+        return positions(self.dim)
 
     @property
     def velocity(self) -> tuple[int, ...]:
         """Columns of the state that are velocities."""
-        return tuple(range(1, 2 * self.dim, 2))
+        return velocities(self.dim)
 
-    def transition(self, dt: float) -> Floats:
-        """F (n, n) over dt seconds."""
+    def transition(self, dt: float, x: Floats) -> Floats:
+        """F (1, n, n) over dt seconds."""
         F = np.eye(2 * self.dim)
         F[self.position, self.velocity] = dt
+        return F[None]
+
+    def jacobian(self, dt: float, x: Floats, F: Floats) -> Floats:
+        """F: the motion is linear."""
         return F
 
-    def process_noise(self, dt: float, x: Floats, scale: Floats, settled: Settled) -> Floats:
-        """Q (T, n, n) over dt seconds: accelerations stretched along the heading of `settled` rows.
+    def process_noise(self, dt: float, x: Floats, P: Floats, hits: Ints, scale: Floats) -> Floats:
+        """Q (T, n, n) over dt seconds: accelerations stretched along the heading of rows that know theirs.
 
-        x (T, n), scale (T,) multiplies the standard deviations. The acceleration covariance is
-        A = cross^2 I + (accel^2 - cross^2) u u', u the unit velocity (SPEC 004).
+        x (T, n), P (T, n, n), hits (T,) updates so far, scale (T,) multiplies the standard deviations. The
+        acceleration covariance is A = cross^2 I + (accel^2 - cross^2) u u', u the unit velocity (SPEC 004).
         """
+        settled = self.settled(x, P, hits)
         if self.hold_s is None:
             time = np.array([dt**4 / 4, dt**3 / 2, dt**2])
         else:
@@ -88,13 +99,7 @@ class ConstantVelocity:
         position (B, d), cov (B, d, d), scale (B,) -> x (B, n), P (B, n, n). The velocity is zero with
         the prior's variance: the second measurement then gives the two-point estimate.
         """
-        n = 2 * self.dim
-        x = np.zeros((len(position), n))
-        P = np.zeros((len(position), n, n))
-        x[:, self.position] = position
-        P[:, 0::2, 0::2] = cov
-        P[:, self.velocity, self.velocity] = ((self.speed * scale) ** 2)[:, None]
-        return x, P
+        return at_rest(position, cov, np.repeat((self.speed * scale)[:, None], self.states, axis=1))
 
 
 @njit(cache=CACHE, nogil=True)

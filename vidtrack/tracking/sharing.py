@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Decision, Event, Floats, Ints, Scan
 from vidtrack.tracking.border import Border
@@ -42,7 +42,7 @@ class Sharing:
         return shared, ~self._groups.explained(predicted, shared, blobs)
 
     def follow(
-        self, shared: Ints, hides: Mask, bank: KalmanBank, register: Register, blobs: Floats, t: float, dt: float
+        self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
     ) -> None:
         """Update the tracks that lean on blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
         rows = np.flatnonzero(shared >= 0)

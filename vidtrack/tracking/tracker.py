@@ -13,7 +13,9 @@ from vidtrack.associate.hard import GNN, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ScanError
+from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.scan import Choices, Decision, Event, Floats, Ints, Scan, Status, Tracks
@@ -58,14 +60,14 @@ class Tracker:
 
     def __init__(
         self,
-        model: ConstantVelocity | None = None,
+        model: Motion | None = None,
         associate: Associator | None = None,
         gate: Gate | float = 0.999,
         life: LifeCycle | None = None,
         groups: Groups | None = None,
         shape: Shape | None = None,
         *,
-        estimator: Callable[[ConstantVelocity], KalmanBank] = KalmanBank,
+        estimator: Callable[[Motion], Estimator] = KalmanBank,
         bounds: tuple[float, float] | None = None,
         births: bool = True,
         detection_probability: float = 0.9,
@@ -73,7 +75,7 @@ class Tracker:
         box_s: float = 0.3,
         explain: bool = False,
     ) -> None:
-        self.model = model or ConstantVelocity()
+        self.model: Motion = model or ConstantVelocity()
         self.associate = associate or GNN()
         self.gate = gate if isinstance(gate, Gate) else Gate(gate)
         self.life = life or LifeCycle()
@@ -125,8 +127,7 @@ class Tracker:
         """Put in confirmed tracks with known states x (B, n), P (B, n, n); returns their ids."""
         first, count = len(self.bank), len(x)
         position = list(self.model.position)
-        self.bank.append(x[:, position], P[:, position][:, :, position], np.ones(count))
-        self.bank.x[first:], self.bank.P[first:] = x, P
+        self.bank.insert(x, P, np.ones(count))
         boxes = np.full((count, 4), np.nan) if box is None else box
         runs = np.zeros(count, np.int64) if run is None else run
         ids = self.register.append(t, x[:, position], boxes, BIRTH_EXISTENCE, runs)

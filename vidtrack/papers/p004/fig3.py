@@ -49,7 +49,7 @@ class Frame:
         T = np.array([[c, -s], [s, c]])
         u = np.stack([np.cos(HEADING), np.sin(HEADING)], axis=-1) @ T.T
         x = np.stack([np.zeros(2), u[:, 0], np.zeros(2), u[:, 1]], axis=-1)
-        Q = MODEL.process_noise(1.0, x, np.ones(2), np.array([True, True]))
+        Q = MODEL.process_noise(1.0, x, np.zeros((2, 4, 4)), np.full(2, 100), np.ones(2))
         return cls(PREDICTED @ T.T, Q[:, ::2, ::2], MEASURED @ T.T, u)
 
     def d2(self, distance: Distance) -> Floats:

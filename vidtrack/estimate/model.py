@@ -1,0 +1,70 @@
+"""What a motion model owes the estimators."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from vidtrack.scan import Floats, Ints
+
+
+class Motion(Protocol):
+    """How a state moves and how uncertain it grows while nobody looks.
+
+    Every model's state begins with [x, vx, y, vy, ...]; what else it holds (accelerations, a turn rate) follows.
+
+    dim        space dimensions
+    states     n, components of the state
+    position, velocity   columns of the state, one per axis
+    per_size   the noise is in object sizes instead of pixels or metres
+    """
+
+    @property
+    def dim(self) -> int: ...
+
+    @property
+    def states(self) -> int: ...
+
+    @property
+    def position(self) -> tuple[int, ...]: ...
+
+    @property
+    def velocity(self) -> tuple[int, ...]: ...
+
+    @property
+    def per_size(self) -> bool: ...
+
+    def transition(self, dt: float, x: Floats) -> Floats:
+        """F (1, n, n) or (T, n, n) with F x the states x (T, n) after dt seconds."""
+
+    def jacobian(self, dt: float, x: Floats, F: Floats) -> Floats:
+        """(1, n, n) or (T, n, n) derivative of F x by x; F itself for linear motion."""
+
+    def process_noise(self, dt: float, x: Floats, P: Floats, hits: Ints, scale: Floats) -> Floats:
+        """Q (T, n, n) over dt seconds; hits (T,) updates so far, scale (T,) multiplies standard deviations."""
+
+    def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
+        """x (B, n), P (B, n, n) of new rows from one located measurement each: (B, d), (B, d, d); scale (B,)."""
+
+
+def positions(dim: int) -> tuple[int, ...]:
+    """Columns of the positions."""
+    return tuple(range(0, 2 * dim, 2))
+
+
+def velocities(dim: int) -> tuple[int, ...]:
+    """Columns of the velocities."""
+    return tuple(range(1, 2 * dim, 2))
+
+
+def at_rest(position: Floats, cov: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+    """x (B, n), P (B, n, n): located at position (B, d), cov (B, d, d), all else zero with deviations sigma (B, n)."""
+    dim = position.shape[1]
+    x = np.zeros(sigma.shape)
+    P = np.zeros((*sigma.shape, sigma.shape[1]))
+    columns = np.arange(sigma.shape[1])
+    P[:, columns, columns] = sigma**2
+    x[:, : 2 * dim : 2] = position
+    P[:, : 2 * dim : 2, : 2 * dim : 2] = cov
+    return x, P
