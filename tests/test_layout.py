@@ -14,7 +14,11 @@ FLOORS = (
     "cli",
     "papers",
     "run",
+    "live",
+    "radar_run",
     "pipeline",
+    "radar_pipeline",
+    "steps",
     "serve",
     "simulate",
     "output",
@@ -29,6 +33,7 @@ FLOORS = (
     "formats",
     "scan",
     "config",
+    "state",
     "errors",
     "compiled",
 )
@@ -94,8 +99,8 @@ def test_no_module_imports_itself_by_way_of_others():
     assert not waiting, "these import each other"
 
 
-def test_rerun_is_imported_in_one_file():
-    assert users_of("rerun") == {"output.rerun"}
+def test_rerun_is_imported_where_recordings_are_made():
+    assert users_of("rerun") == {"output.recorder", "output.rerun", "output.rerun_radar"}
 
 
 def test_opencv_is_used_where_there_are_pictures():

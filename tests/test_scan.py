@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import Error, ScanError
@@ -12,6 +12,7 @@ EYE = np.eye(2)
 
 
 @given(count=st.integers(0, 20), dim=st.sampled_from([1, 2, 3]))
+@settings(deadline=None)
 def test_one_covariance_is_taken_for_all(count, dim):
     z = np.arange(float(count * dim)).reshape(count, dim)
     scan = Scan(1, z, 2 * np.eye(dim))
@@ -76,6 +77,7 @@ def test_singular_covariance_is_refused_in_any_dimension(dim):
 
 
 @given(scale=st.sampled_from([1e-12, 1e-6, 1.0, 1e6, 1e12]))
+@settings(deadline=None)
 def test_units_do_not_decide_what_is_a_covariance(scale):
     assert len(Scan(0.0, np.zeros((1, 2)), scale * np.array([[2.0, 1.0], [1.0, 2.0]]))) == 1
     with pytest.raises(ScanError):

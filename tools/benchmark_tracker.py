@@ -29,10 +29,10 @@ import numpy as np
 from peers.environment import python_of
 
 from vidtrack import formats, score
-from vidtrack.config import Settings
+from vidtrack.config import Settings, SourceSettings
 from vidtrack.pipeline import build_tracker
-from vidtrack.scan import Floats, Ints, Scan, Status
-from vidtrack.video.detections import SIGMA_SHARE
+from vidtrack.scan import Floats, Ints, Status
+from vidtrack.video.detections import open_detections
 
 FPS = 25.0
 SPACING = 150.0  # px; one vehicle on each square of this side
@@ -132,8 +132,14 @@ def _shaken(box: Floats, rng: np.random.Generator) -> Floats:
 
 def run_ours(data: Traffic) -> Outcome:
     """The tracker of `vidtrack track det.txt`, with its default settings, on the scans it makes of stored boxes."""
-    tracker = build_tracker(Settings().tracker, (data.side, data.side), whole=True)
-    scans = [_scan(frame / FPS, box) for frame, box in enumerate(data.frames)]
+    settings = Settings(source=SourceSettings(fps=FPS))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "det.txt"
+        frame = np.repeat(np.arange(len(data.start) - 1), np.diff(data.start))
+        formats.write_mot(path, formats.box_table(frame, np.full(len(frame), -1), data.box))
+        detections = open_detections(str(path), settings)
+    tracker = build_tracker(settings.tracker, (data.side, data.side), whole=detections.settings)
+    scans = [scan for _, _, scan in detections]
     seconds, rows = np.empty(len(scans)), []
     for frame, scan in enumerate(scans):
         begin = perf_counter()
@@ -142,12 +148,6 @@ def run_ours(data: Traffic) -> Outcome:
         took = (tracks.status != Status.TENTATIVE) & (tracks.measurement >= 0)
         rows.append((np.full(took.sum(), frame), tracks.id[took], tracks.measurement[took]))
     return Outcome(seconds, *(np.concatenate(column) for column in zip(*rows, strict=True)))
-
-
-def _scan(time_s: float, box: Floats) -> Scan:
-    size = box[:, 2:]
-    R = (SIGMA_SHARE * size)[:, :, None] ** 2 * np.eye(2)
-    return Scan(time_s, box[:, :2] + size / 2, R, box=np.hstack([-size / 2, size]))
 
 
 def run_peer(name: str, data: Traffic, folder: Path) -> Outcome:

@@ -5,24 +5,34 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vidtrack.associate.gate import Gate as Gate
+    from vidtrack.associate.generalized_nn import GeneralizedNN as GeneralizedNN
     from vidtrack.associate.hard import GNN as GNN
     from vidtrack.associate.hard import NN as NN
+    from vidtrack.associate.hard import GreedyGNN as GreedyGNN
+    from vidtrack.associate.jpda import JPDA as JPDA
+    from vidtrack.associate.pda import PDA as PDA
+    from vidtrack.associate.strongest import PSN as PSN
+    from vidtrack.associate.strongest import StrongestNeighbour as StrongestNeighbour
     from vidtrack.config import Settings as Settings
     from vidtrack.config import load as load_settings  # noqa: F401
     from vidtrack.errors import ConfigError as ConfigError
     from vidtrack.errors import Error as Error
     from vidtrack.errors import FormatError as FormatError
     from vidtrack.errors import OutputError as OutputError
+    from vidtrack.errors import PlotFormatError as PlotFormatError
     from vidtrack.errors import ScanError as ScanError
     from vidtrack.errors import SourceError as SourceError
     from vidtrack.errors import StoppedEarly as StoppedEarly
     from vidtrack.estimate.motion import ConstantVelocity as ConstantVelocity
     from vidtrack.pipeline import track as track
+    from vidtrack.radar_pipeline import track_plots as track_plots
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
     from vidtrack.tracking.groups import Groups as Groups
     from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
+    from vidtrack.tracking.mht import MHT as MHT
+    from vidtrack.tracking.splitting import Split as Split
     from vidtrack.tracking.tracker import Tracker as Tracker
 
 _HOME = {
@@ -32,20 +42,30 @@ _HOME = {
     "FormatError": "errors",
     "GNN": "associate.hard",
     "Gate": "associate.gate",
+    "GeneralizedNN": "associate.generalized_nn",
+    "GreedyGNN": "associate.hard",
     "Groups": "tracking.groups",
+    "JPDA": "associate.jpda",
     "LifeCycle": "tracking.lifecycle",
+    "MHT": "tracking.mht",
     "NN": "associate.hard",
     "OutputError": "errors",
+    "PlotFormatError": "errors",
+    "PDA": "associate.pda",
+    "PSN": "associate.strongest",
     "Scan": "scan",
     "ScanError": "errors",
     "Settings": "config",
     "SourceError": "errors",
+    "Split": "tracking.splitting",
     "Status": "scan",
     "StoppedEarly": "errors",
+    "StrongestNeighbour": "associate.strongest",
     "Tracker": "tracking.tracker",
     "Tracks": "scan",
     "load_settings": "config",
     "track": "pipeline",
+    "track_plots": "radar_pipeline",
 }
 __all__ = sorted(_HOME)
 

@@ -123,11 +123,24 @@ class BlobSettings(_Group):
     """standard deviation of the centroid per standard deviation of the blob's extent, in its direction"""
 
 
+class DetectionSettings(_Group):
+    """Stored detections (MOT det.txt); object size is the longer side of a box."""
+
+    sure_score: float | None = Field(None, ge=0, le=1)
+    """share of detections, the lowest scores, that may only continue tracks; None: from what is found again"""
+    jitter: float | None = Field(None, gt=0)
+    """object sizes; standard deviation of a box's centre; None: from second differences of chains of boxes"""
+    accel: float | None = Field(None, gt=0)
+    """object sizes/s^2; standard deviation of the acceleration in each direction; None: as for jitter"""
+    box_s: float = Field(0.05, gt=0)
+    """s; time constant with which a track's box follows its detections' boxes"""
+
+
 class TrackerSettings(_Group):
     """Object size is the longer side of a vehicle's box."""
 
-    method: Literal["nn", "gnn"] = "gnn"
-    """association: nn takes each track's nearest measurement, gnn the best exclusive assignment"""
+    method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] = "gnn"
+    """association by one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), later (split, mht)"""
     distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"
     """confidence region with the full covariance, with the variances per axis only (eq. 8), or plain distance"""
     gate_probability: float = Field(0.999, ge=0, le=1)
@@ -183,18 +196,101 @@ class OutputSettings(_Group):
     """s; least time between the pictures of a rerun recording, for long runs; 0: every frame"""
 
 
+class RadarSettings(_Group):
+    """Radar plots: metres, seconds, degrees; x east, y north, z up, azimuth clockwise from north."""
+
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """m; x, y, z of the radar, added to what it measures in range and azimuth"""
+    sigma_range_m: float = Field(50.0, gt=0)
+    """m; standard deviation of a range where the file has no column sigma_range_m"""
+    sigma_azimuth_deg: float = Field(0.3, gt=0, le=45)
+    """degrees; the same of an azimuth"""
+    sigma_elevation_deg: float = Field(0.3, gt=0, le=45)
+    """degrees; the same of an elevation"""
+    sigma_position_m: float = Field(50.0, gt=0)
+    """m; the same of x, y and z"""
+    sigma_doppler_m_s: float = Field(2.0, gt=0)
+    """m/s; the same of a range rate"""
+    skip_bad_rows: bool = False
+    """rows that cannot be right are left out and counted; false: they end the run"""
+    estimator: Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta"] = "kalman"
+    """kalman, converted: plots become unbiased positions; ekf, ukf: range and angles as measured; imm: two models"""
+    model: Literal["cv", "ca", "singer", "ct"] = "cv"
+    """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
+    detection_probability: float = Field(0.9, gt=0, lt=1)
+    """probability that a scan shows a target"""
+    clutter_density: float | None = Field(None, gt=0)
+    """false plots per scan and unit of the measurement space (m^2, m^3, m rad, ...); None: from the file's plots"""
+    max_speed: float = Field(400.0, gt=0)
+    """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
+    accel: float = Field(8.0, gt=0)
+    """m/s^2; standard deviation of a target's acceleration"""
+    hold_s: float = Field(4.0, gt=0)
+    """s; correlation time of the acceleration"""
+    quiet_accel: float = Field(1.0, gt=0)
+    """m/s^2; standard deviation of the acceleration in imm's quiet mode; its other mode is radar.model"""
+    quiet_s: float = Field(60.0, gt=0)
+    """s; mean time that imm's quiet mode lasts"""
+    manoeuvre_s: float = Field(15.0, gt=0)
+    """s; mean time that imm's other mode lasts"""
+    euclidean_radius_m: float = Field(2000.0, gt=0)
+    """m; gate of the euclidean distance"""
+    coast_scans: int = Field(5, ge=1, le=62)
+    """a track is given up after this many scans without a plot"""
+    trail_s: float = Field(60.0, ge=0)
+    """s; how far back the trail behind a target reaches in rerun"""
+
+
+class LiveSettings(_Group):
+    """Cameras and streams."""
+
+    timeout_s: float = Field(5.0, gt=0, le=300)
+    """s; opening or reading that takes longer is given up and begun anew"""
+    backoff_s: float = Field(1.0, gt=0)
+    """s; pause before the second attempt to connect, doubled with every further one"""
+    backoff_longest_s: float = Field(30.0, gt=0)
+    """s; longest pause between two attempts"""
+    roll_s: float | None = Field(None, gt=0)
+    """s; by the clock, after which results go on in a new sub-folder; None: never, or hourly if live.keep_* is set"""
+    keep_s: float | None = Field(None, gt=0)
+    """s; sub-folders that are older are deleted; None: none is"""
+    keep_bytes: float | None = Field(None, ge=1e6)
+    """bytes that results and recordings may take together, the oldest are deleted; None: any"""
+    every_frame: bool = False
+    """every frame is tracked, and a tracker that is too slow falls behind; false: the newest one, others are dropped"""
+    ffmpeg: tuple[str, ...] = ()
+    """NAME=VALUE options for opening, such as rtsp_transport=udp, video_size=1280x720 or input_format=mjpeg"""
+
+    @field_validator("ffmpeg")
+    @classmethod
+    def _name_and_value(cls, options: tuple[str, ...]) -> tuple[str, ...]:
+        for option in options:
+            if not option.partition("=")[1]:
+                raise ValueError(f"{option!r} is not NAME=VALUE")
+        return options
+
+
 class Settings(_Group):
     """Everything that a run can be told."""
 
     source: SourceSettings = SourceSettings()
     detector: DetectorSettings = DetectorSettings()
     blobs: BlobSettings = BlobSettings()
+    detections: DetectionSettings = DetectionSettings()
     tracker: TrackerSettings = TrackerSettings()
+    radar: RadarSettings = RadarSettings()
     output: OutputSettings = OutputSettings()
+    live: LiveSettings = LiveSettings()
 
 
-def load(path: Path | None = None, assignments: Iterable[str | tuple[str, Any]] = ()) -> Settings:
+def load(
+    path: Path | None = None,
+    assignments: Iterable[str | tuple[str, Any]] = (),
+    base: Mapping[str, Any] | None = None,
+) -> Settings:
     """Settings from defaults, a TOML file and assignments ("a.b=value" or a name with its value), later ones winning.
+
+    base  nested settings between the defaults and the file
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest) or a bad value.
     """
@@ -206,6 +302,7 @@ def load(path: Path | None = None, assignments: Iterable[str | tuple[str, Any]] 
             raise ConfigError(f"cannot read settings {path}: {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path} is not valid TOML: {error}") from None
+    tree = _over(base or {}, tree)
     for assignment in assignments:
         name, value = _split(assignment) if isinstance(assignment, str) else assignment
         _assign(tree, name.split("."), value)
@@ -218,6 +315,13 @@ def parse(tree: Mapping[str, Any]) -> Settings:
         return Settings.model_validate(tree)
     except ValidationError as error:
         raise ConfigError("\n".join(_complaint(detail) for detail in error.errors())) from None
+
+
+def _over(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
+    """`tree` where it says something, `base` elsewhere."""
+    both = dict(base) | dict(tree)
+    groups = (name for name in tree if isinstance(base.get(name), dict) and isinstance(tree[name], dict))
+    return both | {name: _over(base[name], tree[name]) for name in groups}
 
 
 def _split(assignment: str) -> tuple[str, Any]:

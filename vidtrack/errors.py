@@ -37,3 +37,7 @@ class FormatError(Error):
     """A table (MOT, CSV, Parquet) cannot be read; the message names the line."""
 
     exit_code = 3
+
+
+class PlotFormatError(FormatError):
+    """A table of radar plots cannot be used; the message names the column, or the lines and what is wrong in them."""

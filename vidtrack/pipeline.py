@@ -9,15 +9,16 @@ from time import perf_counter
 import numpy as np
 
 from vidtrack.associate.gate import Gate
-from vidtrack.associate.hard import GNN, NN, Associator
 from vidtrack.associate.shape import Shape
-from vidtrack.config import Settings, TrackerSettings
+from vidtrack.associate.trust import Trust
+from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
-from vidtrack.scan import Scan, Status, Tracks
+from vidtrack.scan import TENTATIVE, Scan, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.methods import METHODS
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
@@ -25,8 +26,6 @@ from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
 from vidtrack.video.source import open_source
-
-METHODS: dict[str, type[Associator]] = {"nn": NN, "gnn": GNN}
 
 
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
@@ -54,19 +53,19 @@ def build_tracker(
     settings: TrackerSettings,
     bounds: tuple[float, float] | None = None,
     *,
-    whole: bool = False,
+    whole: DetectionSettings | None = None,
     explain: bool = False,
 ) -> Tracker:
     """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height).
 
     whole  each box is one whole object, from a detector that tells objects apart: boxes may overlap but are
-           never shared, their size is evidence, and M hits of N confirm a track without it having to travel
+           never shared, their size and score are evidence, and M hits of N confirm a track without it having to travel
     """
     return Tracker(
         model=ConstantVelocity(
             dim=2,
-            accel=settings.accel,
-            cross=settings.cross,
+            accel=settings.accel if whole is None or whole.accel is None else whole.accel,
+            cross=settings.cross if whole is None else None,
             speed=settings.speed,
             hold_s=settings.hold_s,
             per_size=True,
@@ -84,8 +83,9 @@ def build_tracker(
         ),
         groups=Groups(cover=settings.group_cover) if settings.merged_blobs and not whole else None,
         shape=Shape() if whole else None,
+        trust=Trust(whole.sure_score) if whole and whole.sure_score is not None else None,
         bounds=bounds,
-        box_s=settings.box_s,
+        box_s=whole.box_s if whole else settings.box_s,
         explain=explain,
     )
 
@@ -100,7 +100,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
     for frame in frames:
         clock = [ended, perf_counter()]
         expected = tracker.predict(frame.time_s)
-        vehicles = expected.box[expected.status != Status.TENTATIVE]
+        vehicles = expected.box[expected.status != TENTATIVE]
         driven = expected.box[has_driven(expected)]
         foreground = detector.apply(frame, driven)
         clock.append(perf_counter())
@@ -129,4 +129,4 @@ def has_driven(tracks: Tracks) -> np.ndarray:
 
     What a vehicle leaves behind in the scene never does, and is not to be protected from being forgotten.
     """
-    return (tracks.status != Status.TENTATIVE) & (tracks.travel > 3 * longer(tracks.box))
+    return (tracks.status != TENTATIVE) & (tracks.travel > 3 * longer(tracks.box))

@@ -8,20 +8,23 @@ from pathlib import Path
 from types import TracebackType
 
 from vidtrack.config import Settings
-from vidtrack.output.confirmed import Confirmed
+from vidtrack.live.memory import Memory
+from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S, Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import open_run
 from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
-from vidtrack.output.sink import Sink, Step
+from vidtrack.output.results import Results
+from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
 from vidtrack.pipeline import build_detector, build_tracker, detection_steps, video_steps
 from vidtrack.traffic.lines import LineCounter, parse_lines
 from vidtrack.video.detections import Detections, is_detections, open_detections
+from vidtrack.video.recording import Recording, is_recording
 from vidtrack.video.resources import keep_freed_memory, opencv_single_threaded
 from vidtrack.video.source import Source, open_source
 
@@ -51,18 +54,21 @@ class Run:
     ) -> None:
         with ExitStack() as stack:  # whatever fails below, what is open by then is closed
             self._source = opened = _open(source, settings)
-            if isinstance(opened, Source):
+            if not isinstance(opened, Detections):
                 stack.callback(opened.close)
             shape = (opened.height, opened.width)
-            bounds, stored = (opened.width, opened.height), isinstance(opened, Detections)
+            bounds = (opened.width, opened.height)
+            whole = opened.settings if isinstance(opened, Detections) else None
             explain = decisions or rerun is not None
-            tracker = build_tracker(settings.tracker, bounds, whole=stored, explain=explain)
+            tracker = build_tracker(settings.tracker, bounds, whole=whole, explain=explain)
             detector = None
-            if isinstance(opened, Source):
+            if not isinstance(opened, Detections):
                 keep_freed_memory()
                 if settings.detector.kind not in ("mog2", "knn"):  # they are OpenCV's, and long enough for its threads
                     stack.enter_context(opencv_single_threaded())
                 detector = build_detector(settings)
+                if isinstance(opened, Recording):
+                    opened.remember = Memory(detector, tracker, opened.like).restore
                 self._steps = video_steps(opened, detector, tracker, settings)
             else:
                 self._steps = detection_steps(opened, tracker)
@@ -71,38 +77,29 @@ class Run:
             self.folder = open_run(output, opened.name, force)
 
             counter = LineCounter(lines) if lines else None
-            self._summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
-            stack.callback(self._summary.close)  # last of all: it reports what the others did
-            self._sinks: list[Sink] = []
-
-            def add(sink: Sink) -> None:
-                self._sinks.append(sink)
-                stack.callback(sink.close)
-
+            summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
+            self._results = results = stack.enter_context(Results(summary))
             if counter is not None:
-                add(CountsFile(self.folder / "counts.csv", counter))
+                results.add(CountsFile(self.folder / "counts.csv", counter))
             plot = TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines)
-            add(Confirmed(TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot))
+            hold_s = LIVE_HOLD_S if isinstance(opened, Recording) else HOLD_S
+            results.add(Confirmed(TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot, hold_s=hold_s))
             if decisions:
-                add(DecisionLog(self.folder / "decisions.csv"))
+                results.add(DecisionLog(self.folder / "decisions.csv"))
             if masks is not None:
-                add(Threaded(MaskFolder(masks)))
+                results.add(Threaded(MaskFolder(masks)))
             if video is not None:
                 from vidtrack.output.video import AnnotatedVideo
 
-                add(Threaded(AnnotatedVideo(video, opened.fps, settings.output, lines)))
+                results.add(Threaded(AnnotatedVideo(video, opened.fps, settings.output, lines)))
             if rerun is not None:
                 from vidtrack.output.rerun import RerunSink
 
-                add(Threaded(RerunSink(rerun, shape, settings, lines)))
-            self._sinks.append(self._summary)
+                results.add(Threaded(RerunSink(rerun, shape, settings, lines)))
             self._open = stack.pop_all()
 
     def __iter__(self) -> Iterator[Step]:
-        for step in self._steps:
-            for sink in self._sinks:
-                sink.step(step)
-            yield step
+        return self._results.record(self._steps)
 
     def __enter__(self) -> Run:
         return self
@@ -110,7 +107,6 @@ class Run:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._summary.interrupted = kind is not None
         self._open.__exit__(kind, error, trace)
 
     def _reading(self) -> dict[str, object]:
@@ -128,7 +124,9 @@ class Run:
         }
 
 
-def _open(source: str, settings: Settings) -> Source | Detections:
+def _open(source: str, settings: Settings) -> Source | Recording | Detections:
     if is_detections(source):
-        return open_detections(source, settings.source)
+        return open_detections(source, settings)
+    if is_recording(source):
+        return Recording(source)
     return open_source(source, settings.source)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+from vidtrack.compiled import CACHE
 from vidtrack.errors import ScanError
 
 if TYPE_CHECKING:
@@ -27,6 +29,10 @@ class Status(IntEnum):
     MERGED = 3
 
 
+TENTATIVE, CONFIRMED, COASTING, MERGED = (int(status) for status in Status)
+"""The same as plain numbers: NumPy compares with them ten times as fast as with members of an enumeration."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scan:
     """What a sensor saw at one time.
@@ -38,7 +44,8 @@ class Scan:
     noise      (m, m) covariance that a measurement not made would have had: what a miss tells depends on it.
                Taken from R where that is one for all, else the mean of R; None in an empty scan without either
     box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre)
-    amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class
+    amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class, -1 unknown:
+               a track whose class is known takes no measurement of another
     run        (M,) Monte Carlo run of each measurement; pairs form within equal runs only
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, and covariances that are not
@@ -103,8 +110,21 @@ class Scan:
         return len(self.z)
 
 
+@njit(cache=CACHE, nogil=True)
+def _surely_usable(z: Floats, R: Floats) -> bool:
+    """Whether all measurements in the plane are finite and their covariances positive definite."""
+    for i in range(len(z)):
+        xx, yy, xy = R[i, 0, 0], R[i, 1, 1], R[i, 0, 1]
+        finite = np.isfinite(z[i, 0]) and np.isfinite(z[i, 1]) and np.isfinite(xx + yy + xy)
+        if not (finite and xx > 0 and xy == R[i, 1, 0] and xx * yy - xy * xy > 1e-12 * max(xx, yy) ** 2):
+            return False
+    return True
+
+
 def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
     """Raise ScanError naming the first measurement that no filter could use."""
+    if z.shape[1] == 2 and _surely_usable(z, R):
+        return
     finite = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
     if not finite.all():
         i = int(np.argmin(finite))
@@ -137,6 +157,7 @@ class Decision:
     inflation  (K,) how much a miss widens the row: the missed branch has P + inflation K S K' (PDA, PSNF); None: not
     spread     whether the scatter of the weighted measurements widens the row; generalized nearest neighbour uses
                their mean as if it were one measurement
+    approximate  (K,) rows whose weights are approximate, their cluster being too large for exact ones; None: none
     """
 
     parent: Ints
@@ -146,6 +167,7 @@ class Decision:
     beta0: Floats
     inflation: Floats | None = None
     spread: bool = True
+    approximate: NDArray[np.bool_] | None = None
 
     def without(self, rows: NDArray[np.bool_]) -> Decision:
         """The same decision with these rows (K,) missed, which tells nothing about them."""
@@ -165,13 +187,22 @@ class Decision:
         """Both decisions about disjoint sets of rows as one."""
         row = np.concatenate([self.row, other.row])
         order = np.argsort(row, kind="stable")
+        theirs = np.zeros(len(self.parent), bool)
+        theirs[other.row] = True
         return replace(
             self,
             row=row[order],
             measurement=np.concatenate([self.measurement, other.measurement])[order],
             beta=np.concatenate([self.beta, other.beta])[order],
             beta0=self.beta0 + other.beta0 - 1.0,
+            inflation=_chosen(theirs, other.inflation, self.inflation),
+            approximate=_chosen(theirs, other.approximate, self.approximate),
         )
+
+
+def _chosen(theirs: NDArray[np.bool_], other: Any, own: Any) -> Any:
+    """Row by row the other's values or one's own, where a method gives any."""
+    return None if own is None else np.where(theirs, other, own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,6 +226,10 @@ class Choices:
     gate: Floats
     runner_up: Ints
     runner_up_d2: Floats
+
+    def only(self, rows: NDArray[Any]) -> Choices:
+        """Those of a mask or of indices."""
+        return Choices(*(getattr(self, column.name)[rows] for column in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,10 +273,15 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.id)
 
+    def only(self, rows: NDArray[Any]) -> Tracks:
+        """The tracks of a mask or of indices."""
+        columns = {column.name: getattr(self, column.name) for column in fields(self)}
+        return replace(self, **{name: value[rows] for name, value in columns.items() if isinstance(value, np.ndarray)})
+
     @property
     def seen(self) -> NDArray[np.bool_]:
         """(T,) whether this scan shows the track, alone or in a blob it shares."""
-        return np.asarray((self.measurement >= 0) | (self.status == Status.MERGED))
+        return np.asarray((self.measurement >= 0) | (self.status == MERGED))
 
     @property
     def xy(self) -> Floats:

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.gate import Pairs
-from vidtrack.associate.hard import GNN, NN
+from vidtrack.associate.hard import GNN, NN, GreedyGNN
 from vidtrack.associate.problem import Problem
 from vidtrack.scan import Scan
 
@@ -104,6 +104,21 @@ def test_a_good_pair_and_a_miss_beat_two_bad_pairs():
     assert taken(GNN(), pairs([[1.0, 9.1], [1.2, np.nan]], 9.21), 2) == [0, -1]
 
 
+def test_maximum_cardinality_serves_as_many_tracks_as_possible():
+    """The other convention of `gnn_nonassignment`: 9.1 + 1.2 = 10.3, but nobody misses."""
+    assert taken(GNN("maximum-cardinality"), pairs([[1.0, 9.1], [1.2, np.nan]], 9.21), 2) == [1, 0]
+
+
+def test_greedy_rules_take_the_first_that_comes():
+    """SPEC 001, `greedy_vs_optimal` and `fig2`; in track order the first track chooses before the nearer second."""
+    assert taken(GreedyGNN(), pairs([[1.0, 2.0], [1.5, 9.0]], 9.21), 2) == [0, 1]
+    d2 = [[3.25, 1.53, 4.16, 162.0], [21.25, 3.33, 1.16, 117.0]]
+    assert taken(GreedyGNN(), pairs(d2, 9.21), 4) == [1, 2]
+    late = [[2.0, 3.0], [1.0, 4.0]]
+    assert taken(GreedyGNN("cost"), pairs(late, 9.21), 2) == [1, 0]
+    assert taken(GreedyGNN("track"), pairs(late, 9.21), 2) == [0, 1]
+
+
 def test_worked_example_of_the_survey():
     """SPEC 001, `fig2`: tracks 0 and 1 take measurements 1 and 2; 3 is outside every gate."""
     d2 = [[3.25, 1.53, 4.16, 162.0], [21.25, 3.33, 1.16, 117.0]]
@@ -123,7 +138,7 @@ def test_uncertain_track_yields_to_the_certain_one():
     assert taken(GNN(), pairs([[2.0], [2.0]], 9.21, log_s), 1) == [-1, 0]
 
 
-@pytest.mark.parametrize("rule", [NN(), GNN()])
+@pytest.mark.parametrize("rule", [NN(), GNN(), GNN("maximum-cardinality"), GreedyGNN(), GreedyGNN("track")])
 def test_without_pairs_everybody_misses(rule):
     assert taken(rule, pairs(np.full((3, 2), np.nan), 9.21), 2) == [-1, -1, -1]
     assert taken(rule, pairs(np.empty((0, 2)), 9.21), 2) == []

@@ -202,7 +202,7 @@ def test_decisions_tell_choice_runner_up_and_reason(tmp_path):
     with open(tmp_path / "decisions.csv", newline="") as file:
         rows = list(csv.reader(file))
     assert rows == [
-        HEADER.strip().split(","),
+        ["frame", *HEADER.strip().split(",")],
         ["1", "0.040000", "1", "update", "4", "1", "0.5123", "9.21", "7", "3.25", ""],
         ["1", "0.040000", "2", "miss", "", "", "", "9.21", "", "", ""],
         ["1", "0.040000", "2", "delete", "", "", "", "", "", "", "left the picture, 'exit'"],

@@ -12,7 +12,7 @@ from synthetic_steps import make_step
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.mot import MotFile, settle_gaps
 from vidtrack.output.parquet import ParquetParts
-from vidtrack.output.tables import VIDEO, TrackTable, schema, video_rows
+from vidtrack.output.tables import VIDEO, TrackTable, schema, track_rows
 
 HEADER = (
     "frame,time_s,track_id,status,x_px,y_px,vx_px_s,vy_px_s,sigma_x_px,sigma_y_px,corr_xy,"
@@ -74,7 +74,7 @@ def test_parts_are_readable_before_the_end_and_become_one_file(tmp_path, monkeyp
     monkeypatch.setattr("vidtrack.output.parquet._PART_ROWS", 2)
     parts = ParquetParts(tmp_path / "tracks.parquet", schema(VIDEO))
     for index in range(5):
-        parts.add(video_rows([make_step(index, [(1, "c", index, 0)])]))
+        parts.add(track_rows([make_step(index, [(1, "c", index, 0)])]))
     assert pq.read_table(tmp_path / "tracks.parquet.parts")["frame"].to_pylist() == [0, 1, 2, 3]
     parts.close()
     assert pq.read_table(tmp_path / "tracks.parquet")["frame"].to_pylist() == [0, 1, 2, 3, 4]
@@ -189,12 +189,15 @@ def test_mot_is_sorted_although_gaps_come_late(tmp_path, monkeypatch):
 
 def test_settled_gaps_by_hand():
     rows = np.zeros((5, 8))
-    rows[:, 0] = [1, 2, 3, 2, 2]
-    rows[:, 1] = [1, 1, 1, 5, 6]
-    rows[:, 7] = [1, 0, 1, 0, 0]
-    sure, waiting = settle_gaps(rows, alive=np.array([1, 5]))
-    assert sure[:, :2].tolist() == [[1, 1], [2, 1], [3, 1]]
-    assert waiting[:, :2].tolist() == [[2, 5]]  # 6 is dead
+    rows[:, 0] = [1, 2, 2, 2, 3]
+    rows[:, 1] = [1, 1, 5, 6, 1]
+    rows[:, 7] = [1, 0, 0, 0, 1]
+    decided, waiting = settle_gaps(rows, alive=np.array([1, 5]))
+    assert decided[:, :2].tolist() == [[1, 1]]
+    assert waiting[:, :2].tolist() == [[2, 1], [2, 5], [3, 1]]  # 6 is dead, and 5 holds up what comes later
+    decided, waiting = settle_gaps(waiting, alive=np.array([1]))
+    assert decided[:, :2].tolist() == [[2, 1], [3, 1]]
+    assert not len(waiting)
 
 
 def test_mot_leaves_tracks_without_boxes_out(tmp_path):

@@ -109,7 +109,7 @@ def test_a_car_of_the_first_frame_leaves_no_ghost():
     street, detector = Street(), disturbance()
     for k in range(30):
         foreground = detector.apply(street.frame(k / 10, cars=[(30 + 12 * k, 50, 220)]), NONE_KNOWN)
-        if k >= 20:
+        if k >= 25:
             assert (foreground.mask > 0).sum() < 0.01 * CAR[0] * CAR[1]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vidtrack.config import SourceSettings
+from vidtrack.config import Settings, SourceSettings
 from vidtrack.errors import FormatError, SourceError
 from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.source import open_source
@@ -20,6 +20,11 @@ LINES = """\
 """
 
 
+def opened(path, **detections):
+    """The detections of a file at 10 frames/s."""
+    return open_detections(str(path), Settings(source=SourceSettings(fps=10), detections=detections))
+
+
 @pytest.fixture
 def det(tmp_path):
     (tmp_path / "det.txt").write_text(LINES)
@@ -27,7 +32,7 @@ def det(tmp_path):
 
 
 def test_boxes_become_centres_with_a_spread_that_grows_with_the_box(det):
-    scans = list(open_detections(str(det), SourceSettings(fps=10)))
+    scans = list(opened(det))
     assert [(index, time_s, len(scan)) for index, time_s, scan in scans] == [
         (0, 0.0, 1),
         (1, pytest.approx(0.1), 0),
@@ -36,16 +41,22 @@ def test_boxes_become_centres_with_a_spread_that_grows_with_the_box(det):
     scan = scans[0][2]
     np.testing.assert_allclose(scan.z, [[30, 70]])
     np.testing.assert_allclose(scan.box, [[-20, -50, 40, 100]])
-    np.testing.assert_allclose(scan.R, [np.diag([2.0**2, 5.0**2])])
+    np.testing.assert_allclose(scan.R, [np.eye(2) * 5.0**2])
     np.testing.assert_allclose(scans[2][2].R[0], np.eye(2) * 0.5**2)
     assert all(scan.t == time_s for _, time_s, scan in scans)
+
+
+def test_settings_win_over_what_the_file_tells(det):
+    told = opened(det, sure_score=0.3, jitter=0.2).settings
+    assert (told.sure_score, told.jitter, told.accel) == (0.3, 0.2, None)
+    np.testing.assert_allclose(next(iter(opened(det, jitter=0.2)))[2].R, [np.eye(2) * 20.0**2])
 
 
 def test_scores_count_by_their_order_only(tmp_path):
     def scores(values):
         path = tmp_path / "det.txt"
         path.write_text("".join(f"1,-1,0,0,9,9,{value}\n" for value in values))
-        return next(iter(open_detections(str(path), SourceSettings(fps=10))))[2].score
+        return next(iter(opened(path)))[2].score
 
     np.testing.assert_allclose(scores([0.1, 0.9, 0.4, 0.4]), [0.25, 1, 0.75, 0.75])
     np.testing.assert_allclose(scores([-1, 140, 30, 30]), [0.25, 1, 0.75, 0.75])
@@ -56,27 +67,30 @@ def test_seqinfo_gives_rate_size_and_length(det):
     (det.parent / "seqinfo.ini").write_text(
         "[Sequence]\nname=street\nframeRate=20\nseqLength=6\nimWidth=640\nimHeight=480\n"
     )
-    detections = open_detections(str(det), SourceSettings())
+    detections = open_detections(str(det), Settings())
     assert (detections.name, detections.fps, detections.width, detections.height) == ("street", 20, 640, 480)
     assert [len(scan) for _, _, scan in detections] == [1, 0, 2, 0, 0, 0]
     assert detections.stats.frames_read == detections.frames == 6
 
 
 def test_without_seqinfo_the_size_holds_all_boxes_and_the_rate_is_assumed(det):
-    detections = open_detections(str(det), SourceSettings())
+    detections = open_detections(str(det), Settings())
     assert (detections.width, detections.height, detections.fps) == (90, 120, 25)
     assert "--fps" in detections.stats.warnings[0]
 
 
 def test_lines_in_any_order(det):
     det.write_text("".join(reversed(LINES.splitlines(keepends=True))))
-    assert [len(scan) for _, _, scan in open_detections(str(det), SourceSettings(fps=10))] == [1, 0, 2]
+    assert [len(scan) for _, _, scan in opened(det)] == [1, 0, 2]
 
 
 def test_start_and_end(det):
-    scans = list(open_detections(str(det), SourceSettings(fps=10, start_s=0.1, end_s=0.2)))
-    assert [index for index, _, _ in scans] == [1, 2]
-    assert list(open_detections(str(det), SourceSettings(fps=10, start_s=9))) == []
+    def indices(**span):
+        settings = Settings(source=SourceSettings(fps=10, **span))
+        return [index for index, _, _ in open_detections(str(det), settings)]
+
+    assert indices(start_s=0.1, end_s=0.2) == [1, 2]
+    assert indices(start_s=9) == []
 
 
 @pytest.mark.parametrize(
@@ -85,7 +99,7 @@ def test_start_and_end(det):
 def test_malformed_line_is_named(det, line):
     det.write_text(LINES + line + "\n")
     with pytest.raises(FormatError, match="line 4"):
-        open_detections(str(det), SourceSettings())
+        open_detections(str(det), Settings())
 
 
 def test_told_from_other_text_by_content(tmp_path, det):
@@ -109,7 +123,7 @@ def test_told_from_other_text_by_content(tmp_path, det):
 @pytest.mark.skipif("VIDTRACK_DATA" not in os.environ, reason="needs the real data: set VIDTRACK_DATA")
 def test_mot15_sequence():
     path = Path(os.environ["VIDTRACK_DATA"]) / "mot15" / "ADL-Rundle-6" / "det" / "det.txt"
-    detections = open_detections(str(path), SourceSettings())
+    detections = open_detections(str(path), Settings())
     scans = [scan for _, _, scan in detections]
     assert (detections.fps, detections.width, detections.height, len(scans)) == (30, 1920, 1080, 525)
     assert sum(map(len, scans)) == sum(1 for _ in path.open())

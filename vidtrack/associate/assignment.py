@@ -14,7 +14,17 @@ def assign(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) 
     """Column of each row, -1 for none, of least total cost.
 
     start (T + 1,), column (N,), cost (N,): row t may take column[k] at cost[k], start[t] <= k < start[t+1];
-    miss (T,) cost of taking none. Shortest augmenting paths with potentials (Jonker and Volgenant 1987)
+    miss (T,) cost of taking none.
+    """
+    return solve(start, column, cost, miss, columns)[0]
+
+
+@njit(cache=CACHE, nogil=True)
+def solve(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) -> tuple[Ints, Floats, Floats]:
+    """The columns that `assign` gives, with the potentials u (T,) and v (columns,) that prove them best.
+
+    No reduced cost, cost - u - v or miss - u, is negative; those of the assignment are zero. v is at most zero,
+    and zero where a column is left over. Shortest augmenting paths with potentials (Jonker and Volgenant 1987)
     on the sparse graph; the rows a path touches are those of one cluster, so separate clusters cost
     nothing extra. "None" is a private column of each row, number `columns` + t.
     """
@@ -74,4 +84,4 @@ def assign(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) 
     for t in range(rows):
         if column_of[t] >= columns:
             column_of[t] = -1
-    return column_of
+    return column_of, u, v[:columns]

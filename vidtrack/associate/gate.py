@@ -64,6 +64,23 @@ class Pairs:
             start,
         )
 
+    def of(self, rows: Ints) -> Pairs:
+        """The pairs of these rows (K,), each as often as it is named."""
+        count = np.diff(self.start)[rows]
+        start = np.concatenate([[0], np.cumsum(count)])
+        pair = np.repeat(self.start[rows] - start[:-1], count) + np.arange(start[-1])
+        return Pairs(
+            np.repeat(np.arange(len(rows)), count),
+            self.measurement[pair],
+            self.d2[pair],
+            self.nis[pair],
+            self.log_s[pair],
+            self.log_l[pair],
+            self.cost[pair],
+            self.limit[rows],
+            start,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Gate:

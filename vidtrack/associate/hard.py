@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numba import njit
@@ -12,6 +12,7 @@ from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import CACHE
+from vidtrack.errors import ConfigError
 from vidtrack.scan import Decision, Floats, Ints
 
 
@@ -21,7 +22,9 @@ class Associator(Protocol):
     gated_births  whether a measurement in a track's gate that no track got may start one
     """
 
-    gated_births: ClassVar[bool]
+    @property
+    def gated_births(self) -> bool:
+        """The setting."""
 
     def decide(self, problem: Problem) -> Decision:
         """Weights of the measurements for each track."""
@@ -31,10 +34,10 @@ class Associator(Protocol):
 class NN:
     """Nearest neighbour: each track takes its nearest measurement; two tracks may take the same one.
 
-    What lies in a gate starts no track, or each redundant measurement would.
+    gated_births  what lies in a gate starts no track, or each redundant measurement would
     """
 
-    gated_births: ClassVar[bool] = False
+    gated_births: bool = False
 
     def decide(self, problem: Problem) -> Decision:
         """Smallest cost in each row."""
@@ -46,24 +49,62 @@ class NN:
 class GNN:
     """Global nearest neighbour: the exclusive assignment of least summed cost, d2 + ln|S|.
 
-    A track may stay without a measurement at the cost of one at the edge of its gate, the "missed-track"
-    convention (SPEC 001, `gnn_nonassignment`): two bad pairs never beat one good pair and a miss.
-    ln|S| makes tracks of different certainty comparable; a miss is priced with the largest ln|S| of the
-    cluster, so that every gated pair beats a miss.
+    ln|S| makes tracks of different certainty comparable.
+
+    convention    what a track without a measurement costs (SPEC 001, `gnn_nonassignment`). missed-track: as much as
+                  a measurement at the edge of its gate, so that two bad pairs never beat a good pair and a miss; it
+                  is priced with the largest ln|S| of the cluster, so that every gated pair beats a miss.
+                  maximum-cardinality: more than any pairs can save, so that as few tracks as possible miss
+    gated_births  whether a measurement in a track's gate that no track got may start one
+
+    Raises ConfigError for another convention.
     """
 
-    gated_births: ClassVar[bool] = True
+    convention: Literal["missed-track", "maximum-cardinality"] = "missed-track"
+    gated_births: bool = True
+
+    def __post_init__(self) -> None:
+        _refuse_unknown("convention", self.convention, ("missed-track", "maximum-cardinality"))
 
     def decide(self, problem: Problem) -> Decision:
         """Optimal assignment, cluster by cluster."""
         pairs, measurements = problem.pairs, problem.measurements
-        cluster = clusters(pairs.row, pairs.measurement, problem.rows, measurements)
-        miss = pairs.limit + _largest(cluster, pairs.row, pairs.cost - pairs.d2)
-        finite = np.isfinite(miss)
-        miss[~finite] = (
-            1.0 + pairs.cost.max(initial=0.0) - min(0.0, pairs.cost.min(initial=0.0))
-        )  # a gate of one: never miss
+        never = (1 + problem.rows) * (1.0 + np.abs(pairs.cost).max(initial=0.0))
+        if self.convention == "maximum-cardinality":
+            miss = np.full(problem.rows, never)
+        else:
+            cluster = clusters(pairs.row, pairs.measurement, problem.rows, measurements)
+            miss = np.minimum(never, pairs.limit + _largest(cluster, pairs.row, pairs.cost - pairs.d2))
         return one_hot(assign(pairs.start, pairs.measurement, pairs.cost, miss, measurements))
+
+
+@dataclass(frozen=True, slots=True)
+class GreedyGNN:
+    """Sub-optimal global nearest neighbour (SPEC 001): exclusive, but a choice once made is never taken back.
+
+    order         cost: the pair of least cost in the whole scan comes first; track: the first track takes its
+                  nearest measurement, then the second takes what is left
+    gated_births  whether a measurement in a track's gate that no track got may start one
+
+    Raises ConfigError for another order.
+    """
+
+    order: Literal["cost", "track"] = "cost"
+    gated_births: bool = True
+
+    def __post_init__(self) -> None:
+        _refuse_unknown("order", self.order, ("cost", "track"))
+
+    def decide(self, problem: Problem) -> Decision:
+        """Pair after pair in that order, if both are still free."""
+        pairs = problem.pairs
+        keys = (pairs.cost,) if self.order == "cost" else (pairs.cost, pairs.row)
+        return one_hot(_first_come(np.lexsort(keys), pairs.row, pairs.measurement, problem.rows, problem.measurements))
+
+
+def _refuse_unknown(name: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise ConfigError(f"the {name} of the global nearest neighbour is {value!r}; choose from {', '.join(known)}")
 
 
 def one_hot(taken: Ints) -> Decision:
@@ -86,6 +127,17 @@ def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
         for k in range(start[t], start[t + 1]):
             if cost[k] < best:
                 best, taken[t] = cost[k], measurement[k]
+    return taken
+
+
+@njit(cache=CACHE, nogil=True)
+def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
+    """(T,) what each row gets if the pairs are served in this order."""
+    taken, free = np.full(rows, -1), np.ones(measurements, np.bool_)
+    for k in order:
+        if taken[row[k]] < 0 and free[measurement[k]]:
+            taken[row[k]] = measurement[k]
+            free[measurement[k]] = False
     return taken
 
 

@@ -10,6 +10,10 @@ import numpy as np
 from vidtrack.associate.gate import Gate, Pairs
 from vidtrack.scan import Floats, Ints, Scan
 
+VANISHING = 2000.0
+"""A factor that is zero in a limit (no clutter; P_D P_G of one) is taken as exp(-2000) or less: against it no
+likelihood counts, so that weights are those of the limit, yet one impossibility still differs from two."""
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -41,10 +45,17 @@ class Problem:
         clutter: float | Floats = 1e-5,
         *,
         run: Ints | None = None,
+        label: Ints | None = None,
         angles: tuple[int, ...] = (),
     ) -> Problem:
-        """The problem that a gate leaves of predicted measurements zhat (T, m), cov (T, m, m) and a scan."""
+        """The problem that a gate leaves of predicted measurements zhat (T, m), cov (T, m, m) and a scan.
+
+        run (T,) Monte Carlo runs and label (T,) classes, -1 unknown: a pair has one run, and no two known classes.
+        """
         pairs = gate.pairs(zhat, cov, scan, run, angles)
+        if label is not None and scan.label is not None:
+            mine, theirs = label[pairs.row], scan.label[pairs.measurement]
+            pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))
         rows, dim = zhat.shape
         inside = gate.inside(pairs.limit, dim)
         return cls(pairs, scan, cov, np.broadcast_to(detection, rows), np.broadcast_to(clutter, rows), inside)
@@ -65,15 +76,35 @@ class Problem:
         return 1.0 - self.detection * self.inside
 
     @cached_property
+    def log_missed(self) -> Floats:
+        """(T,) ln(1 - P_D P_G), with VANISHING in place of zero."""
+        return self._log(self.missed)
+
+    @cached_property
     def log_ratio(self) -> Floats:
         """(N,) ln(P_D N(v; 0, S) / clutter density) of each pair: a target's measurement against a false one.
 
-        Infinite without clutter: a measurement in the gate is then a target's for certain.
+        Without clutter the density is VANISHING; -inf for a target that is never detected.
         """
-        row = self.pairs.row
         with np.errstate(divide="ignore"):
-            return np.log(self.detection)[row] + self.pairs.log_l - np.log(self.clutter)[row]
+            detection = np.log(self.detection)
+        return (detection - self._log(self.clutter))[self.pairs.row] + self.pairs.log_l
+
+    def _log(self, factor: Floats) -> Floats:
+        with np.errstate(divide="ignore"):
+            return np.maximum(np.log(factor), -VANISHING - 4 * np.abs(self.pairs.log_l).max(initial=0.0))
 
     def only(self, mask: np.ndarray) -> Problem:
         """The same with the pairs of a mask (N,)."""
         return replace(self, pairs=self.pairs.only(mask))
+
+    def of(self, rows: Ints) -> Problem:
+        """The same for these rows (K,), each as often as it is named: successors ask what their parents asked."""
+        return replace(
+            self,
+            pairs=self.pairs.of(rows),
+            cov=self.cov[rows],
+            detection=self.detection[rows],
+            clutter=self.clutter[rows],
+            inside=self.inside[rows],
+        )

@@ -14,8 +14,12 @@ from vidtrack.errors import Error
 
 COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
-    "simulate": "Draw a traffic video with exact truth.",
+    "live": "Tracks from a camera or a stream, until stopped.",
+    "radar": "Tracks from a table of radar plots.",
+    "simulate": "Draw a traffic video or radar plots with exact truth.",
     "eval": "Score tracks against truth.",
+    "predict": "Track error of a radar filter in clutter, before there is a plot.",
+    "threshold": "The detection threshold that suits a tracker best.",
     "reproduce": "Figures and tables of the papers, ours beside theirs.",
     "view": "Look at a finished run in rerun.",
     "repair": "Make a killed run's files whole.",

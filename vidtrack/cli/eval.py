@@ -96,6 +96,7 @@ def command(
     the tracks table gives the consistency of the covariances (NIS, NEES).
     """
     from vidtrack import formats, score
+    from vidtrack.cli.json_file import write_json
 
     found = formats.read(result)
     states = formats.read_states(result) if result.is_dir() else None
@@ -110,24 +111,9 @@ def command(
         states=states,
     )
     if json_to is not None:
-        _write_json(scores, json_to)
+        write_json(scores, json_to)
     if json_to != "-":
         _print_table(scores, f"{result.name} against {truth.name}")
-
-
-def _write_json(scores: dict[str, float | int | str], path: str) -> None:
-    import json
-
-    from vidtrack.errors import OutputError
-
-    text = json.dumps(scores, indent=2) + "\n"
-    if path == "-":
-        click.echo(text, nl=False)
-        return
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}; choose another file for --json") from None
 
 
 def _print_table(scores: dict[str, float | int | str], title: str) -> None:

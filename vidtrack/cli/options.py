@@ -42,6 +42,26 @@ def start_log(verbose: int, quiet: bool) -> None:
     logger.setLevel(min(level, logging.WARNING))
 
 
+def association_options(function: Function) -> Function:
+    """--method, --distance, --rerun, --decisions: what tracking pictures and tracking plots have in common."""
+    for option in (
+        click.option("--decisions", is_flag=True, help="Write why each track got what it got."),
+        click.option("--rerun", metavar="FILE.rrd|spawn|serve", help="Record or show everything in rerun."),
+        click.option(
+            "--distance",
+            type=click.Choice(["mahalanobis", "decoupled", "euclidean"]),
+            help="What decides which measurement is whose.  [default: mahalanobis]",
+        ),
+        click.option(
+            "--method",
+            type=click.Choice(["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"]),
+            help="Association.  [default: gnn]",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
 def settings_options(function: Function) -> Function:
     """--config and --set."""
     function = click.option(

@@ -13,14 +13,16 @@ Item = TypeVar("Item")
 LINE_EVERY_S = 10.0
 
 
-def progress(items: Iterable[Item], expected: int | None, name: str, quiet: bool) -> Iterator[Item]:
-    """The items, while stderr tells how far they are."""
+def progress(
+    items: Iterable[Item], expected: int | None, name: str, quiet: bool, unit: str = "frame"
+) -> Iterator[Item]:
+    """The items, while stderr tells how far they are; `unit` is the word for one of them."""
     if quiet:
         return iter(items)
-    return _bar(items, expected, name) if sys.stderr.isatty() else _lines(items, expected, name)
+    return _bar(items, expected, name, unit) if sys.stderr.isatty() else _lines(items, expected, name, unit)
 
 
-def _bar(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Item]:
+def _bar(items: Iterable[Item], expected: int | None, name: str, unit: str) -> Iterator[Item]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -28,7 +30,7 @@ def _bar(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Ite
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]:.0f} frames/s"),
+        TextColumn("{task.fields[rate]:.0f} " + f"{unit}s/s"),
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
@@ -42,7 +44,7 @@ def _bar(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Ite
                 told = elapsed
 
 
-def _lines(items: Iterable[Item], expected: int | None, name: str) -> Iterator[Item]:
+def _lines(items: Iterable[Item], expected: int | None, name: str, unit: str) -> Iterator[Item]:
     began = told = time.monotonic()
     of = f" of {expected}" if expected else ""
     done = 0
@@ -50,6 +52,6 @@ def _lines(items: Iterable[Item], expected: int | None, name: str) -> Iterator[I
         yield item
         now = time.monotonic()
         if now - told > LINE_EVERY_S:
-            click.echo(f"{name}: frame {done}{of}, {done / (now - began):.0f} frames/s", err=True)
+            click.echo(f"{name}: {unit} {done}{of}, {done / (now - began):.0f} {unit}s/s", err=True)
             told = now
-    click.echo(f"{name}: {done} frames in {time.monotonic() - began:.1f} s", err=True)
+    click.echo(f"{name}: {done} {unit}s in {time.monotonic() - began:.1f} s", err=True)

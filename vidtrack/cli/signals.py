@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -37,6 +38,26 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
             yield item
             if caught:
                 raise KeyboardInterrupt if caught[0] == signal.SIGINT else Terminated
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def stopping(stop: Callable[[], None]) -> Iterator[None]:
+    """The first signal calls `stop`, a second one ends the program at once."""
+    stopped = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal stopped
+        if stopped:
+            raise KeyboardInterrupt
+        stopped = True
+        stop()
+
+    before = {number: signal.signal(number, note) for number in _WATCHED}
+    try:
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

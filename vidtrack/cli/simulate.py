@@ -1,4 +1,4 @@
-"""`vidtrack simulate`: draw a traffic video whose truth is known exactly."""
+"""`vidtrack simulate`: a traffic video or radar plots whose truth is known exactly."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from pathlib import Path
 
 import click
 
-SCENARIOS = ("crossing", "crossing-45", "nine", "junction")
+VIDEO = ("crossing", "crossing-45", "nine", "junction")
+RADAR = ("radar-tws", "radar-incoming", "radar-altitude", "radar-speed", "radar-crossing", "radar-unresolved")
+VIDEO_ONLY = ("fps", "size", "noise", "shake", "light_steps")
+RADAR_ONLY = ("snr_db", "pfa", "weibull", "glint")
 
 
 class _Size(click.ParamType):
@@ -24,23 +27,45 @@ class _Size(click.ParamType):
         return int(width), int(height)
 
 
+class _Pair(click.ParamType):
+    """Two positive numbers B,C."""
+
+    name = "B,C"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float] | None:
+        try:
+            shape, rate = (float(part) for part in str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not a pair of numbers such as 1.5,0.693", param, ctx)
+        return shape, rate
+
+
 @click.command(
     name="simulate",
-    short_help="Draw a traffic video with exact truth.",
+    short_help="Draw a traffic video or radar plots with exact truth.",
     epilog="""\b
 Examples:
   vidtrack simulate junction -o junction
   vidtrack simulate crossing-45 -o crossing --seed 7 --fps 25
-  vidtrack simulate junction -o hard --size 1280x720 --noise 5 --shake 1.5 --light-steps 2""",
+  vidtrack simulate junction -o hard --size 1280x720 --noise 5 --shake 1.5 --light-steps 2
+  vidtrack simulate radar-tws -o tws --seed 3 --snr-db 16""",
 )
-@click.argument("scenario", type=click.Choice(SCENARIOS))
+@click.argument("scenario", type=click.Choice(VIDEO + RADAR), metavar="SCENARIO")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder to write.  [default: runs/SCENARIO]")
-@click.option("--seed", default=0, show_default=True, help="The same seed gives the same video.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="The same seed gives the same files.")
 @click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15]")
 @click.option("--size", type=_Size(), help="The same scene at this size.  [default: 320x240, junction 240x180]")
 @click.option("--noise", default=2.0, show_default=True, help="Sensor noise, standard deviation in grey levels.")
 @click.option("--shake", default=0.0, show_default=True, help="Camera shake, standard deviation in px.")
 @click.option("--light-steps", default=0, show_default=True, help="Sudden changes of the exposure.")
+@click.option("--snr-db", type=float, help="Radar: mean signal to noise ratio of a target.  [default: the scenario's]")
+@click.option(
+    "--pfa", type=click.FloatRange(0, 0.1), help="Radar: false alarms per resolution cell.  [default: the scenario's]"
+)
+@click.option("--weibull", type=_Pair(), help="Radar: clutter amplitudes, P(a > t) = exp(-C t^B); 2,0.5 is Rayleigh.")
+@click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--quiet", is_flag=True, help="No progress bar.")
 def command(
@@ -52,17 +77,34 @@ def command(
     noise: float,
     shake: float,
     light_steps: int,
+    snr_db: float | None,
+    pfa: float | None,
+    weibull: tuple[float, float] | None,
+    glint: float | None,
     force: bool,
     quiet: bool,
 ) -> None:
-    """Draw SCENARIO and write video.avi and gt.txt (MOTChallenge form, visibility in column 9).
+    """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a radar scenario
+    as plots.csv and truth.csv.
 
     \b
     crossing     two vehicles cross in mid-picture and are one blob for half a second or more
     crossing-45  the same, turned by 45 degrees
     nine         nine vehicles cross on an open yard
     junction     a T-junction: people, a motorcycle, cars, a lorry; 14 targets in 17 s
+
+    \b
+    radar-tws         track while scan: eight aircraft, two of them turn with 2.5 g, Weibull clutter
+    radar-incoming    one aircraft comes in, seen 7.7 times a second in range, azimuth and elevation
+    radar-altitude    the same, its altitude swings by 300 m
+    radar-speed       the same, it accelerates with 2.5 g from 200 to 350 m/s
+    radar-crossing    two aircraft cross at a small angle in clutter
+    radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     """
+    _refuse_options_of(RADAR_ONLY if scenario in VIDEO else VIDEO_ONLY, scenario)
+    if scenario in RADAR:
+        _simulate_radar(scenario, output, seed, snr_db, pfa, weibull, glint, force)
+        return
     from vidtrack.output.folder import open_run
     from vidtrack.simulate import simulate, write
 
@@ -70,3 +112,31 @@ def command(
     folder = open_run(output, scenario, force)
     with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=quiet) as frames:
         write(clip, folder, frames)
+
+
+def _simulate_radar(
+    scenario: str,
+    output: Path | None,
+    seed: int,
+    snr_db: float | None,
+    pfa: float | None,
+    weibull: tuple[float, float] | None,
+    glint: float | None,
+    force: bool,
+) -> None:
+    from vidtrack.detection.amplitude import Weibull
+    from vidtrack.output.folder import open_run
+    from vidtrack.simulate.radar_scenarios import simulate_radar
+    from vidtrack.simulate.radar_write import write_radar
+
+    clutter = None if weibull is None else Weibull(*weibull)
+    seen = simulate_radar(scenario, seed, snr_db=snr_db, p_fa=pfa, clutter=clutter, glint=glint)
+    write_radar(seen, open_run(output, scenario, force))
+
+
+def _refuse_options_of(other_kind: tuple[str, ...], scenario: str) -> None:
+    """An option that the scenario's kind does not have is a mistake."""
+    context = click.get_current_context()
+    for name in other_kind:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name.replace('_', '-')} does nothing for {scenario}; leave it out")

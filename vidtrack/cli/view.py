@@ -20,7 +20,8 @@ Examples:
 @click.option("--save", metavar="FILE.rrd", help="Write a recording instead of starting the viewer.")
 @click.option("--video/--no-video", default=True, help="Show the pictures of the source, if it is still there.")
 def command(run: Path, save: str | None, video: bool) -> None:
-    """Show the tracks of the folder RUN over its video, or over the background in tracks.png without one.
+    """Show the tracks of the folder RUN over its video, over the background in tracks.png without one, or, of a radar's
+    run, in metres.
 
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
     while tracking, with --rerun.
@@ -30,10 +31,16 @@ def command(run: Path, save: str | None, video: bool) -> None:
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
     from vidtrack.output.rerun import RerunSink
+    from vidtrack.output.rerun_radar import RadarRerun
     from vidtrack.traffic.lines import parse_lines
     from vidtrack.video.source import open_source
 
     finished = replay.read_run(run)
+    if finished.shape is None:
+        with closing(RadarRerun(save or "spawn", finished.settings)) as radar:
+            for step in replay.steps(finished):
+                radar.step(step)
+        return
     height, width = finished.shape
     lines = parse_lines(finished.settings.output.lines, width, height)
     with ExitStack() as stack:
@@ -45,6 +52,6 @@ def command(run: Path, save: str | None, video: bool) -> None:
             except SourceError as error:
                 click.echo(f"vidtrack: {error}; the background of tracks.png is shown instead", err=True)
         if frames is None:
-            sink.background(replay.background(finished))
+            sink.background(replay.background(run, finished.shape))
         for step in replay.steps(finished, frames):
             sink.step(step)

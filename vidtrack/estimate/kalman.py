@@ -17,6 +17,8 @@ class KalmanBank:
     object where the model works per size, one elsewhere.
     """
 
+    STATE = ("x", "P", "hits", "scale")
+
     def __init__(self, model: Motion) -> None:
         n = model.states
         self.model = model

@@ -51,3 +51,10 @@ class Position:
 
 
 POSITION = Position()
+
+
+def wrapped(difference: Floats, angles: tuple[int, ...]) -> Floats:
+    """(N, m) differences of measurements with their angles taken the short way round, in -pi..pi."""
+    for a in angles:
+        difference[:, a] -= 2 * np.pi * np.round(difference[:, a] / (2 * np.pi))
+    return difference

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from contextlib import ExitStack
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vidtrack.output.sink import Sink, Step
-from vidtrack.scan import Status, Tracks
+from vidtrack.scan import TENTATIVE
 
 
 @dataclass(slots=True)
@@ -21,6 +19,12 @@ class _Held:
     proven: set[int] = field(default_factory=set)
 
 
+HOLD_S = 2.0
+"""How long rows wait for their track to be confirmed."""
+LIVE_HOLD_S = 0.7
+"""The same in live runs, and when their recordings are repeated: what waits is lost in a kill."""
+
+
 class Confirmed:
     """Passes steps on to `sinks`, without pictures and with confirmed tracks only, from their first measurement.
 
@@ -28,7 +32,7 @@ class Confirmed:
     memory stays bounded whatever the tracker does.
     """
 
-    def __init__(self, *sinks: Sink, hold_s: float = 2.0) -> None:
+    def __init__(self, *sinks: Sink, hold_s: float = HOLD_S) -> None:
         self._sinks = sinks
         self._hold_s = hold_s
         self._held: deque[_Held] = deque()
@@ -36,7 +40,7 @@ class Confirmed:
 
     def step(self, step: Step) -> None:
         """Take a frame's results; pass on those that are decided."""
-        tentative = step.tracks.status == Status.TENTATIVE
+        tentative = step.tracks.status == TENTATIVE
         undecided = set(step.tracks.id[tentative].tolist())
         decided = self._undecided - undecided
         if decided:
@@ -59,16 +63,10 @@ class Confirmed:
 
     def _release(self, held: _Held) -> None:
         tracks = held.step.tracks
-        keep = tracks.status != Status.TENTATIVE
+        keep = tracks.status != TENTATIVE
         if not keep.all():
-            keep |= np.isin(tracks.id, list(held.proven))
-            held.step = replace(held.step, tracks=_rows(tracks, keep))
+            if held.proven:
+                keep |= np.isin(tracks.id, list(held.proven))
+            held.step = replace(held.step, tracks=tracks.only(keep))
         for sink in self._sinks:
             sink.step(held.step)
-
-
-def _rows(tracks: Tracks, keep: NDArray[np.bool_]) -> Tracks:
-    """The tracks with keep (T,) True."""
-    columns: dict[str, Any] = {f.name: getattr(tracks, f.name) for f in fields(tracks)}
-    kept: dict[str, Any] = {name: v[keep] for name, v in columns.items() if isinstance(v, np.ndarray)}
-    return replace(tracks, **kept)

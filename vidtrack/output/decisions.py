@@ -8,17 +8,19 @@ from vidtrack.output.linefile import LineFile
 from vidtrack.output.sink import Step
 from vidtrack.scan import Choices, Event
 
-HEADER = "frame,time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,reason\n"
+HEADER = "time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,reason\n"
 
 
 class DecisionLog:
     """Sink that writes one row per track and scan (event "update" or "miss") and one per event of a track's life.
 
     Tentative tracks are included: the reasons for their deaths are what one looks for.
+
+    index  name of the first column, "frame" or "scan"
     """
 
-    def __init__(self, path: Path) -> None:
-        self._file = LineFile(path, HEADER)
+    def __init__(self, path: Path, index: str = "frame") -> None:
+        self._file = LineFile(path, f"{index},{HEADER}")
 
     def step(self, step: Step) -> None:
         """Write what was decided in one scan."""

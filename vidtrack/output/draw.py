@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
-import colorsys
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vidtrack.output.colours import Colour, colour
 from vidtrack.scan import Floats, Status, Tracks
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
-Colour = tuple[int, ...]
 BLACK: Colour = (0, 0, 0)
 WHITE: Colour = (255, 255, 255)
 GREY: Colour = (170, 170, 170)
 LINE: Colour = (0, 220, 255)
 _LUMA = (0.114, 0.587, 0.299)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-
-
-@cache
-def _hue(step: int) -> Colour:
-    red, green, blue = colorsys.hsv_to_rgb(step * 0.618034 % 1.0, 0.75 if step % 2 else 0.95, 1.0)
-    return round(255 * blue), round(255 * green), round(255 * red)
-
-
-def colour(track_id: int) -> Colour:
-    """Blue, green, red of an identity; neighbouring numbers are far apart in hue."""
-    return _hue(track_id % 256)
 
 
 class Pen:

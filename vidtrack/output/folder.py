@@ -35,12 +35,17 @@ def open_run(path: Path | None, source_name: str, force: bool) -> Path:
 
     Raises OutputError when the folder cannot be made or written, or `path` is not empty and `force` is off.
     """
-    folder = _next_free(source_name) if path is None else _asked_for(path, force)
+    return usable(_next_free(source_name) if path is None else _asked_for(path, force))
+
+
+def usable(folder: Path) -> Path:
+    """The folder, made if there is none, when files can be written into it. Raises OutputError."""
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror}; choose another folder with -o") from None
+        raise OutputError(f"cannot write into {folder}: {error.strerror}; choose another folder") from None
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -48,6 +49,11 @@ class LineFile:
         self._waiting.clear()
         with writing(self.path):
             append(self._file, block)
+
+    def sync(self) -> None:
+        """Wait until everything handed over is on the disk, safe from a power cut."""
+        with writing(self.path):
+            os.fdatasync(self._file.fileno())
 
     def close(self) -> None:
         """Write what waits."""

@@ -2,81 +2,88 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
-from vidtrack.output.linefile import Every, LineFile, sort_rows
+from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.sink import Step
-from vidtrack.output.tables import csv_text
+from vidtrack.output.tables import csv_text, stacked
 from vidtrack.scan import Floats, Ints
 
 _FRAME, _ID, _SEEN = 0, 1, 7
 
 
 class MotFile:
-    """Sink that writes `frame,id,left,top,width,height,conf,-1,-1,-1`, frames from 1.
+    """Sink that writes `frame,id,left,top,width,height,conf,-1,-1,-1`, frames from 1, sorted by frame and id.
 
-    Measured and merged rows are written every second. The rows of a gap wait until the track is found
-    again, and are dropped at its death: nobody saw it go there. `close` sorts the file by frame and id.
-    `conf` is the track's probability of existence.
+    The rows of a gap wait until the track is found again, and are dropped at its death: nobody saw it go there.
+    Rows of later frames wait with them, so that what is in the file is sorted at any time and memory holds no more
+    than the longest gap. `conf` is the track's probability of existence.
     """
 
     def __init__(self, path: Path) -> None:
         self._file = LineFile(path)
         self._steps: list[Step] = []
-        self._gaps = np.empty((0, 8))
+        self._waiting = np.empty((0, 8))
         self._due = Every(1.0)
 
     def step(self, step: Step) -> None:
         """Take one frame's confirmed tracks."""
         self._steps.append(step)
         if self._due():
-            self._write()
+            self.flush()
 
     def close(self) -> None:
         """Write what waits; gaps that stayed open are dropped."""
         try:
-            self._write()
+            self._write(alive=np.empty(0, np.int64))
         finally:
             self._file.close()
-        sort_rows(self._file.path, columns=2, header=False)
 
-    def _write(self) -> None:
-        if not self._steps:
-            return
-        rows = np.concatenate([self._gaps, *(_rows(step) for step in self._steps)])
-        sure, self._gaps = settle_gaps(rows, self._steps[-1].tracks.id)
+    def flush(self) -> None:
+        """Write what is decided by now."""
+        if self._steps:
+            self._write(alive=self._steps[-1].tracks.id)
+
+    def _write(self, alive: Ints) -> None:
+        rows = np.concatenate([self._waiting, _rows(self._steps)]) if self._steps else self._waiting
+        decided, self._waiting = settle_gaps(rows, alive)
         self._steps.clear()
-        self._file.add(_lines(sure))
+        self._file.add(_lines(decided))
         self._file.flush()
 
 
-def _rows(step: Step) -> Floats:
-    """(T, 8) frame, id, left, top, width, height, conf, seen."""
-    tracks = step.tracks
-    frame = np.full(len(tracks), step.index + 1)
-    conf = np.where(np.isnan(tracks.existence), 1.0, tracks.existence)
-    rows = np.column_stack([frame, tracks.id, tracks.box, conf, tracks.seen])
-    return rows[~np.isnan(tracks.box).any(axis=1)]
+def _rows(steps: Sequence[Step]) -> Floats:
+    """(N, 8) frame, id, left, top, width, height, conf, seen; without tracks that have no box."""
+    frame = np.repeat([step.index + 1 for step in steps], [len(step.tracks) for step in steps])
+    box, existence = stacked(steps, "box"), stacked(steps, "existence")
+    conf = np.where(np.isnan(existence), 1.0, existence)
+    rows = np.column_stack([frame, stacked(steps, "id"), box, conf, stacked(steps, "seen")])
+    return rows[~np.isnan(box).any(axis=1)]
 
 
 def settle_gaps(rows: Floats, alive: Ints) -> tuple[Floats, Floats]:
-    """Rows that are sure, and the gap rows that still wait; gaps of dead tracks are in neither.
+    """Rows that can be written, and those that wait: from the first gap on that may still be closed.
 
-    rows   (N, 8) see _rows; a row that was not seen is sure once its track was seen later
+    rows   (N, 8) see _rows, sorted by frame; a row that was not seen counts once its track was seen later, and
+           not at all if the track died before
     alive  ids of the tracks that may be found again
     """
+    frame, seen = rows[:, _FRAME], rows[:, _SEEN] > 0
     ids, index = np.unique(rows[:, _ID], return_inverse=True)
     last_seen = np.zeros(len(ids))
-    seen = rows[:, _SEEN] > 0
-    np.maximum.at(last_seen, index[seen], rows[seen, _FRAME])
-    sure = rows[:, _FRAME] <= last_seen[index]
-    return rows[sure], rows[~sure & np.isin(rows[:, _ID], alive)]
+    np.maximum.at(last_seen, index[seen], frame[seen])
+    sure = frame <= last_seen[index]
+    open_gap = ~sure & np.isin(rows[:, _ID], alive)
+    early = frame < frame[open_gap].min(initial=np.inf)
+    return rows[sure & early], rows[(sure | open_gap) & ~early]
 
 
 def _lines(rows: Floats) -> str:
+    rows = rows[np.lexsort((rows[:, _ID], rows[:, _FRAME]))]
     number = rows[:, [_FRAME, _ID]].astype(np.int64)
     unused = np.full((len(rows), 3), -1)
     columns = [*number.T, *np.round(rows[:, 2:6], 2).T, np.round(rows[:, 6], 3), *unused.T]

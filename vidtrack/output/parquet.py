@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 
@@ -13,7 +13,8 @@ import pyarrow.parquet as pq
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 
-_PART_ROWS = 20_000  # 3 MB
+_PART_ROWS = 2_000  # 0.3 MB: what waits in memory, and what a killed run lacks
+_GROUP_ROWS = 20_000  # rows that the one file keeps together
 _PART_S = 60.0
 
 
@@ -41,7 +42,7 @@ class ParquetParts:
         """Join all parts to one file."""
         parts = (pq.read_table(self._part(i)) for i in range(self._count))
         last = pa.concat_tables([self._schema.empty_table(), *self._waiting])
-        write_parquet(self._path, self._schema, chain(parts, [last]))
+        write_parquet(self._path, self._schema, _grouped(chain(parts, [last])))
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _close_part(self) -> None:
@@ -55,6 +56,18 @@ class ParquetParts:
 
     def _part(self, number: int) -> Path:
         return self._folder / f"{number:06d}.parquet"
+
+
+def _grouped(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
+    """The same rows in tables of at least _GROUP_ROWS, but for the last."""
+    group: list[pa.Table] = []
+    for table in tables:
+        group.append(table)
+        if sum(len(part) for part in group) >= _GROUP_ROWS:
+            yield pa.concat_tables(group)
+            group.clear()
+    if group:
+        yield pa.concat_tables(group)
 
 
 def parts_folder(path: Path) -> Path:

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vidtrack.output.draw import Pen, colour, draw_lines
+from vidtrack.output.colours import colour
+from vidtrack.output.draw import Pen, draw_lines
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Tracks

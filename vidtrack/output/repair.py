@@ -15,11 +15,11 @@ import pyarrow.csv
 from vidtrack.errors import FormatError
 from vidtrack.output.linefile import drop_partial_line, replace_text, sort_rows
 from vidtrack.output.parquet import parts_folder, write_parquet
-from vidtrack.output.tables import VIDEO, schema
+from vidtrack.output.tables import layout, schema
 
 
 def repair(folder: Path) -> int:
-    """Rebuild tracks.parquet from tracks.csv, cut half-written lines, sort mot.txt; returns the number of rows.
+    """Rebuild tracks.parquet from tracks.csv, cut half-written lines; returns the number of rows.
 
     A summary of a killed run stays marked as interrupted; its tracks and counts are taken from the tables.
     Raises FormatError when `folder` holds no tracks.csv or a damaged one.
@@ -29,10 +29,8 @@ def repair(folder: Path) -> int:
             drop_partial_line(folder / name)
     table = read_tracks(folder / "tracks.csv")
     parquet = folder / "tracks.parquet"
-    write_parquet(parquet, schema(VIDEO), [table])
+    write_parquet(parquet, table.schema, [table])
     shutil.rmtree(parts_folder(parquet), ignore_errors=True)
-    if (folder / "mot.txt").is_file():
-        sort_rows(folder / "mot.txt", columns=2, header=False)
     if (folder / "counts.csv").is_file():
         sort_rows(folder / "counts.csv", columns=1, header=True)
     _repair_summary(folder, table)
@@ -41,8 +39,9 @@ def repair(folder: Path) -> int:
 
 def read_tracks(path: Path) -> pa.Table:
     """The table in a tracks.csv, with units in its schema. Raises FormatError."""
-    wanted = schema(VIDEO)
     try:
+        with path.open() as file:
+            wanted = schema(layout(file.readline().strip().split(",")))
         table = pyarrow.csv.read_csv(
             path,
             convert_options=pyarrow.csv.ConvertOptions(

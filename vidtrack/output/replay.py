@@ -15,7 +15,7 @@ from vidtrack.config import Settings, parse
 from vidtrack.errors import FormatError
 from vidtrack.output.repair import read_tracks
 from vidtrack.output.sink import Step
-from vidtrack.scan import Scan, Status, Tracks
+from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
 from vidtrack.video.frame import Frame, Image
 
 _NO_BLOBS = (np.empty((0, 2)), np.eye(2))
@@ -26,13 +26,13 @@ class Run:
     """A run folder's contents.
 
     source    name of the input
-    shape     (H, W) of its pictures
+    shape     (H, W) of its pictures; None for a radar's run
     table     tracks.csv
     """
 
     folder: Path
     source: str
-    shape: tuple[int, int]
+    shape: tuple[int, int] | None
     settings: Settings
     table: pa.Table
 
@@ -43,7 +43,7 @@ def read_run(folder: Path) -> Run:
     path = folder / "summary.json"
     try:
         summary = json.loads(path.read_text())
-        shape = (int(summary["height"]), int(summary["width"]))
+        shape = None if "scan" in table.column_names else (int(summary["height"]), int(summary["width"]))
         return Run(folder, summary["source"], shape, parse(summary["settings"]), table)
     except FileNotFoundError:
         raise FormatError(f"{folder} is not a run: it has no summary.json") from None
@@ -51,33 +51,35 @@ def read_run(folder: Path) -> Run:
         raise FormatError(f"{path} is damaged ({error}); vidtrack repair {folder} may help") from None
 
 
-def background(run: Run) -> Image:
-    """tracks.png in source size, grey without one."""
-    picture = cv2.imread(str(run.folder / "tracks.png"))
+def background(folder: Path, shape: tuple[int, int]) -> Image:
+    """tracks.png in source size (H, W), grey without one."""
+    picture = cv2.imread(str(folder / "tracks.png"))
     if picture is None:
-        return np.full((*run.shape, 3), 60, np.uint8)
-    return np.asarray(cv2.resize(picture, run.shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
+        return np.full((*shape, 3), 60, np.uint8)
+    return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def steps(run: Run, frames: Iterable[Frame] | None = None) -> Iterator[Step]:
-    """The run frame by frame: those of the source, or without them all from the table's first to its last."""
+    """The run step by step: the source's frames, or without them all of the table from its first to its last."""
     columns = {name: run.table[name].to_numpy() for name in run.table.column_names}
     statuses = {status.name.lower(): status for status in Status}
     columns["status"] = np.array([statuses[word] for word in columns["status"]], np.int8)
-    number = columns["frame"]
-    for index, time_s, frame in _table_times(columns) if frames is None else ((f.index, f.time_s, f) for f in frames):
+    number = columns.pop("scan" if run.shape is None else "frame")
+    for index, time_s, frame in (
+        _table_times(number, columns["time_s"]) if frames is None else ((f.index, f.time_s, f) for f in frames)
+    ):
         first, last = np.searchsorted(number, index), np.searchsorted(number, index, side="right")
         tracks = _tracks(time_s, {name: values[first:last] for name, values in columns.items()})
         yield Step(index, time_s, Scan(time_s, *_NO_BLOBS), tracks, frame, None, {})
 
 
-def _table_times(columns: dict[str, np.ndarray]) -> Iterator[tuple[int, float, None]]:
+def _table_times(number: Ints, time_s: Floats) -> Iterator[tuple[int, float, None]]:
     """Number and time of each frame; one without tracks is not in the table, so its time is interpolated."""
-    frames, first = np.unique(columns["frame"], return_index=True)
+    frames, first = np.unique(number, return_index=True)
     if not len(frames):
         return
     every = np.arange(frames[0], frames[-1] + 1)
-    times = np.interp(every, frames, columns["time_s"][first])
+    times = np.interp(every, frames, time_s[first])
     yield from ((index, time_s, None) for index, time_s in zip(every.tolist(), times.tolist(), strict=True))
 
 
@@ -85,21 +87,29 @@ def _tracks(t: float, rows: dict[str, np.ndarray]) -> Tracks:
     """Tracks of one frame; what the table does not hold is NaN, and velocities have no covariance."""
     count = len(rows["track_id"])
     unknown = np.full(count, np.nan)
-    P = np.zeros((count, 4, 4))
-    P[:, 0, 0], P[:, 2, 2] = rows["sigma_x_px"] ** 2, rows["sigma_y_px"] ** 2
-    P[:, 0, 2] = P[:, 2, 0] = rows["corr_xy"] * rows["sigma_x_px"] * rows["sigma_y_px"]
+    unit = "m" if "x_m" in rows else "px"
+    axes = [axis for axis in "xyz" if f"{axis}_{unit}" in rows]
+    states = [column for axis in axes for column in (rows[f"{axis}_{unit}"], rows[f"v{axis}_{unit}_s"])]
+    sigma = np.column_stack([rows[f"sigma_{axis}_{unit}"] for axis in axes])
+    position, velocity = tuple(range(0, len(states), 2)), tuple(range(1, len(states), 2))
+    P = np.zeros((count, len(states), len(states)))
+    P[:, position, position] = sigma**2
+    P[:, 0, 2] = P[:, 2, 0] = rows["corr_xy"] * sigma[:, 0] * sigma[:, 1]
+    boxes = [rows.get(name, unknown) for name in ("left_px", "top_px", "width_px", "height_px")]
     return Tracks(
         t=t,
         id=rows["track_id"],
         status=rows["status"],
-        x=np.column_stack([rows["x_px"], rows["vx_px_s"], rows["y_px"], rows["vy_px_s"]]),
+        x=np.column_stack(states),
         P=P,
-        box=np.column_stack([rows["left_px"], rows["top_px"], rows["width_px"], rows["height_px"]]),
-        group=rows["group_id"],
+        box=np.column_stack(boxes),
+        group=rows.get("group_id", np.full(count, -1)),
         group_since_s=unknown,
         age_s=unknown,
         travel=unknown,
         existence=unknown,
         measurement=np.full(count, -1),
         nis=rows["nis"],
+        position=position,
+        velocity=velocity,
     )

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from vidtrack.scan import Scan, Tracks
-from vidtrack.video.foreground import Foreground
-from vidtrack.video.frame import Frame
+
+if TYPE_CHECKING:  # radar runs have no pictures, and must not need OpenCV
+    from vidtrack.video.foreground import Foreground
+    from vidtrack.video.frame import Frame
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One frame through the whole pipeline.
+    """One frame, or one scan of a radar, through the whole pipeline.
 
-    index       frame number from 0
-    frame, foreground   None for stored detections, which have no picture
+    index       frame number from 0, or the scan's number
+    frame, foreground   None for stored detections and radar plots, which have no picture
     stage_s     seconds spent in each stage
     """
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from vidtrack.config import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
-from vidtrack.scan import Status
+from vidtrack.scan import TENTATIVE
 from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
@@ -25,6 +25,7 @@ class Summary:
     reading  the source's own account when asked: fps, width, height, frames_read, frames_dropped,
              decode_errors, reconnects, stalls, truncated
     counter  the counted lines, None without any
+    unit     what steps are: "frames" or "scans"
 
     `interrupted` is True until the run clears it before `close`, so a killed or failed run says so.
     """
@@ -36,6 +37,7 @@ class Summary:
         settings: Settings,
         reading: Callable[[], Mapping[str, object]],
         counter: LineCounter | None = None,
+        unit: str = "frames",
     ) -> None:
         self.interrupted = True
         self._path = path
@@ -44,6 +46,7 @@ class Summary:
         self._versions = {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES}
         self._reading = reading
         self._counter = counter
+        self._unit = unit
         self._start = time.monotonic()
         self._frames = 0
         self._media_s = 0.0
@@ -55,7 +58,7 @@ class Summary:
 
     def step(self, step: Step) -> None:
         """Count."""
-        confirmed = set(step.tracks.id[step.tracks.status != Status.TENTATIVE].tolist())
+        confirmed = set(step.tracks.id[step.tracks.status != TENTATIVE].tolist())
         self._tracks += len(confirmed - self._alive)
         self._alive = confirmed
         self._frames += 1
@@ -74,7 +77,7 @@ class Summary:
         return {
             "source": self._source,
             **self._reading(),
-            "frames": self._frames,
+            self._unit: self._frames,
             "media_s": round(self._media_s, 6),
             "tracks": self._tracks,
             "counts": {} if self._counter is None else self._counter.totals(),

@@ -31,11 +31,11 @@ def _real(name: str, unit: str, decimals: int = 3) -> Column:
     return Column(name, unit, pa.float64(), decimals)
 
 
+_TRACK = (_real("time_s", "s", 6), Column("track_id", "1", pa.int64()), Column("status", "1", pa.string()))
+
 VIDEO = (
     Column("frame", "1", pa.int64()),
-    _real("time_s", "s", 6),
-    Column("track_id", "1", pa.int64()),
-    Column("status", "1", pa.string()),
+    *_TRACK,
     _real("x_px", "px"),
     _real("y_px", "px"),
     _real("vx_px_s", "px/s"),
@@ -52,6 +52,23 @@ VIDEO = (
 )
 """Columns of video tracks. `group_id` is -1 alone; `nis` is empty where there was no update."""
 
+RADAR = (
+    Column("scan", "1", pa.int64()),
+    *_TRACK,
+    _real("x_m", "m"),
+    _real("y_m", "m"),
+    _real("vx_m_s", "m/s"),
+    _real("vy_m_s", "m/s"),
+    _real("sigma_x_m", "m"),
+    _real("sigma_y_m", "m"),
+    _real("corr_xy", "1", 6),
+    _real("nis", "1"),
+)
+"""Columns of radar tracks in the plane: x east, y north."""
+
+RADAR_3D = (*RADAR, _real("z_m", "m"), _real("vz_m_s", "m/s"), _real("sigma_z_m", "m"))
+"""Columns of radar tracks in space: z up."""
+
 _STATUS_WORDS = np.array([status.name.lower() for status in Status])
 
 
@@ -60,28 +77,39 @@ def schema(columns: Sequence[Column]) -> pa.Schema:
     return pa.schema([pa.field(c.name, c.kind, metadata={"unit": c.unit}) for c in columns])
 
 
-def video_rows(steps: Sequence[Step]) -> pa.Table:
-    """Table with the columns VIDEO, rows in the order of the steps."""
-    tracks = [step.tracks for step in steps]
-    counts = [len(t) for t in tracks]
-    x, P, box = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("x", "P", "box"))
-    position, velocity = list(tracks[0].position), list(tracks[0].velocity)
+def layout(names: Sequence[str]) -> Sequence[Column]:
+    """The columns of a table of tracks with these names; those of video where they fit nothing."""
+    return next((columns for columns in (RADAR_3D, RADAR) if {c.name for c in columns} <= set(names)), VIDEO)
+
+
+def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO) -> pa.Table:
+    """Table with these columns, rows in the order of the steps."""
+    counts = [len(step.tracks) for step in steps]
+    x, P, box = (stacked(steps, name) for name in ("x", "P", "box"))
+    position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
     cov = P[:, position][:, :, position]
-    sigma = np.sqrt(cov[:, [0, 1], [0, 1]])
-    values = [
-        np.repeat([step.index for step in steps], counts),
-        np.repeat([step.time_s for step in steps], counts),
-        np.concatenate([t.id for t in tracks]),
-        _STATUS_WORDS[np.concatenate([t.status for t in tracks])],
-        *x[:, position].T,
-        *x[:, velocity].T,
-        *sigma.T,
-        cov[:, 0, 1] / sigma.prod(axis=1),
-        *box.T,
-        np.concatenate([t.group for t in tracks]),
-        np.concatenate([t.nis for t in tracks]),
-    ]
-    return pa.Table.from_arrays([_array(c, v) for c, v in zip(VIDEO, values, strict=True)], schema=schema(VIDEO))
+    sigma = np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
+    values = {
+        "time_s": np.repeat([step.time_s for step in steps], counts),
+        "track_id": stacked(steps, "id"),
+        "status": _STATUS_WORDS[stacked(steps, "status")],
+        "corr_xy": cov[:, 0, 1] / sigma[:, :2].prod(axis=1),
+        "group_id": stacked(steps, "group"),
+        "nis": stacked(steps, "nis"),
+    }
+    values["frame"] = values["scan"] = np.repeat([step.index for step in steps], counts)
+    for unit in ("px", "m"):
+        for k, axis in enumerate("xyz"[: len(position)]):
+            values[f"{axis}_{unit}"] = x[:, position[k]]
+            values[f"v{axis}_{unit}_s"] = x[:, velocity[k]]
+            values[f"sigma_{axis}_{unit}"] = sigma[:, k]
+    values |= zip(("left_px", "top_px", "width_px", "height_px"), box.T, strict=True)
+    return pa.Table.from_arrays([_array(c, values[c.name]) for c in columns], schema=schema(columns))
+
+
+def stacked(steps: Sequence[Step], name: str) -> np.ndarray:
+    """(N, ...) one quantity of all tracks, in the order of the steps."""
+    return np.concatenate([getattr(step.tracks, name) for step in steps])
 
 
 def _array(column: Column, values: np.ndarray) -> pa.Array:
@@ -93,9 +121,10 @@ def _array(column: Column, values: np.ndarray) -> pa.Array:
 class TrackTable:
     """Sink that writes tracks.csv every second and tracks.parquet in parts."""
 
-    def __init__(self, folder: Path) -> None:
-        self._csv = LineFile(folder / "tracks.csv", ",".join(c.name for c in VIDEO) + "\n")
-        self._parquet = ParquetParts(folder / "tracks.parquet", schema(VIDEO))
+    def __init__(self, folder: Path, columns: Sequence[Column] = VIDEO) -> None:
+        self._columns = columns
+        self._csv = LineFile(folder / "tracks.csv", ",".join(c.name for c in columns) + "\n")
+        self._parquet = ParquetParts(folder / "tracks.parquet", schema(columns))
         self._waiting: list[Step] = []
         self._due = Every(1.0)
 
@@ -117,11 +146,11 @@ class TrackTable:
     def _write(self) -> None:
         if not self._waiting:
             return
-        rows = video_rows(self._waiting)
+        table = track_rows(self._waiting, self._columns)
         self._waiting.clear()
-        self._csv.add(csv_text(rows))
+        self._csv.add(csv_text(table))
         self._csv.flush()
-        self._parquet.add(rows)
+        self._parquet.add(table)
 
 
 def csv_text(table: pa.Table) -> str:

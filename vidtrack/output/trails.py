@@ -19,12 +19,12 @@ class Trails:
     def step(self, tracks: Tracks) -> None:
         """Add a scan, forget what is too old."""
         shown = tracks.status != Status.TENTATIVE
-        self._scans.append((tracks.t, tracks.id[shown], tracks.xy[shown, :2]))
+        self._scans.append((tracks.t, tracks.id[shown], tracks.xy[shown]))
         while tracks.t - self._scans[0][0] > self._seconds:
             self._scans.popleft()
 
     def paths(self) -> dict[int, Floats]:
-        """(n, 2) positions in order of time for each track of the last scan."""
+        """(n, d) positions in order of time for each track of the last scan."""
         if not self._scans:
             return {}
         alive = self._scans[-1][1]

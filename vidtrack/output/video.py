@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from io import FileIO
 from pathlib import Path
 
 import av
@@ -14,8 +13,9 @@ from av.video.stream import VideoStream
 
 from vidtrack.config import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
+from vidtrack.output.disk import Disk
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails
-from vidtrack.output.folder import append, writing
+from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
 from vidtrack.scan import Status
@@ -24,25 +24,6 @@ from vidtrack.video.frame import Image
 
 _CLOCK = Fraction(1, 90_000)
 _FRAGMENT_S = 1
-
-
-class _Disk:
-    """A file for PyAV to write to. It keeps an error for later: FFmpeg crashes on a header that it could not write."""
-
-    def __init__(self, file: FileIO) -> None:
-        self.error: OSError | None = None
-        self._file = file
-
-    def write(self, block: bytes) -> int:
-        if self.error is None:
-            try:
-                append(self._file, block)
-            except OSError as error:
-                self.error = error
-        return len(block)
-
-    def close(self) -> None:
-        self._file.close()
 
 
 class AnnotatedVideo:
@@ -62,7 +43,7 @@ class AnnotatedVideo:
         self._stream: VideoStream | None = None
         self._pts = -1
         try:
-            self._disk = _Disk(open(path, "wb", buffering=0))  # noqa: SIM115
+            self._disk = Disk(path)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}; give --video another file") from None
         self._container: OutputContainer = av.open(

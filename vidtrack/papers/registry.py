@@ -25,6 +25,14 @@ class Experiment:
 
 
 EXPERIMENTS = {
+    "000-fig1": Experiment("p000.fig1", "The best P_F scan by scan, in closed form and exactly"),
+    "000-fig2": Experiment("p000.fig2", "Error of a PDAF with a fixed threshold and with the best one"),
+    "001-fig2": Experiment("p001.fig2", "Two close tracks, four observations: gates and association"),
+    "001-fig3": Experiment("p001.fig3", "The gate shrinks as observations come in"),
+    "001-fig4": Experiment("p001.fig4", "Two close targets by nearest neighbour"),
+    "001-fig5": Experiment("p001.fig5", "Two close targets by branching"),
+    "002-fig1": Experiment("p002.fig1", "Predicted and actual error of a PSNF, by SNR and threshold"),
+    "002-fig2": Experiment("p002.fig2", "Predicted and actual error of a PSNF in Weibull clutter"),
     "004-fig1": Experiment("p004.fig1", "A measurement nearer to one target and more probable for the other"),
     "004-fig2": Experiment("p004.fig2", "The confidence region of a moving target's predicted position"),
     "004-fig3": Experiment("p004.fig3", "Crossing targets: who takes which measurement, by distance and by region"),

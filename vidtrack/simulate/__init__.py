@@ -1,7 +1,25 @@
-"""Traffic video with exact truth: scenes as data, drawn by a camera with noise, shake and light changes."""
+"""Traffic video and radar plots with exact truth.
 
-from vidtrack.simulate.clip import SCENARIOS, Clip, simulate
-from vidtrack.simulate.truth import Truth
-from vidtrack.simulate.write import write
+Video: scenes as data, drawn by a camera with noise, shake and light changes. Radar: flights, seen with errors, misses
+and clutter; that part needs no OpenCV.
+"""
 
-__all__ = ["SCENARIOS", "Clip", "Truth", "simulate", "write"]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vidtrack.simulate.clip import SCENARIOS as SCENARIOS
+    from vidtrack.simulate.clip import Clip as Clip
+    from vidtrack.simulate.clip import simulate as simulate
+    from vidtrack.simulate.truth import Truth as Truth
+    from vidtrack.simulate.write import write as write
+
+_HOME = {"SCENARIOS": "clip", "Clip": "clip", "Truth": "truth", "simulate": "clip", "write": "write"}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a name of the video part when it is first used."""
+    if name not in _HOME:
+        raise AttributeError(f"module vidtrack.simulate has no attribute {name}")
+    return getattr(import_module(f"vidtrack.simulate.{_HOME[name]}"), name)

@@ -25,9 +25,8 @@ class Border:
         """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border cuts."""
         if np.isinf(self.width):
             return np.zeros((len(box), 4), bool)
-        left, top, width, height = box.T
-        right, bottom = self.width - REACH, self.height - REACH
-        return np.column_stack([left < REACH, top < REACH, left + width > right, top + height > bottom])
+        near, far = box[:, :2], box[:, :2] + box[:, 2:]
+        return np.concatenate([near < REACH, far > (self.width - REACH, self.height - REACH)], axis=1)
 
     def cut(self, box: Floats) -> Mask:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""

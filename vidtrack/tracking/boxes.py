@@ -11,7 +11,9 @@ from vidtrack.scan import Floats, Ints
 
 def absolute(box: Floats, xy: Floats) -> Floats:
     """(N, 4) boxes relative to their points (N, 2), placed in the picture."""
-    return np.column_stack([box[:, :2] + xy[:, :2], box[:, 2:]])
+    placed = box.copy()
+    placed[:, :2] += xy[:, :2]
+    return placed
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")

@@ -18,21 +18,22 @@ def heaviest(decision: Decision) -> Ints:
     return best
 
 
-def evidence(problem: Problem, decision: Decision) -> Floats:
+def evidence(problem: Problem, decision: Decision, taken: Ints) -> Floats:
     """(T,) log-likelihood ratio, target against none, of what each row got.
 
-    A shared-out row: 1 - P_D P_G + sum of P_D N / clutter = (1 - P_D P_G) / beta0, the PDA's normaliser. A row
-    with one measurement for certain: P_D N / clutter of that one.
+    A row with one measurement for certain: P_D N / clutter of that one. A shared-out row: the PDA's normaliser
+    1 - P_D P_G + sum of P_D N / clutter, which is what any of its choices weighs over its share; here the miss where
+    nothing was `taken` (T,), else that measurement.
     """
-    with np.errstate(divide="ignore"):
-        ratio = np.log(problem.missed) - np.log(decision.beta0)
-    sure = np.flatnonzero(decision.beta == 1.0)
-    taken = np.full(problem.rows, -1)
-    taken[decision.row[sure]] = decision.measurement[sure]
+    none = taken < 0
+    ratio = problem.log_missed - np.log(np.where(none, decision.beta0, 1.0))
+    share = np.ones(problem.rows)
+    of_taken = decision.measurement == taken[decision.row]
+    share[decision.row[of_taken]] = decision.beta[of_taken]
     pairs = problem.pairs
     chosen = pairs.measurement == taken[pairs.row]
     ratio[pairs.row[chosen]] = problem.log_ratio[chosen]
-    return np.nan_to_num(ratio, nan=0.0)
+    return ratio - np.log(share)
 
 
 def innovations(pairs: Pairs, taken: Ints) -> Floats:

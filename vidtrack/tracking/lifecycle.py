@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Status
+from vidtrack.scan import MERGED, TENTATIVE, Floats
 from vidtrack.tracking.register import Register
 
 Mask = np.ndarray
@@ -50,23 +50,24 @@ class LifeCycle:
         enough = self._hits(register) >= self.confirm_hits
         old = t - register.born_s >= self.confirm_s * (1 - 1e-9)
         travelled = np.linalg.norm(xy - register.start, axis=1) >= self.confirm_travel * size
-        return (register.status == Status.TENTATIVE) & enough & old & travelled
+        return (register.status == TENTATIVE) & enough & old & travelled
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
         scans = np.minimum(_bit_length(register.history), self.confirm_window)
         misses = scans - self._hits(register)
-        return (register.status == Status.TENTATIVE) & (misses > self.confirm_window - self.confirm_hits)
+        return (register.status == TENTATIVE) & (misses > self.confirm_window - self.confirm_hits)
 
     def lost(self, register: Register, t: float) -> Mask:
-        """(T,) confirmed rows without evidence for too long."""
+        """(T,) rows without evidence for too long; by misses only those that are confirmed."""
         gone = np.zeros(len(register), bool)
-        if self.coast_s is not None:
-            patience = np.where(register.status == Status.MERGED, self.hidden_s, self.coast_s)
-            gone |= t - register.updated_s > np.maximum(patience, self.coast_s)
         if self.coast_scans is not None:
-            gone |= register.history & ((1 << self.coast_scans) - 1) == 0
-        return (register.status != Status.TENTATIVE) & gone
+            unseen = register.history & ((1 << self.coast_scans) - 1) == 0
+            gone |= (register.status != TENTATIVE) & unseen
+        if self.coast_s is not None:
+            patience = np.where(register.status == MERGED, self.hidden_s, self.coast_s)
+            gone |= t - register.updated_s > np.maximum(patience, self.coast_s)
+        return gone
 
     def _hits(self, register: Register) -> np.ndarray:
         return np.bitwise_count(register.history & ((1 << self.confirm_window) - 1)).astype(np.int64)

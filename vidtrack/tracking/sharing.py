@@ -23,6 +23,8 @@ Mask = np.ndarray
 class Sharing:
     """Keeps tracks on the blobs they share. All blobs are (M, 4) boxes in the picture."""
 
+    STATE = ("_made",)
+
     def __init__(self, groups: Groups, border: Border, box_s: float) -> None:
         self._groups = groups
         self._border = border
@@ -51,7 +53,7 @@ class Sharing:
         position, velocity = list(bank.model.position), list(bank.model.velocity)
         box, on = register.box[rows], shared[rows]
         predicted = absolute(box, bank.x[rows][:, position])
-        before = predicted - np.pad(dt * bank.x[rows][:, velocity], ((0, 0), (0, 2)))
+        before = absolute(predicted, -dt * bank.x[rows][:, velocity])
         var = np.diagonal(bank.P[rows], axis1=1, axis2=2)[:, position]
         cut = self._border.sides(blobs)
         z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
@@ -64,19 +66,19 @@ class Sharing:
         register.updated_s[rows[own > 0]] = t
 
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
-        xy = np.pad(bank.x[rows][:, position], ((0, 0), (0, 2)))
-        box = self._border.reaching(box + xy, self._border.sides(before) & cut[on]) - xy
+        xy = bank.x[rows][:, position]
+        box = absolute(self._border.reaching(absolute(box, xy), self._border.sides(before) & cut[on]), -xy)
         alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
-        box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (blobs[on[alone]] - xy[alone] - box[alone])
+        box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box
 
     def regroup(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """A group keeps its number and its start for as long as any of its members stay together."""
-        if not ((shared >= 0).any() or (register.group >= 0).any()):
+        blobs = np.flatnonzero(np.bincount(shared[shared >= 0]) > 1)
+        if not (len(blobs) or (register.group >= 0).any()):
             return
         group = np.full(len(shared), -1)
-        blobs, count = np.unique(shared[shared >= 0], return_counts=True)
-        for blob in blobs[count > 1]:
+        for blob in blobs:
             members = np.flatnonzero(shared == blob)
             number = register.group[members].max()
             if number < 0 or (group == number).any():

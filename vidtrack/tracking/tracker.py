@@ -12,16 +12,19 @@ from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
+from vidtrack.associate.trust import EQUAL, Trust
 from vidtrack.errors import ScanError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
-from vidtrack.scan import Choices, Decision, Event, Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Scan, Tracks
+from vidtrack.tracking.births import distinct
 from vidtrack.tracking.border import Border
 from vidtrack.tracking.boxes import absolute, area, best_cover, longer, widened
 from vidtrack.tracking.choices import choices, evidence, heaviest, innovations
+from vidtrack.tracking.forest import Deferred, Forest
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.register import Register
@@ -45,11 +48,12 @@ class Tracker:
     """Multi-target tracker: predict, gate, associate, update, register, delete.
 
     model      motion model of every target
-    associate  association rule (NN(), GNN(), ...)
+    associate  association rule: NN(), GNN(), ..., or one that decides scans later: MHT(), Split()
     gate       Gate, or the probability of one
     life       confirmation and deletion
     groups     how tracks share merged blobs (scans with boxes only); None: they do not
     shape      how the size of boxes counts in the association; None: it does not
+    trust      which scores may start a track; None: scores do not count
     estimator  the filters' bank, made from the model
     bounds     (width, height) of the picture; a track that leaves it is deleted; None: no border
     births     whether measurements that belong to no track start one
@@ -58,14 +62,17 @@ class Tracker:
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     """
 
+    STATE = ("t", "bank", "register", "sharing", "forest")
+
     def __init__(
         self,
         model: Motion | None = None,
-        associate: Associator | None = None,
+        associate: Associator | Deferred | None = None,
         gate: Gate | float = 0.999,
         life: LifeCycle | None = None,
         groups: Groups | None = None,
         shape: Shape | None = None,
+        trust: Trust | None = None,
         *,
         estimator: Callable[[Motion], Estimator] = KalmanBank,
         bounds: tuple[float, float] | None = None,
@@ -76,10 +83,16 @@ class Tracker:
         explain: bool = False,
     ) -> None:
         self.model: Motion = model or ConstantVelocity()
-        self.associate = associate or GNN()
+        self.associate: Associator = GNN()
+        self.forest: Forest | None = None
+        if isinstance(associate, Deferred):
+            self.forest = associate.forest()
+        elif associate is not None:
+            self.associate = associate
         self.gate = gate if isinstance(gate, Gate) else Gate(gate)
         self.life = life or LifeCycle()
         self.shape = shape
+        self.trust = trust or EQUAL
         self.births = births
         self.detection_probability = detection_probability
         self.clutter_density = clutter_density
@@ -88,7 +101,7 @@ class Tracker:
         self.bank = estimator(self.model)
         self.register = Register(self.model.dim)
         self.border = Border(*bounds) if bounds else Border()
-        self.sharing = Sharing(groups, self.border, box_s) if groups else None
+        self.sharing = Sharing(groups, self.border, box_s) if groups and not self.forest else None
         self.t: float | None = None
 
     def step(self, scan: Scan) -> Tracks:
@@ -101,18 +114,24 @@ class Tracker:
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
         problem = self._problem(scan, sensor, blobs)
-        decision, shared, hides, free = self._associated(problem, blobs)
+        if self.forest:
+            decision, shared, hides, free = self._grown(self.forest, problem, events)
+            problem = problem.of(decision.parent)
+        else:
+            decision, shared, hides, free = self._associated(problem, blobs)
         taken = heaviest(decision)
         self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
             self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
         nis = innovations(problem.pairs, taken)
-        why = choices(self.register.id, problem.pairs, decision, taken) if self.explain else None
-        self._believe(problem, decision, shared)
+        why = self._why(problem, decision, taken) if self.explain else None
+        self._believe(problem, decision, taken, shared)
         kept = self._delete(scan.t, events)
         if self.sharing:
             self.sharing.regroup(shared[kept], self.register, scan.t, events)
         born = self._register(scan, sensor, blobs, free, events)
+        if self.forest:
+            self.forest.settle(self.register, scan.t, events)
         self._confirm(scan.t, events)
         taken = np.concatenate([np.where(shared >= 0, shared, taken)[kept], born])
         nis = np.concatenate([nis[kept], np.full(len(born), np.nan)])
@@ -128,10 +147,12 @@ class Tracker:
         first, count = len(self.bank), len(x)
         position = list(self.model.position)
         self.bank.insert(x, P, np.ones(count))
+        if self.forest:
+            self.forest.add(count)
         boxes = np.full((count, 4), np.nan) if box is None else box
         runs = np.zeros(count, np.int64) if run is None else run
         ids = self.register.append(t, x[:, position], boxes, BIRTH_EXISTENCE, runs)
-        self.register.status[first:] = Status.CONFIRMED
+        self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
         return ids
 
@@ -145,8 +166,9 @@ class Tracker:
         self.t = t
         lost = self.life.lost(self.register, t)
         if lost.any():
-            for track, seen in zip(self.register.id[lost], self.register.updated_s[lost], strict=True):
-                events.append(Event(t, int(track), "delete", f"no evidence since {seen:.2f} s"))
+            last = dict(zip(self.register.id[lost].tolist(), self.register.updated_s[lost].tolist(), strict=True))
+            for track in self._ends(lost):
+                events.append(Event(t, int(track), "delete", f"no evidence since {last[int(track)]:.2f} s"))
             self._keep(~lost)
         return dt
 
@@ -161,7 +183,7 @@ class Tracker:
         zhat, cov = self.bank.predicted_measurement(sensor)
         problem = Problem.gated(
             self.gate, zhat, cov, scan, self.detection_probability, self.clutter_density,
-            run=self.register.run, angles=sensor.angles,
+            run=self.register.run, label=self.register.label, angles=sensor.angles,
         )  # fmt: skip
         if self.shape is None or blobs is None:
             return problem
@@ -174,19 +196,31 @@ class Tracker:
         that hide more than their tracks account for, and the measurements (M,) that may start a track.
         """
         pairs, rows, count = problem.pairs, problem.rows, problem.measurements
-        confirmed = self.register.status != Status.TENTATIVE
-        first = self.associate.decide(problem.only(confirmed[pairs.row]))
+        confirmed = self.register.status != TENTATIVE
+        first = self.trust.decide(self.associate, problem, confirmed)
         shared, hides = np.full(rows, -1), np.ones(count, bool)
         if self.sharing and blobs is not None:
             shared, hides = self.sharing.claim(self._boxes(), self.bank.hits, heaviest(first), confirmed, blobs)
             first = first.without(shared >= 0)
-        free = hides & ~claimed(first, count)
+        free = hides & ~claimed(first, count) & self.trust.sure(problem.scan)
         open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
-        second = self.associate.decide(problem.only(open_to_all))
-        free &= ~claimed(second, count)
+        decision = first
+        if open_to_all.any():
+            second = self.associate.decide(problem.only(open_to_all))
+            free &= ~claimed(second, count)
+            decision = first.joined(second)
         if not self.associate.gated_births:
             free[pairs.measurement] = False
-        return first.joined(second), shared, hides, free
+        return decision, shared, hides, distinct(problem.scan, free)
+
+    def _grown(self, forest: Forest, problem: Problem, events: list[Event]) -> tuple[Decision, Ints, Mask, Mask]:
+        """The same where decisions wait: rows become their successors; nothing leans on blobs."""
+        pairs, sure = problem.pairs, self.trust.sure(problem.scan)
+        confirmed = self.register.status != TENTATIVE
+        problem = problem.only(confirmed[pairs.row] | sure[pairs.measurement])
+        clutter = float(np.mean(self.clutter_density))
+        decision, born = forest.grow(problem, self.register, sure & self.births, clutter, events)
+        return decision, np.full(len(decision.parent), -1), sure, born
 
     def _update(
         self, decision: Decision, taken: Ints, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float
@@ -195,11 +229,14 @@ class Tracker:
         register = self.register
         self.bank.update(decision, scan, sensor)
         hit = decision.beta0 < 0.5
+        rows = np.flatnonzero(hit)
         register.history = (register.history << 1 | hit) & ((1 << 63) - 1)
-        register.updated_s[hit] = scan.t
+        register.updated_s[rows[self.trust.sure(scan)[taken[rows]]]] = scan.t
+        if scan.label is not None:
+            told = scan.label[taken[rows]]
+            register.label[rows] = np.where(told < 0, register.label[rows], told)
         if blobs is None or scan.box is None:
             return
-        rows = np.flatnonzero(hit)
         old, new = register.box[rows], scan.box[taken[rows]]
         follow = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / self.bank.hits[rows])
         follow[np.isnan(old[:, 0]) | self.border.cut(blobs[taken[rows]])] = 1.0
@@ -207,9 +244,17 @@ class Tracker:
         if self.model.per_size:
             self.bank.scale[rows] = longer(register.box[rows])
 
-    def _believe(self, problem: Problem, decision: Decision, shared: Ints) -> None:
+    def _why(self, problem: Problem, decision: Decision, taken: Ints) -> Choices:
+        """What was decided for each track that is believed."""
+        why = choices(self.register.id, problem.pairs, decision, taken)
+        if not self.forest:
+            return why
+        shown = self.forest.shown
+        return why.only(shown[shown < problem.rows])
+
+    def _believe(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints) -> None:
         """Existence probability: Bayes with the likelihood ratio of what each track got."""
-        log_ratio = evidence(problem, decision)
+        log_ratio = evidence(problem, decision, taken)
         log_ratio[shared >= 0] = 0.0
         log_odds = np.clip(logit(self.register.existence) + log_ratio, -BELIEF, BELIEF)
         self.register.existence = expit(log_odds)
@@ -222,31 +267,34 @@ class Tracker:
         going = self.border.leaving(self._boxes(), v) & (t - register.updated_s > EXIT_S)
         left = missed & (going | self.border.outside(self.bank.x[:, self.model.position]))
         hopeless = self.life.hopeless(register) & ~left
-        events.extend(_deaths(t, register.id[hopeless], "too many misses before confirmation"))
-        events.extend(_deaths(t, register.id[left], "left the picture"))
         kept = ~(hopeless | left)
         if not kept.all():
+            events.extend(_deaths(t, self._ends(~kept, hopeless), "too many misses before confirmation"))
+            events.extend(_deaths(t, self._ends(~kept, left), "left the picture"))
             self._keep(kept)
         return kept
 
     def _register(self, scan: Scan, sensor: Sensor, blobs: Floats | None, free: Mask, events: list[Event]) -> Ints:
         """Start tentative tracks from measurements that belong to nobody; returns their indices."""
-        if blobs is not None and self.sharing:
+        if blobs is not None and self.sharing and free.any():
             free[free] = ~self._pieces(blobs[free])
-        born = np.flatnonzero(free) if self.births else np.empty(0, np.int64)
+        born = np.flatnonzero(free & self.births)
+        if not len(born):
+            return born
         box = np.full((len(born), 4), np.nan) if scan.box is None else scan.box[born]
         scale = longer(box) if self.model.per_size and scan.box is not None else np.ones(len(born))
         position, cov = sensor.locate(scan.z[born], scan.R[born])
         self.bank.append(position, cov, scale)
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
-        ids = self.register.append(scan.t, position, box, BIRTH_EXISTENCE, run)
+        label = None if scan.label is None else scan.label[born]
+        ids = self.register.append(scan.t, position, box, BIRTH_EXISTENCE, run, label)
         for track, j in zip(ids, born, strict=True):
             events.append(Event(scan.t, int(track), "birth", f"measurement {j} belongs to no track"))
         return born
 
     def _pieces(self, blobs: Floats) -> Mask:
         """(M,) blobs that are pieces of a vehicle already tracked."""
-        tracked = self._boxes()[self.register.status != Status.TENTATIVE]
+        tracked = self._boxes()[self.register.status != TENTATIVE]
         vehicle, share = best_cover(blobs, widened(tracked, NEAR))
         piece = (vehicle >= 0) & (share >= FRAGMENT)
         piece[piece] = area(blobs[piece]) < SMALL * area(tracked[vehicle[piece]])
@@ -255,21 +303,31 @@ class Tracker:
     def _confirm(self, t: float, events: list[Event]) -> None:
         """Tentative tracks that earned it are confirmed; the others' status follows what was seen of them."""
         register = self.register
-        size = np.nan_to_num(longer(register.box))
+        size = np.fmax(longer(register.box), 0.0)  # none where there is no box
         ready = self.life.confirmed(register, t, self.bank.x[:, self.model.position], size)
-        register.status[ready] = Status.CONFIRMED
+        if self.forest:
+            ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)
+            register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
+        register.status[ready] = CONFIRMED
         reason = f"{self.life.confirm_hits} hits of {self.life.confirm_window}"
         events.extend(Event(t, int(track), "confirmed", reason) for track in register.id[ready])
-        known = register.status != Status.TENTATIVE
+        known = register.status != TENTATIVE
         seen = register.history & 1 == 1
-        register.status[known] = np.where(seen[known], Status.CONFIRMED, Status.COASTING)
-        register.status[register.group >= 0] = Status.MERGED
+        register.status[known] = np.where(seen[known], CONFIRMED, COASTING)
+        register.status[register.group >= 0] = MERGED
 
     def _boxes(self) -> Floats:
         """(T, 4) the tracks' boxes in the picture."""
         return absolute(self.register.box, self.bank.x[:, self.model.position])
 
+    def _ends(self, going: Mask, why: Mask | None = None) -> Ints:
+        """Ids of the tracks that lose their last row when `going` (T,) go, and one row of which goes by `why` (T,)."""
+        register = self.register
+        return np.setdiff1d(register.id[going if why is None else why], register.id[~going])
+
     def _keep(self, kept: Mask) -> None:
+        if self.forest:
+            self.forest.keep(kept)
         rows = np.flatnonzero(kept)
         self.bank.keep(rows)
         self.register.keep(rows)
@@ -285,7 +343,7 @@ class Tracker:
         why: Choices | None = None,
     ) -> Tracks:
         register = self.register
-        return Tracks(
+        tracks = Tracks(
             t=t,
             id=register.id.copy(),
             status=register.status.copy(),
@@ -305,6 +363,10 @@ class Tracker:
             events=events,
             choices=why,
         )
+        if not self.forest:
+            return tracks
+        shown = self.forest.shown
+        return tracks.only(shown[np.argsort(register.id[shown])])
 
 
 def claimed(decision: Decision, measurements: int) -> Mask:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from vidtrack.config import SourceSettings
+from vidtrack.config import DetectionSettings, Settings
 from vidtrack.errors import SourceError
 from vidtrack.formats import read_mot
 from vidtrack.scan import Floats, Scan
+from vidtrack.tracking.boxes import longer
+from vidtrack.video.habits import Habits, habits
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.span import Span
 from vidtrack.video.stats import SourceStats
 
-SIGMA_SHARE = 0.05  # standard deviation of a box centre over the box's width and height
-SIGMA_FLOOR_PX = 0.5
+JITTER = 0.05
+"""Object sizes; standard deviation of a box's centre where the file is too short to tell."""
+LEAST_SIGMA_PX = 0.5
 _LINES_LOOKED_AT = 20
 
 
@@ -29,7 +33,7 @@ def is_detections(path: str) -> bool:
         return any(_has_six_numbers(line) for _, line in zip(range(_LINES_LOOKED_AT), file, strict=False))
 
 
-def open_detections(path: str, settings: SourceSettings) -> Detections:
+def open_detections(path: str, settings: Settings) -> Detections:
     """Read a MOT file of detections. Raises SourceError if it cannot be read, FormatError naming a bad line."""
     return Detections(Path(path), settings)
 
@@ -38,13 +42,14 @@ class Detections:
     """Iterates over (index, time_s, Scan), one scan a frame, in order.
 
     name, width, height, fps, frames, stats   as for Source; without seqinfo.ini the size is what holds all boxes
+    settings   of detections, with what the file tells in place of None
 
-    z is the centre of a box, R the square of SIGMA_SHARE of its width and height (at least SIGMA_FLOOR_PX).
-    The score is the share of the file's detections that do not score higher: scales differ between
-    detectors, only the order counts. Frames without a line are empty scans, up to the sequence's length.
+    z is the centre of a box, R the square of its jitter (at least LEAST_SIGMA_PX). The score is the share
+    of the file's detections that do not score higher: scales differ between detectors, only the order
+    counts. Frames without a line are empty scans, up to the sequence's length.
     """
 
-    def __init__(self, path: Path, settings: SourceSettings) -> None:
+    def __init__(self, path: Path, settings: Settings) -> None:
         try:
             table = read_mot(path)
         except OSError as error:
@@ -57,11 +62,13 @@ class Detections:
         self.stats = SourceStats()
         info = read_sequence_info(path.parent)
         self.name = info.name or path.stem
-        self.fps = untimed_rate(info, settings, self.stats)
+        self.fps = untimed_rate(info, settings.source, self.stats)
+        told = habits(self._frame, self._box, self._score, self.fps, settings.tracker.hold_s)
+        self.settings = _told(settings.detections, told)
         right, bottom = np.ceil((self._box[:, :2] + self._box[:, 2:]).max(axis=0)).astype(int)
         self.width, self.height = info.width or int(right), info.height or int(bottom)
         length = max(info.length or 0, int(self._frame[-1]) + 1)
-        self._frames = Span.of(settings).frames(self.fps, length)
+        self._frames = Span.of(settings.source).frames(self.fps, length)
         self.frames = len(self._frames)
 
     def __iter__(self) -> Iterator[tuple[int, float, Scan]]:
@@ -69,15 +76,22 @@ class Detections:
             rows = slice(*np.searchsorted(self._frame, [index, index + 1]))
             time_s = index / self.fps
             self.stats.frames_read += 1
-            yield index, time_s, _scan(time_s, self._box[rows], self._score[rows])
+            yield index, time_s, _scan(time_s, self._box[rows], self._score[rows], self.settings.jitter or JITTER)
 
 
-def _scan(time_s: float, box: Floats, score: Floats) -> Scan:
+def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
+    """The settings, what they leave open taken from the file's habits."""
+    open_ones = {name: value for name, value in asdict(habits).items() if getattr(settings, name) is None}
+    return settings.model_copy(update=open_ones)
+
+
+def _scan(time_s: float, box: Floats, score: Floats, jitter: float) -> Scan:
     """Boxes (M, 4) as measurements of their centres."""
     size = box[:, 2:]
-    sigma = np.maximum(SIGMA_SHARE * size, SIGMA_FLOOR_PX)
+    sigma = np.maximum(jitter * longer(box), LEAST_SIGMA_PX)
     relative = np.hstack([-size / 2, size])
-    return Scan(time_s, box[:, :2] + size / 2, sigma[:, :, None] ** 2 * np.eye(2), box=relative, score=score)
+    R = sigma[:, None, None] ** 2 * np.eye(2)
+    return Scan(time_s, box[:, :2] + size / 2, R, box=relative, score=score)
 
 
 def _rank(score: Floats) -> Floats:

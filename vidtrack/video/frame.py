@@ -29,6 +29,13 @@ class Frame:
     v: Image | None = None
     full_range: bool = False
 
+    @classmethod
+    def blank(cls, shape: tuple[int, int], coloured: bool) -> Frame:
+        """A black frame of shape (H, W)."""
+        half = ((shape[0] + 1) // 2, (shape[1] + 1) // 2)
+        chroma = np.zeros(half, np.uint8) if coloured else None
+        return cls(0, 0.0, np.zeros(shape, np.uint8), chroma, chroma)
+
     @property
     def shape(self) -> tuple[int, int]:
         """(H, W)."""

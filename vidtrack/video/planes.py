@@ -21,16 +21,22 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
     chroma is thinned to half size by stride. Everything else (RGB, palettes, more than 8 bits, packed
     layouts) is converted: RGB to full-range BT.601, which `Frame.bgr` undoes; YUV keeps its range.
     """
+    picture = planar(picture)
     if _is_grey(picture):
-        if picture.format.name != "gray":
-            picture = picture.reformat(format="gray")
         return Frame(index, time_s, _plane(picture, 0), full_range=picture.color_range != _LIMITED)
-    if picture.format.name not in _YUV or any(plane.line_size < 0 for plane in picture.planes):
-        picture = _converted(picture)
     height, width = (picture.height + 1) // 2, (picture.width + 1) // 2
     u, v = (_thinned(_plane(picture, channel), height, width) for channel in (1, 2))
     full_range = picture.color_range == _FULL or picture.format.name.startswith("yuvj")
     return Frame(index, time_s, _plane(picture, 0), u, v, full_range)
+
+
+def planar(picture: av.VideoFrame) -> av.VideoFrame:
+    """The picture in planes of 8 bits: itself where it is so already, otherwise converted."""
+    if _is_grey(picture):
+        return picture if picture.format.name == "gray" else picture.reformat(format="gray")
+    if picture.format.name not in _YUV or any(plane.line_size < 0 for plane in picture.planes):
+        return _converted(picture)
+    return picture
 
 
 def _is_grey(picture: av.VideoFrame) -> bool:

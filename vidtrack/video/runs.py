@@ -7,6 +7,9 @@ import numpy as np
 
 from vidtrack.compiled import CACHE
 
+_HIGHS, _NONE = np.uint64(0x8080808080808080), np.uint64(0)  # the highest bit of each of eight bytes, or of none
+_BYTE, _LAST = np.uint64(8), np.uint64(56)  # bits up to the next byte, and up to the last one
+
 
 @numba.njit(cache=CACHE, nogil=True)
 def find_runs(mask, background):  # type: ignore[no-untyped-def]
@@ -15,66 +18,82 @@ def find_runs(mask, background):  # type: ignore[no-untyped-def]
     mask (h, w) uint8; each (N,) int32 in raster order, stop excluded.
     """
     h, w = mask.shape
-    pixels, words = mask.ravel(), eights(mask)
-    room = 1024
-    row, start, stop = np.empty(room, np.int32), np.empty(room, np.int32), np.empty(room, np.int32)
-    n = 0
-    for y in range(h):
-        if n + w // 2 + 1 > room:
-            room = 2 * room + w
-            row, start, stop = _grown(row, n, room), _grown(start, n, room), _grown(stop, n, room)
-        left, right = y * w, (y + 1) * w
-        x = next_zero(pixels, left, right) if background else next_nonzero(pixels, words, left, right)
-        while x < right:
-            row[n], start[n] = y, x - left
-            x = next_nonzero(pixels, words, x, right) if background else next_zero(pixels, x, right)
-            stop[n] = x - left
-            n += 1
-            x = next_zero(pixels, x, right) if background else next_nonzero(pixels, words, x, right)
+    most = h * (w // 2 + 1)
+    row, start, stop = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
+    pixels = mask.ravel()
+    words = pixels[: mask.size // 8 * 8].view(np.uint64)
+    outside = _HIGHS if background else _NONE
+    n = _find_runs(words, _rest(pixels, background), outside, w, row, start, stop)
     return row[:n], start[:n], stop[:n]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def eights(mask):  # type: ignore[no-untyped-def]
-    """The pixels of mask (h, w) uint8 as words of eight, without what is left over."""
-    return mask.ravel()[: mask.size // 8 * 8].view(np.uint64)
+def _find_runs(words, rest, outside, w, row, start, stop):  # type: ignore[no-untyped-def]
+    """Fill row, start, stop and return the number of runs.
 
-
-@numba.njit(cache=CACHE, nogil=True, inline="always")
-def next_nonzero(pixels, words, x, end):  # type: ignore[no-untyped-def]
-    """First place in x..end where pixels (N,) is not 0, end if none; `words` skips 64 or eight zeros at a time."""
-    while x < end and pixels[x] == 0:
-        x += 1
-        if x & 7 == 0:
-            k = x >> 3
-            while k << 3 < end and k + 8 <= len(words) and _none(words[k : k + 8]):
-                k += 8
-            while k << 3 < end and k < len(words) and words[k] == 0:
-                k += 1
-            x = k << 3
-    return min(x, end)
-
-
-@numba.njit(cache=CACHE, nogil=True, inline="always")
-def _none(eight):  # type: ignore[no-untyped-def]
-    """Whether these eight words are all 0."""
-    return eight[0] | eight[1] | eight[2] | eight[3] | eight[4] | eight[5] | eight[6] | eight[7] == 0
-
-
-@numba.njit(cache=CACHE, nogil=True, inline="always")
-def next_zero(pixels, x, end):  # type: ignore[no-untyped-def]
-    """First place in x..end where pixels (N,) is 0, end if none."""
-    while x < end and pixels[x] != 0:
-        x += 1
-    return x
+    words (N,) eight pixels each, and the rest of them; outside: the marks of eight pixels that are in no run.
+    """
+    n = y = left = k = 0
+    first = -1  # of the run that is open
+    before = _NONE  # mark of the pixel before the word
+    while k <= len(words):
+        if before == outside >> _LAST and k + 8 <= len(words) and _all_zero(words, k):
+            k += 8
+            continue
+        marks = _not_zero(words[k] if k < len(words) else rest) ^ outside
+        edges = marks ^ (marks << _BYTE | before)
+        before = marks >> _LAST
+        while edges != 0:
+            x = 8 * k + _lowest_byte(edges)
+            edges &= edges - np.uint64(1)
+            if first < 0:
+                first = x
+                continue
+            while first < x:  # a row's end ends a run
+                while first >= left + w:
+                    y, left = y + 1, left + w
+                end = min(x, left + w)
+                row[n], start[n], stop[n] = y, first - left, end - left
+                n += 1
+                first = end
+            first = -1
+        k += 1
+    return n
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _grown(values, used, room):  # type: ignore[no-untyped-def]
-    bigger = np.empty(room, values.dtype)
-    for i in range(used):
-        bigger[i] = values[i]
-    return bigger
+def _rest(pixels, filler):  # type: ignore[no-untyped-def]
+    """The last pixels, fewer than eight, as a word that is filled up."""
+    rest = np.full(8, filler, np.uint8)
+    for x in range(len(pixels) // 8 * 8, len(pixels)):
+        rest[x % 8] = pixels[x]
+    return rest.view(np.uint64)[0]
+
+
+@numba.njit(cache=CACHE, nogil=True, inline="always")
+def _not_zero(word):  # type: ignore[no-untyped-def]
+    """The highest bit of each byte that is not 0."""
+    return ((word & ~_HIGHS) + ~_HIGHS | word) & _HIGHS
+
+
+@numba.njit(cache=CACHE, nogil=True, inline="always")
+def _lowest_byte(word):  # type: ignore[no-untyped-def]
+    """Number of the lowest byte that is not 0, of a word that is not 0."""
+    number = 0
+    if word & np.uint64(0xFFFFFFFF) == 0:
+        number, word = 4, word >> np.uint64(32)
+    if word & np.uint64(0xFFFF) == 0:
+        number, word = number + 2, word >> np.uint64(16)
+    return number + 1 if word & np.uint64(0xFF) == 0 else number
+
+
+@numba.njit(cache=CACHE, nogil=True, inline="always")
+def _all_zero(words, k):  # type: ignore[no-untyped-def]
+    """Whether the eight words from k on are all 0."""
+    total = _NONE
+    for i in range(k, k + 8):
+        total |= words[i]
+    return total == 0
 
 
 @numba.njit(cache=CACHE, nogil=True)

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.random import Generator
 
 from vidtrack.associate.gate import Distance, Gate
-from vidtrack.associate.hard import GNN, NN
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.papers.p004.simulated import MEASUREMENT_SIGMA, Targets, drive, nearest_target, track
 from vidtrack.scan import Floats
+from vidtrack.tracking.methods import METHODS
 
-METHODS: dict[str, type[NN] | type[GNN]] = {"nn": NN, "gnn": GNN}
 DISTANCES: tuple[Distance, ...] = ("euclidean", "decoupled", "mahalanobis")
 GATE = 0.9999
 LOST = 15.0

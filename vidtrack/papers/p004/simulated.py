@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import Associator
 from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Floats, Ints, Scan, Tracks
+from vidtrack.tracking.forest import Deferred
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
 
@@ -56,7 +57,7 @@ def drive(
     return np.stack(path)
 
 
-def track(targets: Targets, model: ConstantVelocity, associate: Associator, gate: Gate) -> Floats:
+def track(targets: Targets, model: ConstantVelocity, associate: Associator | Deferred, gate: Gate) -> Floats:
     """Positions (K - 1, N, 2) of the tracks of all targets from frame 1 on, started there by two points.
 
     Row n starts on target n; nothing is born or deleted, so that every run ends with a track for each target.
@@ -68,8 +69,19 @@ def track(targets: Targets, model: ConstantVelocity, associate: Associator, gate
     path = [targets.z[1]]
     for k in range(2, len(targets.z)):
         seen = targets.seen[k]
-        path.append(tracker.step(Scan(float(k), targets.z[k, seen], R, run=targets.run[seen])).xy)
+        path.append(_placed(tracker.step(Scan(float(k), targets.z[k, seen], R, run=targets.run[seen])), len(x)))
     return np.stack(path)
+
+
+def _placed(tracks: Tracks, count: int) -> Floats:
+    """Positions (N, 2) of the first `count` tracks in order of id; infinite where a track has ended.
+
+    Branching ends a track when another has taken the same measurements.
+    """
+    xy = np.full((count, 2), np.inf)
+    first = tracks.id <= count
+    xy[tracks.id[first] - 1] = tracks.xy[first]
+    return xy
 
 
 def two_points(z0: Floats, z1: Floats) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Scene, absorb, adopt, learn, spare, start
+from vidtrack.video.background.scene import Scene, absorb, adopt, learn, nothing, spare, start
 from vidtrack.video.background.shadow import SHADOW, mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -25,18 +25,21 @@ _FIRST_S = 0.1  # plain averaging after a start
 _UNSURE_S = 10.0  # after a start ghosts are many: for so long
 _UNSURE_GHOST_S = 0.3  # they need only so much cover
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
+_GAP_S = 2.0  # a longer time between two frames went unseen: it is no cover, and what stands there now is unsure
 _KNOWN_S = np.float32(0.1)  # shorter than all of these, and not 0: that is for pixels that are seen free
 
 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
+    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames")
+
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
         self._view = view
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._scene: Scene | None = None
+        self._scene = nothing()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
 
@@ -44,10 +47,12 @@ class Disturbance:
         """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never taken for scene."""
         s = self._settings
         picture = smooth(self._view.reduce(frame))
-        if self._scene is None:
+        if not self._scene.luma.size:
             self._scene = self._start(picture, frame.time_s)
         scene = self._scene
         dt, self._time_s = frame.time_s - self._time_s, frame.time_s
+        if dt > _GAP_S:
+            self._start_s = frame.time_s
 
         if s.exposure:
             follow_gain(picture, scene, np.float32(self._view.black))
@@ -71,12 +76,12 @@ class Disturbance:
 
     def scene(self) -> Image:
         """(H, W, 3) the learnt scene in source size, blue-green-red."""
-        empty = np.empty((0, 0))
-        return self._view.enlarge(Picture(*self._scene[:3]) if self._scene else Picture(empty, empty, empty))
+        return self._view.enlarge(Picture(*self._scene[:3]))
 
     def _start(self, picture: Picture, time_s: float) -> Scene:
         self._time_s = self._start_s = time_s
         self._frames = 0
+        self._change.restart(time_s)
         return start(picture)
 
     @property
@@ -113,7 +118,8 @@ class Disturbance:
         weight = -math.expm1(-dt / s.learn_s)
         if self._time_s - self._start_s < _FIRST_S:
             weight = max(weight, 1 / self._frames)
-        learn(picture, scene, covered, np.float32(weight), np.float32(-math.expm1(-dt / s.noise_s)), np.float32(dt))
+        noise_weight, seen_s = -math.expm1(-dt / s.noise_s), min(dt, _GAP_S)
+        learn(picture, scene, covered, np.float32(weight), np.float32(noise_weight), np.float32(seen_s))
 
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
         """Take for scene what has stood for absorb_s, and lasting shadow."""

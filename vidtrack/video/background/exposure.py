@@ -11,6 +11,7 @@ _POINTS = 1500  # wanted on the grid
 _DARK, _BRIGHT = np.float32(24), np.float32(235)  # grey levels between which a ratio means something
 _CLIPPED = np.float32(250)
 _STEP = np.float32(0.02)  # a smaller change is left to learning
+_LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covered, or the picture is missing
 
 
 @numba.njit(cache=CACHE, nogil=True, error_model="numpy")
@@ -45,6 +46,17 @@ def gain(luma, scene, black):  # type: ignore[no-untyped-def]
             if scene.covered_s[y, x] == 0 and _DARK < B < _BRIGHT and luma[y, x] <= _CLIPPED:
                 ratio[n] = (np.float32(luma[y, x]) - black) / (B - black)
                 n += 1
-    if 10 * n < len(ratio):
+    if 10 * n < len(ratio) or _mostly_steady(ratio[:n]):
         return np.float32(1)
-    return np.float32(np.median(ratio[:n]))
+    g = np.float32(np.median(ratio[:n]))
+    return g if 1 / _LARGEST < g < _LARGEST else np.float32(1)
+
+
+@numba.njit(cache=CACHE, nogil=True)
+def _mostly_steady(ratio):  # type: ignore[no-untyped-def]
+    """Whether the median of ratio (N,) is so close to 1 that it needs no search."""
+    above = below = 0
+    for r in ratio:
+        above += r > np.float32(1) + _STEP
+        below += r < np.float32(1) - _STEP
+    return 2 * max(above, below) < len(ratio)

@@ -17,6 +17,8 @@ class Paper:
     A is the average of the frames before; the first frame is the first average and shows nothing.
     """
 
+    STATE = ("_view", "_average")
+
     def __init__(self, settings: PaperSettings, view: View) -> None:
         self._settings = settings
         self._view = view

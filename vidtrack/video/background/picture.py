@@ -36,6 +36,8 @@ class View:
     black  luminance of black
     """
 
+    STATE = ("_shape", "step", "black")
+
     def __init__(self, scale: float | None, keep: NDArray | None) -> None:
         """scale: processed over source size, None by the rows; keep (any size): no foreground where it is dark."""
         self._scale = scale

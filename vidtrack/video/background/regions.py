@@ -53,8 +53,10 @@ def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
     for k in range(len(row)):
         y, blob = row[k], label[k]
         area[blob] += stop[k] - start[k]
+        alike = 0
         for x in range(start[k], stop[k]):
-            returned[blob] += abs(np.float32(luma[y, x]) - scene.former[y, x]) < _ALIKE
+            alike += abs(np.float32(luma[y, x]) - scene.former[y, x]) < _ALIKE
+        returned[blob] += alike
         if y < _REACH or y >= h - _REACH:
             continue
         for x in range(max(start[k], _REACH), min(stop[k], w - _REACH)):

@@ -35,6 +35,11 @@ class Scene(NamedTuple):
     former: NDArray[np.float32]
 
 
+def nothing() -> Scene:
+    """The scene before the first frame."""
+    return Scene(*np.empty((6, 0, 0), np.float32))
+
+
 def start(picture: Picture) -> Scene:
     """The first frame is the scene: averaging for seconds would smear the traffic into it."""
     luma, cb, cr = (plane.astype(np.float32) for plane in picture)

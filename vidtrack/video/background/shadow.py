@@ -9,10 +9,10 @@ from vidtrack.compiled import CACHE
 from vidtrack.video.runs import find_runs
 
 SHADOW = 2  # value of a hit that is shadow
-_DARKEST, _LIGHTEST = np.float32(0.4), np.float32(0.97)  # share of the scene's light
-_CHROMA = np.float32(6)  # grey levels by which each chroma plane may miss the factor
+_DARKEST, _LIGHTEST = np.float32(0.5), np.float32(0.97)  # share of the scene's light
+_CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
 _TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light
-_REACH = 2  # px to either side over which luminance differences are taken
+_REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
 _NEUTRAL = np.float32(128)  # chroma of grey
 
 
@@ -20,7 +20,7 @@ _NEUTRAL = np.float32(128)  # chroma of grey
 def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's, times one factor r.
 
-    r = (Y - black) / (B - black); texture is the luminance differences over +-2 px, across and down.
+    r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
     """
     row, start, stop = find_runs(hit, False)
     coloured = len(picture.cb) > 0

@@ -1,0 +1,74 @@
+"""The k best assignments against enumeration."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidtrack.associate.kbest import k_best
+
+
+def enumerated(offset, held, start, column, cost, alone):
+    """Cost of every assignment of every problem, as {(problem, choices): cost}."""
+    rows, alternatives = alone.shape
+    found = {}
+    for h in range(len(offset)):
+        options = [
+            [k for k in range(start[i], start[i + 1]) if held[h, column[k]]] + [-1 - a for a in range(alternatives)]
+            for i in range(rows)
+        ]
+        for choice in product(*options):
+            columns = [column[k] for k in choice if k >= 0]
+            if len(set(columns)) == len(columns):
+                costs = [cost[k] if k >= 0 else alone[i, -1 - k] for i, k in enumerate(choice)]
+                found[h, choice] = offset[h] + sum(costs)
+    return found
+
+
+def random_problems(rng, problems, rows, columns, ties):
+    draw = (lambda *shape: rng.integers(0, 4, shape).astype(float)) if ties else (lambda *shape: rng.normal(size=shape))
+    allowed = rng.random((rows, columns)) < 0.7
+    row, column = np.nonzero(allowed)
+    start = np.searchsorted(row, np.arange(rows + 1))
+    return draw(problems), rng.random((problems, columns)) < 0.8, start, column, draw(len(row)), draw(rows, 2)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    problems=st.integers(1, 3),
+    rows=st.integers(0, 4),
+    columns=st.integers(0, 4),
+    most=st.sampled_from([1, 5, 10_000]),
+    ties=st.booleans(),
+)
+@settings(max_examples=200, deadline=None)
+def test_best_assignments_are_those_of_an_enumeration(seed, problems, rows, columns, most, ties):
+    given_problems = random_problems(np.random.default_rng(seed), problems, rows, columns, ties)
+    every = enumerated(*given_problems)
+    problem, choice, cost = k_best(*given_problems, most, np.inf)
+    expected = np.sort(list(every.values()))[:most]
+    np.testing.assert_allclose(cost, expected, rtol=1e-12, atol=1e-12)
+    ours = {(h, tuple(c)): w for h, c, w in zip(problem.tolist(), choice.tolist(), cost, strict=True)}
+    assert len(ours) == len(cost), "an assignment came twice"
+    for key, value in ours.items():
+        assert every[key] == pytest.approx(value, abs=1e-12)
+
+
+def test_what_costs_much_more_than_the_best_is_left_out():
+    given_problems = random_problems(np.random.default_rng(5), 3, 4, 4, False)
+    every = np.sort(list(enumerated(*given_problems).values()))
+    cost = k_best(*given_problems, 10_000, 1.5)[2]
+    np.testing.assert_allclose(cost, every[every <= every[0] + 1.5])
+
+
+def test_impossible_choices_are_never_made():
+    """A column that nobody holds is nobody's, whatever it offers."""
+    problem, choice, cost = k_best(
+        np.zeros(1), np.array([[False]]), np.array([0, 1]), np.array([0]), np.array([-50.0]), np.array([[1.0, 2.0]]),
+        10, np.inf,
+    )  # fmt: skip
+    np.testing.assert_array_equal(choice, [[-1], [-2]])
+    np.testing.assert_allclose(cost, [1.0, 2.0])
+    np.testing.assert_array_equal(problem, [0, 0])

@@ -1,0 +1,192 @@
+"""Plot tables: what is read, and what is refused."""
+
+import logging
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from plot_files import GOOD, HEADER, write
+
+from vidtrack.config import RadarSettings
+from vidtrack.errors import FormatError, PlotFormatError, SourceError
+from vidtrack.radar.plots import read_plots
+
+SKIP = RadarSettings(skip_bad_rows=True)
+
+
+def test_range_and_azimuth_in_metres_and_radians(tmp_path):
+    plots = read_plots(write(tmp_path / "p.csv", *GOOD))
+    assert plots.polar
+    assert (plots.dim, plots.doppler, plots.amplitude) == (2, False, None)
+    assert plots.scan.tolist() == [0, 1, 2]
+    assert plots.z[:, 0].tolist() == [1000, 1010, 1020]
+    assert plots.z[:, 1] == pytest.approx(np.radians([10, -10, -20]))
+    assert plots.sigma == pytest.approx(np.tile([5, np.radians(0.1)], (3, 1)))
+
+
+def test_every_optional_column(tmp_path):
+    header = "scan,time_s,range_m,azimuth_deg,elevation_deg,doppler_m_s,amplitude,sigma_doppler_m_s,note"
+    plots = read_plots(write(tmp_path / "p.csv", "3,1.5,100,0,30,-20,4.5,0.5,7", header=header))
+    assert (plots.dim, plots.doppler) == (3, True)
+    assert plots.z == pytest.approx(np.array([[100, 0, np.radians(30), -20]]))
+    assert plots.sigma[0, 3] == 0.5
+    assert plots.amplitude.tolist() == [4.5]
+
+
+def test_positions_instead_of_ranges(tmp_path):
+    plots = read_plots(write(tmp_path / "p.csv", "0,0,1,2,3", header="scan,time_s,x_m,y_m,z_m"))
+    assert not plots.polar
+    assert plots.z.tolist() == [[1, 2, 3]]
+
+
+def test_parquet_gives_the_same_as_csv(tmp_path):
+    columns = dict(zip(HEADER.split(","), np.array([row.split(",") for row in GOOD], float).T, strict=True))
+    columns["scan"] = columns["scan"].astype(int)
+    pq.write_table(pa.table(columns), tmp_path / "plots.table")
+    found, expected = read_plots(tmp_path / "plots.table"), read_plots(write(tmp_path / "p.csv", *GOOD))
+    assert np.array_equal(found.z, expected.z)
+    assert np.array_equal(found.scan, expected.scan)
+
+
+def test_missing_sigmas_come_from_the_settings(tmp_path, caplog):
+    path = write(tmp_path / "p.csv", "0,0,100,0", header="scan,time_s,range_m,azimuth_deg")
+    plots = read_plots(path, RadarSettings(sigma_range_m=7.0))
+    assert plots.sigma[0] == pytest.approx([7, np.radians(0.3)])
+    assert "sigma_azimuth_deg" in caplog.text  # assumed, not given
+    assert "sigma_range_m" not in caplog.text
+
+
+def test_rows_in_any_order_are_sorted(tmp_path):
+    plots = read_plots(write(tmp_path / "p.csv", GOOD[2], GOOD[0], GOOD[1]))
+    assert plots.scan.tolist() == [0, 1, 2]
+    assert plots.time_s.tolist() == [0, 1, 2]
+
+
+def test_spaces_after_commas_do_no_harm(tmp_path):
+    path = write(tmp_path / "p.csv", "0, 0, 100, 5", header="scan, time_s, range_m, azimuth_deg")
+    assert read_plots(path).z[0, 0] == 100
+
+
+@pytest.mark.parametrize(
+    ("header", "named"),
+    [
+        ("scan,time_s,range,azimuth_deg", ["'range_m'", "'range'"]),
+        ("scan,time_s,range_km,azimuth_deg", ["'range_m'", "'range_km'"]),
+        ("scan,time,range_m,azimuth_deg", ["'time_s'", "'time'"]),
+        ("skan,time_s,range_m,azimuth_deg", ["'scan'", "'skan'"]),
+        ("scan,time_s,x_m,ym", ["'y_m'", "'ym'"]),
+        ("scan,time_s,a,b", ["range_m", "azimuth_deg", "x_m", "y_m"]),
+    ],
+)
+def test_a_missing_column_is_named_with_the_nearest(tmp_path, header, named):
+    path = write(tmp_path / "p.csv", "0,0,1,1", header=header)
+    with pytest.raises(PlotFormatError) as caught:
+        read_plots(path)
+    assert all(name in str(caught.value) for name in named)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("Elevation", "elevation_deg"), ("amplitud", "amplitude"), ("sigma_rang_m", "sigma_range_m")],
+)
+def test_an_optional_column_that_is_misspelt_is_not_ignored_in_silence(tmp_path, caplog, given, meant):
+    path = write(tmp_path / "p.csv", "0,0,1,1,5", header=f"scan,time_s,range_m,azimuth_deg,{given}")
+    with caplog.at_level(logging.WARNING):
+        assert read_plots(path).dim == 2
+    assert f"column {given!r} is not used; is it {meant!r}?" in caplog.text
+
+
+def test_other_columns_are_ignored(tmp_path, caplog):
+    path = write(tmp_path / "p.csv", "0,0,1,1,5,a", header="scan,time_s,x_m,y_m,sigma_total,beam")
+    assert len(read_plots(path, RadarSettings(sigma_position_m=5.0))) == 1
+    assert not caplog.text
+
+
+BAD = [
+    ("3,3.0,nan,10,5,0.1", "range_m"),
+    ("3,3.0,,10,5,0.1", "range_m"),
+    ("3,3.0,far,10,5,0.1", "'far'"),
+    ("3,3.0,1000,inf,5,0.1", "azimuth_deg"),
+    ("3,3.0,2000000,10,5,0.1", "wrong units suspected"),
+    ("3,3.0,-5,10,5,0.1", "range_m is -5"),
+    ("3,3.0,1000,361,5,0.1", "azimuth_deg is 361"),
+    ("3,3.0,1000,-360.5,5,0.1", "azimuth_deg"),
+    ("3,3.0,1000,10,-5,0.1", "sigma_range_m is -5"),
+    ("3,3.0,1000,10,0,0.1", "sigma_range_m is 0"),
+    ("3,3.0,1000,10,5,90", "sigma_azimuth_deg"),
+    ("3.5,3.0,1000,10,5,0.1", "scan is 3.5"),
+    ("-1,3.0,1000,10,5,0.1", "scan is -1"),
+    ("3,soon,1000,10,5,0.1", "'soon'"),
+    ("3,3.0,1000,10,5", "5 cells"),
+    ("3,3.0,1000,10,5,0.1,7", "7 cells"),
+    ("1,1.0,1010,350,5,0.1", "the plot of line 3 again"),
+    ("3,0.5,1000,10,5,0.1", "scan 3"),
+    ("999999999,4.0,1000,10,5,0.1", "a gap"),
+]
+
+
+@pytest.mark.parametrize(("row", "named"), BAD)
+def test_a_bad_row_is_named_by_line_value_and_rule(tmp_path, row, named):
+    path = write(tmp_path / "p.csv", *GOOD, row)
+    with pytest.raises(PlotFormatError) as caught:
+        read_plots(path)
+    assert isinstance(caught.value, FormatError)
+    assert "line 5" in str(caught.value)
+    assert named in str(caught.value)
+    assert "--skip-bad-rows" in str(caught.value)
+
+
+@pytest.mark.parametrize(("row", "named"), BAD)
+def test_good_rows_are_not_lost_when_bad_ones_are_skipped(tmp_path, caplog, row, named):
+    plots = read_plots(write(tmp_path / "p.csv", GOOD[0], *GOOD[1:], row), SKIP)
+    assert plots.scan.tolist() == [0, 1, 2]
+    assert plots.bad_rows == 1
+    assert named in caplog.text
+
+
+def test_many_bad_rows_are_counted_and_the_first_are_shown(tmp_path):
+    path = write(tmp_path / "p.csv", *[f"{k},{k},-1,0,5,0.1" for k in range(9)])
+    with pytest.raises(PlotFormatError, match=r"9 bad rows: line 2: .* line 6: .*and 4 more"):
+        read_plots(path)
+
+
+def test_a_row_before_an_uneven_one_and_after_it_keep_their_lines(tmp_path):
+    path = write(tmp_path / "p.csv", GOOD[0], "1,2", GOOD[1], "2,2.0,-1,0,5,0.1")
+    with pytest.raises(PlotFormatError, match=r"line 3: 2 cells.*line 5: range_m is -1"):
+        read_plots(path)
+
+
+@pytest.mark.parametrize("settings", [RadarSettings(), SKIP])
+def test_a_file_of_bad_rows_only_is_refused(tmp_path, settings):
+    with pytest.raises(PlotFormatError, match="range_m"):
+        read_plots(write(tmp_path / "p.csv", "0,0,-1,0,5,0.1"), settings)
+
+
+@pytest.mark.parametrize("text", ["", "\n\n", HEADER, HEADER + "\n", "\x00\x01\x02", "no table at all"])
+def test_a_file_without_plots_is_refused(tmp_path, text):
+    path = tmp_path / "p.csv"
+    path.write_text(text)
+    with pytest.raises(PlotFormatError, match=r"p\.csv"):
+        read_plots(path)
+
+
+def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
+    for content in (bytes(range(256)), b"PAR1 but no more"):
+        path = tmp_path / "p.parquet"
+        path.write_bytes(content)
+        with pytest.raises(PlotFormatError):
+            read_plots(path)
+
+
+def test_a_missing_file_is_an_input_error(tmp_path):
+    with pytest.raises(SourceError, match=r"none\.csv"):
+        read_plots(tmp_path / "none.csv")
+    with pytest.raises(SourceError):
+        read_plots(tmp_path)
+
+
+def test_two_columns_of_one_name_are_refused(tmp_path):
+    path = write(tmp_path / "p.csv", "0,0,1,1,2", header="scan,time_s,range_m,azimuth_deg,range_m")
+    with pytest.raises(PlotFormatError, match="two columns 'range_m'"):
+        read_plots(path)

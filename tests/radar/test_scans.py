@@ -1,0 +1,69 @@
+"""Plots as scans for the tracker."""
+
+import numpy as np
+import pytest
+from plot_files import HEADER, write
+
+from vidtrack.config import RadarSettings
+from vidtrack.estimate.sensor import POSITION
+from vidtrack.radar.plots import read_plots
+from vidtrack.radar.scans import clutter_density, measurements
+from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
+
+
+def read(path, *rows, header=HEADER, **settings):
+    settings = RadarSettings(**settings)
+    return measurements(read_plots(write(path / "p.csv", *rows, header=header), settings), settings)
+
+
+def test_skipped_scan_numbers_are_empty_scans_at_times_between(tmp_path):
+    found = read(tmp_path, "4,10,1000,0,5,0.1", "7,16,1000,1,5,0.1", "7,16,1000,9,5,0.1", "8,17,1000,2,5,0.1")
+    scans = list(found)
+    assert [number for number, _ in scans] == [4, 5, 6, 7, 8]
+    assert [scan.t for _, scan in scans] == pytest.approx([10, 12, 14, 16, 17])
+    assert [len(scan) for _, scan in scans] == [1, 0, 0, 2, 1]
+    assert found.count == 5
+    assert all(scan.noise.shape == (2, 2) for _, scan in scans)
+
+
+def test_the_time_of_a_scan_is_the_mean_of_its_plots(tmp_path):
+    found = read(tmp_path, "0,1,1000,0,5,0.1", "0,3,1000,90,5,0.1", "1,5,1000,0,5,0.1", "1,7,1000,90,5,0.1")
+    assert [scan.t for _, scan in found] == [2, 6]
+
+
+def test_linear_estimators_get_positions_as_seen_from_the_radar(tmp_path):
+    found = read(tmp_path, "0,0,1000,90,5,0.1", position=(100.0, 200.0, 0.0))
+    assert found.sensor is POSITION
+    assert found.z[0] == pytest.approx([1100, 200], abs=0.01)
+    assert found.R[0, 0, 0] == pytest.approx(25, rel=1e-3)
+    assert found.R[0, 1, 1] == pytest.approx((1000 * np.radians(0.1)) ** 2, rel=1e-3)
+
+
+def test_the_extended_filter_gets_range_and_azimuth(tmp_path):
+    found = read(tmp_path, "0,0,1000,270,5,0.1", estimator="ekf", position=(1.0, 2.0, 3.0))
+    assert found.sensor == RangeAzimuth((1.0, 2.0))
+    assert found.z[0] == pytest.approx([1000, -np.pi / 2])
+
+
+@pytest.mark.parametrize(
+    ("estimator", "kind", "size"), [("kalman", PositionRangeRate, 4), ("ekf", RangeAzimuthElevation, 4)]
+)
+def test_a_range_rate_stays_one(tmp_path, estimator, kind, size):
+    header = "scan,time_s,range_m,azimuth_deg,elevation_deg,doppler_m_s"
+    found = read(tmp_path, "0,0,1000,0,0,-30", header=header, estimator=estimator, position=(0.0, 0.0, 5.0))
+    assert isinstance(found.sensor, kind)
+    assert found.sensor.origin == (0, 0, 5)
+    assert found.z.shape == (1, size)
+    assert found.z[0, -1] == -30
+
+
+def test_the_clutter_density_is_plots_per_scan_and_area(tmp_path):
+    rng = np.random.default_rng(1)
+    rows = [f"{k},{k},{x},{y}" for k in range(50) for x, y in rng.uniform(0, 1000, (20, 2))]
+    found = read(tmp_path, *rows, header="scan,time_s,x_m,y_m")
+    assert clutter_density(found) == pytest.approx(20e-6, rel=0.01)
+
+
+def test_plots_in_a_row_still_have_a_density(tmp_path):
+    found = read(tmp_path, "0,0,0,5", "1,1,100,5", header="scan,time_s,x_m,y_m", sigma_position_m=10.0)
+    assert clutter_density(found) == pytest.approx(1 / (100 * 10 * np.sqrt(12)))

@@ -1,0 +1,71 @@
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from vidtrack.cli.threshold import command
+from vidtrack.errors import ConfigError
+
+
+def run(*arguments):
+    outcome = CliRunner().invoke(command, [str(argument) for argument in arguments], catch_exceptions=False)
+    assert outcome.exit_code == 0, outcome.output
+    return outcome.stdout
+
+
+def numbers(*arguments):
+    return json.loads(run(*arguments, "--json", "-"))
+
+
+def test_json_has_the_closed_form_and_the_exact_optimum():
+    found = numbers("--snr-db", 10, "--cells", 1000)
+    assert list(found) == ["p_fa", "p_fa_exact", "p_d", "q2", "clamped"]
+    assert found["p_fa"] == pytest.approx(8.399434016146147e-05, rel=1e-9)
+    assert found["p_fa_exact"] == pytest.approx(6.22496282692639e-05, rel=1e-6)
+    assert found["p_d"] == pytest.approx(0.42606638834271526, rel=1e-9)
+    assert found["q2"] == pytest.approx(0.3548089069026351, rel=1e-9)
+    assert found["clamped"] is False
+
+
+@pytest.mark.parametrize("db", [-300, -10, 0, 1.9])
+def test_below_the_validity_of_the_closed_form_it_is_clamped(db):
+    found = numbers("--snr-db", db, "--cells", 100, "--pfa-max", 0.5)
+    assert (found["p_fa"], found["clamped"]) == (0.5, True)
+    assert 0 < found["p_fa_exact"] <= 0.5
+    assert 0 <= found["q2"] <= found["p_d"] <= 1
+
+
+def test_strongest_neighbour_prefers_the_lowest_threshold_and_says_what_is_enough():
+    found = numbers("--filter", "psn", "--snr-db", 16, "--pfa-max", 0.1)
+    assert (found["p_fa"], found["clamped"]) == (0.1, True)
+    assert found["error"] == pytest.approx(1.41732803, rel=1e-6)
+    assert found["p_fa_one_percent"] < 1e-3
+
+
+def test_a_prediction_without_end_is_null():
+    found = numbers("--filter", "psn", "--snr-db", 16, "--weibull", "1,1")
+    assert found["error"] is None
+
+
+def test_table_and_file(tmp_path):
+    table = run("--snr-db", 10, "--cells", 100, "--json", tmp_path / "t.json")
+    assert f"{json.loads((tmp_path / 't.json').read_text())['p_fa']:.6g}" in table
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--snr-db", "nan", "--cells", 10), "--snr-db is nan"),
+        (("--snr-db", 10), "--cells is None"),
+        (("--snr-db", 10, "--cells", 0), "--cells is 0"),
+        (("--snr-db", 10, "--cells", 10, "--pfa-max", 2), "--pfa-max is 2"),
+        (("--snr-db", 10, "--cells", 10, "--gate", 3), "gate of 4"),
+        (("--snr-db", 10, "--filter", "psn", "--weibull", "1"), "B,C"),
+        (("--snr-db", 10, "--filter", "psn", "--weibull", "-1,2"), "shape is -1"),
+        (("--snr-db", 10, "--filter", "psn", "--cell", -1), "cell volume is -1"),
+    ],
+)
+def test_wrong_values_are_refused_in_one_line(arguments, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        run(*arguments)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,116 @@
+"""A saved pipeline goes on as if it had not stopped."""
+
+import numpy as np
+import pytest
+from command_line import SAMPLES
+
+from vidtrack.config import Settings, load
+from vidtrack.errors import ConfigError, FormatError
+from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.state import gather, read_state, restore, write_state
+from vidtrack.video.source import open_source
+
+HALF_S = 4.0
+
+
+class Pipeline:
+    STATE = ("detector", "tracker")
+
+    def __init__(self, settings):
+        self.settings = settings
+        self.detector = build_detector(settings)
+        self.tracker = build_tracker(settings.tracker, (320, 240))
+
+    def steps(self, frames):
+        return list(video_steps(frames, self.detector, self.tracker, self.settings))
+
+
+@pytest.fixture(scope="module")
+def frames():
+    with open_source(str(SAMPLES / "crossing.avi"), Settings().source) as source:
+        return list(source)
+
+
+def halves(frames):
+    return [f for f in frames if f.time_s < HALF_S], [f for f in frames if f.time_s >= HALF_S]
+
+
+@pytest.mark.parametrize("kind", ["disturbance", "paper"])
+def test_it_goes_on_bit_by_bit(tmp_path, frames, kind):
+    settings = load(assignments=[f"detector.kind={kind}"])
+    first, second = halves(frames)
+    stopped, resumed = Pipeline(settings), Pipeline(settings)
+    stopped.steps(first)
+    write_state(tmp_path / "state", gather(stopped))
+    expected = stopped.steps(second)
+    restore(resumed, read_state(tmp_path / "state"))
+    for a, b in zip(expected, resumed.steps(second), strict=True):
+        assert np.array_equal(a.tracks.x, b.tracks.x)
+        assert np.array_equal(a.tracks.P, b.tracks.P)
+        assert np.array_equal(a.tracks.id, b.tracks.id)
+        assert np.array_equal(a.foreground.mask, b.foreground.mask)
+    assert max(len(step.tracks) for step in expected) > 1
+
+
+def test_what_is_gathered_is_a_copy(frames):
+    first, second = halves(frames)
+    pipeline = Pipeline(Settings())
+    pipeline.steps(first)
+    state = gather(pipeline)
+    before = {name: value.copy() for name, value in state.items() if isinstance(value, np.ndarray)}
+    pipeline.steps(second)
+    assert all(np.array_equal(state[name], value, equal_nan=True) for name, value in before.items())
+
+
+def test_a_state_before_the_first_frame_is_one_too(tmp_path, frames):
+    write_state(tmp_path / "state", gather(Pipeline(Settings())))
+    resumed = Pipeline(Settings())
+    restore(resumed, read_state(tmp_path / "state"))
+    assert len(resumed.steps(frames[:5])) == 5
+
+
+def test_other_settings_do_not_fit(frames):
+    paper, ours = Pipeline(load(assignments=["detector.kind=paper"])), Pipeline(Settings())
+    for pipeline in (paper, ours):
+        pipeline.steps(frames[:3])
+    with pytest.raises(FormatError, match="other settings"):
+        restore(ours, gather(paper))
+
+
+def test_arrays_of_another_kind_do_not_reach_compiled_code(frames):
+    pipeline = Pipeline(Settings())
+    pipeline.steps(frames[:20])
+    for wrong in (np.zeros((2, 6)), np.zeros((2, 4), np.float32), np.zeros(4), None):
+        with pytest.raises(FormatError, match=r"tracker\.bank\.x"):
+            restore(Pipeline(Settings()), gather(pipeline) | {"tracker.bank.x": wrong})
+
+
+def test_what_cannot_be_saved_says_so():
+    with pytest.raises(ConfigError, match="OpenCV"):
+        gather(Pipeline(load(assignments=["detector.kind=mog2"])))
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 half a file", b"{}"])
+def test_a_damaged_file_says_so(tmp_path, content):
+    (tmp_path / "state").write_bytes(content)
+    with pytest.raises(FormatError, match="state"):
+        read_state(tmp_path / "state")
+
+
+def test_no_file_is_unpickled(tmp_path):
+    np.savez(tmp_path / "state.npz", plain=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(FormatError):
+        read_state(tmp_path / "state.npz")
+
+
+def test_a_failed_write_leaves_the_old_state(tmp_path, monkeypatch):
+    path = tmp_path / "state"
+    write_state(path, {"a": 1})
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_state(path, {"a": 2})
+    assert read_state(path) == {"a": 1}

@@ -1,0 +1,275 @@
+"""Multiple hypotheses: Reid's probabilities, the decisions that wait, and the bounds that hold."""
+
+from itertools import product
+from math import exp, log, pi
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import vidtrack as vt
+from vidtrack.tracking.hypotheses import Hypotheses, kept
+
+UNPRUNED = {"n_scan": 20, "hypotheses": 100_000, "threshold": 0.0, "mass": 1.0, "branches": 1000}
+ETERNAL = vt.LifeCycle(confirm_hits=1, confirm_window=63, coast_scans=62)
+
+
+def reid_tracker(**model):
+    """The tracker of the reference's examples: one dimension, everything gated, nothing pruned."""
+    return vt.Tracker(
+        vt.ConstantVelocity(dim=1, **model),
+        vt.MHT(new_density=0.01, **UNPRUNED),
+        gate=1.0,
+        life=ETERNAL,
+        detection_probability=0.9,
+        clutter_density=0.05,
+    )
+
+
+def scan(t, *z):
+    return vt.Scan(t, np.reshape(z, (-1, 1)).astype(float), np.eye(1))
+
+
+def probabilities(tracker):
+    """Of all hypotheses over all clusters, falling."""
+    found = tracker.forest.hypotheses
+    clusters = [np.exp(found.log_p[a:b]) for a, b in zip(found.first[:-1], found.first[1:], strict=True)]
+    return np.sort([np.prod(p) for p in product(*clusters)])[::-1]
+
+
+def test_one_track_and_two_measurements():
+    tracker = reid_tracker(accel=1.0, speed=1.0)
+    tracker.add(0.0, np.zeros((1, 2)), np.eye(2)[None])
+    tracker.step(scan(0.0, 0.5, 3.0))
+    expected = [
+        0.015360275585411013, 0.0030720551170822018, 0.08220609080674136, 0.0030720551170822018,
+        0.0006144110234164404, 0.016441218161348276, 0.7326949118240987, 0.14653898236481974,
+    ]  # fmt: skip
+    np.testing.assert_allclose(probabilities(tracker), np.sort(expected)[::-1], rtol=1e-9)
+
+
+def test_two_scans_with_one_measurement_each():
+    tracker = reid_tracker(accel=2**0.5, speed=1e-9)  # P(2|1) = R + 0.5
+    tracker.step(scan(0.0, 0.0))
+    tracker.step(scan(1.0, 1.2))
+    expected = [
+        0.5249263292146156,
+        0.3574901730413107,
+        0.10498526584292309,
+        0.010498526584292308,
+        0.0020997053168584612,
+    ]
+    np.testing.assert_allclose(probabilities(tracker), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("tracks", "measurements", "count"),
+    [(0, 2, 4), (0, 3, 8), (1, 1, 3), (1, 2, 8), (1, 3, 20), (2, 1, 4), (2, 2, 14), (2, 3, 44), (3, 3, 86)],
+)
+def test_number_of_hypotheses(tracks, measurements, count):
+    tracker = reid_tracker(accel=1.0, speed=1.0)
+    tracker.add(0.0, np.arange(2.0 * tracks).reshape(tracks, 2), np.tile(np.eye(2), (tracks, 1, 1)))
+    tracker.step(scan(0.0, *(0.3 * np.arange(measurements))))
+    assert len(probabilities(tracker)) == count
+
+
+def reid(scans, detection, clutter, new, accel, speed):
+    """Every hypothesis of a few scans in one dimension by plain recursion: a list of probabilities."""
+    hypotheses = [(0.0, ())]  # ln weight, ((x, P), ...)
+    F, q = np.array([[1.0, 1.0], [0.0, 1.0]]), accel**2 * np.array([[0.25, 0.5], [0.5, 1.0]])
+    for k, z in enumerate(scans):
+        children = []
+        for weight, tracks in hypotheses:
+            ahead = [(F @ x, F @ P @ F.T + q) for x, P in tracks] if k else []
+            for choice in product(["false", "new", *range(len(ahead))], repeat=len(z)):
+                taken = [c for c in choice if isinstance(c, int)]
+                if len(set(taken)) < len(taken):
+                    continue
+                w = weight + (len(ahead) - len(taken)) * log(1 - detection) + len(taken) * log(detection)
+                after = list(ahead)
+                for c, value in zip(choice, z, strict=True):
+                    if c == "false":
+                        w += log(clutter)
+                    elif c == "new":
+                        w += log(new)
+                        after.append((np.array([value, 0.0]), np.diag([1.0, speed**2])))
+                    else:
+                        x, P = ahead[c]
+                        S, v = P[0, 0] + 1.0, value - x[0]
+                        w += -0.5 * (v * v / S + log(2 * pi * S))
+                        K = P[:, 0] / S
+                        after[c] = (x + K * v, P - np.outer(K, P[0]))
+                children.append((w, tuple(after)))
+        hypotheses = children
+    weights = np.array([w for w, _ in hypotheses])
+    p = np.exp(weights - weights.max())
+    return np.sort(p / p.sum())[::-1]
+
+
+@given(seed=st.integers(0, 2**32 - 1), counts=st.sampled_from([(1, 1, 1), (2, 1), (1, 2), (2, 0, 2), (1, 0, 1, 1)]))
+@settings(max_examples=25, deadline=None)
+def test_all_hypotheses_of_several_scans_are_those_of_an_enumeration(seed, counts):
+    rng = np.random.default_rng(seed)
+    scans = [rng.uniform(-4, 4, n) for n in counts]
+    tracker = reid_tracker(accel=1.5, speed=2.0)
+    for k, z in enumerate(scans):
+        tracker.step(scan(float(k), *z))
+    expected = reid(scans, 0.9, 0.05, 0.01, 1.5, 2.0)
+    found = probabilities(tracker)
+    assert len(found) == len(expected)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rule", "left"),
+    [
+        ({"threshold": 0.06}, 4),
+        ({"most": 3}, 3),
+        ({"mass": 0.85}, 4),
+        ({"mass": 0.80}, 3),
+        ({"most": 1}, 1),
+        ({"threshold": 0.99}, 1),
+    ],
+)
+def test_pruning_rules(rule, left):
+    log_p = np.log([0.4, 0.25, 0.15, 0.1, 0.05, 0.03, 0.02])
+    rule = {"threshold": 0.0, "most": 100, "mass": 1.0} | rule
+    assert kept(log_p, rule["threshold"], rule["most"], rule["mass"]) == left
+
+
+def test_what_is_left_after_pruning_sums_to_one():
+    p = np.array([0.4, 0.25, 0.15, 0.1, 0.05, 0.03, 0.02])
+    every = Hypotheses(np.array([0, 7]), np.log(p), np.arange(8), np.arange(7))
+    left = every.only(np.arange(7) < 3)
+    np.testing.assert_allclose(np.exp(left.log_p), [0.5, 0.3125, 0.1875])
+    np.testing.assert_array_equal(left.leaf, [0, 1, 2])
+
+
+def test_clusters_come_together_over_a_measurement_and_part_again():
+    """Two hypotheses here, two there: four together, and taken apart again what they were."""
+    p, q = np.array([0.7, 0.3]), np.array([0.9, 0.1])
+    two = Hypotheses(np.array([0, 2, 4]), np.log([*p, *q]), np.array([0, 1, 2, 3, 4]), np.array([0, 1, 2, 3]))
+    one = two.merged(np.zeros(2, np.int64), 1, 100, np.inf)
+    np.testing.assert_allclose(np.exp(one.log_p), np.sort(np.outer(p, q).ravel())[::-1])
+    apart = one.marginal(np.array([0, 0, 2, 2]))
+    found = dict(zip(apart.leaf.tolist(), np.exp(apart.log_p), strict=True))
+    assert found == pytest.approx({0: 0.7, 1: 0.3, 2: 0.9, 3: 0.1})
+    best = two.merged(np.zeros(2, np.int64), 1, 2, np.inf)
+    np.testing.assert_allclose(np.exp(best.log_p), np.array([0.63, 0.27]) / 0.9)
+
+
+def crossing(rng, merged):
+    """Two targets through one point; for a while only one measurement half-way between them."""
+    for k in range(40):
+        x = 2.0 * (k - 20)
+        z = np.array([[x, x], [x, -x]]) + 0.7 * rng.normal(size=(2, 2))
+        yield k, z.mean(axis=0, keepdims=True) if k in merged else z
+
+
+def test_ids_do_not_flicker_when_the_likeliest_hypothesis_changes():
+    rng = np.random.default_rng(3)
+    tracker = vt.Tracker(vt.ConstantVelocity(accel=0.3, speed=4.0), vt.MHT(), clutter_density=1e-4)
+    shown, hidden = set(), set()
+    for k, z in crossing(rng, range(18, 22)):
+        z = np.vstack([z, rng.uniform(-40, 40, (2, 2))])
+        tracks = tracker.step(vt.Scan(float(k), z, 0.5 * np.eye(2)))
+        ids = set(tracks.id.tolist())
+        hidden |= shown - ids
+        assert not ids & hidden, "a track came back"
+        shown |= ids
+    assert (tracks.status == vt.Status.CONFIRMED).sum() >= 2
+
+
+def test_a_later_scan_corrects_an_earlier_choice():
+    """Of two measurements the farther one is the target's, as the next scans show: the track goes on from there."""
+    tracker = vt.Tracker(vt.ConstantVelocity(dim=1, accel=1.0, speed=1.0), vt.MHT(n_scan=4), clutter_density=0.01)
+    tracker.add(0.0, np.array([[0.0, 1.0]]), np.array([[[1.0, 0.0], [0.0, 1.0]]]))
+    first = tracker.step(scan(1.0, 0.8, 2.5))
+    assert first.measurement[first.id == 1] == [0]
+    for t, z in ((2.0, 4.6), (3.0, 6.4), (4.0, 8.2)):
+        last = tracker.step(scan(t, z))
+    track = last.id.tolist().index(1)
+    assert last.x[track] == pytest.approx([8.2, 1.8], abs=0.6)
+    path = tracker.forest.window.past[tracker.forest.shown[0]]
+    assert path.tolist() == [4, 3, 2, 1], "of the first scan it now has the second measurement"
+
+
+@pytest.mark.parametrize("detection", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("clutter", [0.0, 1e-4])
+@pytest.mark.parametrize("gate", [0.0, 0.9, 1.0])
+def test_limits_of_the_probabilities(detection, clutter, gate):
+    tracker = vt.Tracker(
+        vt.ConstantVelocity(dim=1), vt.MHT(), gate=gate, detection_probability=detection, clutter_density=clutter
+    )
+    tracker.add(0.0, np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)))
+    for t, z in ((0.0, ()), (1.0, (0.0, 1.0, 50.0)), (2.0, (0.5,)), (3.0, ())):
+        tracks = tracker.step(scan(t, *z))
+        found = tracker.forest.hypotheses
+        assert np.isfinite(found.log_p).all()
+        np.testing.assert_allclose(probabilities(tracker).sum(), 1.0)
+        assert np.isfinite(tracks.x).all()
+
+
+def test_certain_detection_leaves_no_track_without_a_measurement():
+    tracker = vt.Tracker(vt.ConstantVelocity(dim=1), vt.MHT(), gate=1.0, detection_probability=1.0, clutter_density=0.1)
+    tracker.add(0.0, np.array([[0.0, 0.0], [9.0, 0.0]]), np.tile(np.eye(2), (2, 1, 1)))
+    tracks = tracker.step(scan(0.0, 0.0, 4.0))
+    assert sorted(tracks.measurement[np.isin(tracks.id, [1, 2])].tolist()) == [0, 1]
+
+
+def test_the_set_of_hypotheses_stays_bounded():
+    rule = vt.MHT(hypotheses=30, branches=5)
+    tracker = vt.Tracker(vt.ConstantVelocity(speed=2.0), rule, clutter_density=1e-3, life=vt.LifeCycle(coast_scans=20))
+    rng = np.random.default_rng(0)
+    rows = []
+    for k in range(30):
+        tracker.step(vt.Scan(float(k), rng.uniform(0, 60, (40, 2)), np.eye(2)))
+        found = tracker.forest.hypotheses
+        assert np.diff(found.first).max() <= 30
+        assert len(tracker.bank) == len(tracker.register) == len(tracker.forest.window)
+        np.testing.assert_array_equal(np.unique(found.leaf), np.arange(len(tracker.bank)))
+        rows.append(len(tracker.bank))
+    assert max(rows[15:]) < 2 * max(rows[:15]) + 100
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=15, deadline=None)
+def test_hypotheses_are_exclusive_and_runs_never_meet(seed):
+    """In every hypothesis a measurement serves one leaf, and all leaves of a cluster belong to one run."""
+    rng = np.random.default_rng(seed)
+    tracker = vt.Tracker(vt.ConstantVelocity(accel=2.0, speed=5.0), vt.MHT(hypotheses=20), clutter_density=1e-3)
+    for k in range(12):
+        z, run = rng.uniform(0, 40, (12, 2)), np.sort(rng.integers(0, 3, 12))
+        tracks = tracker.step(vt.Scan(float(k), z, np.eye(2), run=run))
+        found, newest = tracker.forest.hypotheses, tracker.forest.window.past[:, 0]
+        for h in range(len(found.log_p)):
+            leaves = found.leaf[found.start[h] : found.start[h + 1]]
+            used = newest[leaves][newest[leaves] >= 0]
+            assert len(set(used.tolist())) == len(used)
+            assert len(set(tracker.register.id[leaves].tolist())) == len(leaves)
+        runs = tracker.register.run[found.leaf]
+        for c in range(len(found.first) - 1):
+            assert len(set(runs[found.cluster == c].tolist())) <= 1
+        taken = tracks.measurement[tracks.measurement >= 0].tolist()
+        assert len(set(taken)) == len(taken)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"n_scan": 0}, {"hypotheses": 0}, {"threshold": 1.0}, {"mass": 0.0}, {"new_density": -1.0}, {"branches": 0}],
+)
+def test_impossible_settings_are_refused(wrong):
+    with pytest.raises(vt.ConfigError, match=str(next(iter(wrong.values())))):
+        vt.MHT(**wrong)
+
+
+def test_likelihood_of_no_track_sums_up_what_it_could_have_been():
+    """A birth that is never seen again becomes its false alarm: hypotheses that differ in it only are one."""
+    tracker = vt.Tracker(vt.ConstantVelocity(dim=1), vt.MHT(), clutter_density=0.05)
+    tracker.step(scan(0.0, 0.0))
+    assert len(probabilities(tracker)) == 2
+    for t in (1.0, 2.0, 3.0):
+        tracker.step(scan(t))
+    assert len(tracker.bank) == 0
+    assert exp(0) == pytest.approx(probabilities(tracker).sum())

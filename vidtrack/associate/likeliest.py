@@ -1,0 +1,91 @@
+"""JPDA*: of joint events that differ by a permutation only the likeliest counts (Blom and Bloem 2000)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vidtrack.associate.events import Side
+from vidtrack.compiled import CACHE
+from vidtrack.scan import Floats, Ints
+
+
+@njit(cache=CACHE, nogil=True)
+def likeliest(
+    tracks: Ints, measurements: Ints, rows: Side, columns: Side, place: Ints,
+    factor: Floats, share: Floats, row_share: Floats, largest: int,
+) -> bool:  # fmt: skip
+    """Probabilities of a cluster's pairs into `share` and of its misses into `row_share`; False if it is too large.
+
+    best[d, m] is the weight of the likeliest way to give exactly the measurements of the set m, whose bits `place`
+    (M,) keeps, to exactly the tracks of the set d. Its track of the highest bit takes one of m and leaves a smaller
+    problem of the same kind. The weights of all (d, m) are then handed back along these choices.
+    """
+    if len(tracks) + len(measurements) > 30 or 1 << len(tracks) + len(measurements) > largest:
+        return False
+    place[measurements] = np.arange(len(measurements))
+    sets, all_tracks = 1 << len(measurements), 1 << len(tracks)
+    missed, unused = _alone(rows.alone[tracks]), _alone(columns.alone[measurements])
+    by_size, first = _by_size(sets)
+    best = np.zeros((all_tracks, sets))
+    chosen = np.full((all_tracks, sets), -1)
+    best[0, 0] = 1.0
+    for d in range(1, all_tracks):
+        t, top, size = _highest(d, tracks)
+        for e in range(rows.start[t], rows.start[t + 1]):
+            mask = 1 << place[rows.other[e]]
+            for m in by_size[first[size] : first[size + 1]]:
+                if m & mask and best[d ^ top, m ^ mask] * factor[e] > best[d, m]:
+                    best[d, m] = best[d ^ top, m ^ mask] * factor[e]
+                    chosen[d, m] = e
+    weight = np.zeros((all_tracks, sets))
+    total = 0.0
+    for d in range(all_tracks):
+        _, _, size = _highest(d, tracks)
+        mass = 0.0
+        for m in by_size[first[size] : first[size + 1]]:
+            weight[d, m] = missed[d] * unused[m]
+            mass += weight[d, m] * best[d, m]
+        total += mass
+        for i in range(len(tracks)):
+            if not d >> i & 1:
+                row_share[tracks[i]] += mass
+    row_share[tracks] /= total
+    for d in range(all_tracks - 1, 0, -1):
+        _, top, size = _highest(d, tracks)
+        for m in by_size[first[size] : first[size + 1]]:
+            e = chosen[d, m]
+            if e >= 0:
+                share[e] += weight[d, m] * best[d, m] / total
+                weight[d ^ top, m ^ 1 << place[rows.other[e]]] += weight[d, m] * factor[e]
+    return True
+
+
+@njit(cache=CACHE, nogil=True)
+def _alone(alone: Floats) -> Floats:
+    """(2^n,) product of the factors of those that are not in each set."""
+    product = np.ones(1 << len(alone))
+    for s in range(len(product)):
+        for i in range(len(alone)):
+            if not s >> i & 1:
+                product[s] *= alone[i]
+    return product
+
+
+@njit(cache=CACHE, nogil=True)
+def _by_size(sets: int) -> tuple[Ints, Ints]:
+    """All sets, the smaller first, and where those of each size begin; no size beyond the whole set has any."""
+    size = np.empty(sets, np.int64)
+    for s in range(sets):
+        size[s] = size[s >> 1] + (s & 1) if s else 0
+    return np.argsort(size, kind="mergesort"), np.searchsorted(np.sort(size), np.arange(64))
+
+
+@njit(cache=CACHE, nogil=True)
+def _highest(d: int, tracks: Ints) -> tuple[int, int, int]:
+    """The track of the highest bit of a set, that bit, and the size of the set."""
+    i, size = 0, 0
+    for b in range(len(tracks)):
+        if d >> b & 1:
+            i, size = b, size + 1
+    return tracks[i], 1 << i, size

@@ -1,0 +1,89 @@
+"""Redundant measurements: several of one target in one scan become one, before the association."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numba import njit
+
+from vidtrack.associate.clusters import find
+from vidtrack.associate.gate import Gate
+from vidtrack.compiled import CACHE
+from vidtrack.estimate.kernels import TURN
+from vidtrack.scan import Floats, Ints, Scan
+
+BLOCK = 256
+"""Measurements compared with all others at a time: heaps of them at one place do not fill the memory."""
+
+
+def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
+    """The scan with the measurements of each target as one, and (M,) which of them each of the old ones is part of.
+
+    a and b are of one target if (za - zb)' (Ra + Rb)^-1 (za - zb) is at most the chi-square quantile of
+    `probability`, or if a chain of such pairs leads from one to the other. They become z = R sum(Ri^-1 zi) with
+    R = (sum Ri^-1)^-1 (SPEC 001, redundancy elimination), in the box around their boxes, as strong and as sure as the
+    strongest and surest, with the label of the first. Measurements of different runs stay apart.
+
+    Raises ConfigError for a probability outside 0..1.
+    """
+    angles = scan.sensor.angles if scan.sensor else ()
+    gate, root = Gate(probability), np.arange(len(scan))
+    for first in range(0, len(scan), BLOCK):
+        some = slice(first, first + BLOCK)
+        run = None if scan.run is None else scan.run[some]
+        pairs = gate.pairs(scan.z[some], scan.R[some], scan, run, angles)
+        _join(root, pairs.row + first, pairs.measurement)
+    leader, part = np.unique(_roots(root), return_inverse=True)
+    order = np.argsort(part, kind="stable")
+    begin = np.searchsorted(part[order], np.arange(len(leader)))
+
+    information = np.linalg.inv(scan.R)
+    away = _wrapped(scan.z - scan.z[leader][part], angles)
+    R = np.linalg.inv(np.add.reduceat(information[order], begin, axis=0))
+    pull = np.add.reduceat((information @ away[:, :, None])[order], begin, axis=0)
+    z = _wrapped(scan.z[leader] + (R @ pull)[:, :, 0], angles)
+
+    def strongest(values: Floats | None) -> Floats | None:
+        return None if values is None else np.maximum.reduceat(values[order], begin)
+
+    return replace(
+        scan,
+        z=z,
+        R=(R + np.swapaxes(R, 1, 2)) / 2,
+        box=None if scan.box is None else _around(scan.box, scan.z, z, order, begin),
+        amplitude=strongest(scan.amplitude),
+        score=strongest(scan.score),
+        label=None if scan.label is None else scan.label[leader],
+        run=None if scan.run is None else scan.run[leader],
+    ), part
+
+
+def _around(box: Floats, place: Floats, z: Floats, order: Ints, begin: Ints) -> Floats:
+    """Boxes (K, 4) relative to z (K, m) around the boxes (M, 4) relative to their places (M, m)."""
+    low = box[:, :2] + place[:, :2]
+    high = low + box[:, 2:]
+    near = np.minimum.reduceat(low[order], begin, axis=0)
+    far = np.maximum.reduceat(high[order], begin, axis=0)
+    return np.hstack([near - z[:, :2], far - near])
+
+
+def _wrapped(z: Floats, angles: tuple[int, ...]) -> Floats:
+    """The same with its angles in -pi..pi."""
+    turns = np.zeros_like(z)
+    turns[:, list(angles)] = np.round(z[:, list(angles)] / TURN)
+    return z - TURN * turns
+
+
+@njit(cache=CACHE, nogil=True)
+def _join(root: Ints, a: Ints, b: Ints) -> None:
+    """Both ends of each pair get the smaller root."""
+    for k in range(len(a)):
+        i, j = find(root, a[k]), find(root, b[k])
+        root[max(i, j)] = min(i, j)
+
+
+@njit(cache=CACHE, nogil=True)
+def _roots(root: Ints) -> Ints:
+    """(M,) representative of each."""
+    return np.array([find(root, i) for i in range(len(root))], np.int64)

@@ -1,0 +1,43 @@
+"""The score of a detection as evidence: what a detector is unsure of may continue a track, but starts none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.associate.hard import Associator
+from vidtrack.associate.problem import Problem
+from vidtrack.scan import Decision, Scan
+
+Mask = np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """Detections that score at least `least` are sure; without scores all are.
+
+    Confirmed tracks choose among sure detections first and, where they get none, among the others. Only sure ones
+    start tracks, confirm them and keep them alive.
+    """
+
+    least: float
+
+    def sure(self, scan: Scan) -> Mask:
+        """(M,) the scan's sure detections."""
+        return np.ones(len(scan), bool) if scan.score is None else scan.score >= self.least
+
+    def decide(self, associate: Associator, problem: Problem, rows: Mask) -> Decision:
+        """The decision about rows (T,), in two rounds."""
+        pairs = problem.pairs
+        asked, sure = rows[pairs.row], self.sure(problem.scan)[pairs.measurement]
+        first = associate.decide(problem.only(asked & sure))
+        if (sure | ~asked).all():
+            return first
+        missed = first.beta0 > 0.5
+        second = associate.decide(problem.only(asked & ~sure & missed[pairs.row]))
+        return first.without(missed).joined(second)
+
+
+EQUAL = Trust(-np.inf)
+"""Scores do not count."""

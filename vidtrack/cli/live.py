@@ -1,0 +1,123 @@
+"""`vidtrack live`: a camera or a stream becomes tracks until it is stopped."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vidtrack.cli.options import common, settings_options, start_log
+from vidtrack.cli.tracking import chosen_settings, tracking_options
+
+if TYPE_CHECKING:
+    from vidtrack.output.status import LiveStatus
+
+_TELL_S = 60.0
+_SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+_BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
+
+
+@click.command(
+    name="live",
+    epilog="""\b
+Examples:
+  vidtrack live 0 --line gate:320,0,320,480
+  vidtrack live rtsp://USER:PASSWORD@192.168.1.20/stream -o cam1 --roll 1h --keep 7d --state cam1.state
+  vidtrack live http://camera.local/video.mjpg --record tape --end 600""",
+)
+@click.argument("source")
+@common("Folder for the results.  [default: runs/NAME]")
+@settings_options
+@tracking_options
+@click.option("--every-frame", is_flag=True, help="Track every frame, and fall behind rather than drop one.")
+@click.option("--roll", metavar="TIME", help="Results go on in a new sub-folder after 10m, 1h, 1d, ...")
+@click.option("--keep", "keeps", multiple=True, metavar="TIME|SIZE", help="Delete the oldest: 7d or 10GB, or both.")
+@click.option("--state", type=click.Path(path_type=Path), metavar="FILE", help="Go on from this file, and save to it.")
+@click.option("--record", type=click.Path(path_type=Path), metavar="DIR", help="Keep what the camera sends, to replay.")
+def command(
+    source: str,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    quiet: bool,
+    verbose: int,
+    config_file: Path | None,
+    assignments: tuple[str, ...],
+    rerun: str | None,
+    video: Path | None,
+    save_masks: Path | None,
+    decisions: bool,
+    state: Path | None,
+    record: Path | None,
+    **chosen: Any,
+) -> None:
+    """Track the vehicles that SOURCE sees: a camera's index, a V4L2 device, or an rtsp:// or http:// stream.
+
+    The newest frame is tracked and older ones are dropped when the machine is too slow. A lost camera is opened
+    again for as long as it takes. Ctrl-C and SIGTERM end the run, with exit code 0.
+
+    The folder of the results is printed; it holds what vidtrack track writes, with --roll in sub-folders named by
+    the time in UTC. Times are seconds since the first picture. What --record keeps, vidtrack track repeats.
+    """
+    from vidtrack.cli.hide import hide_arguments
+    from vidtrack.cli.signals import Terminated, stopping
+    from vidtrack.compiled import first_run
+    from vidtrack.config import load
+    from vidtrack.live.outputs import Extras
+    from vidtrack.live.run import LiveRun
+    from vidtrack.video.live.address import secrets
+
+    hide_arguments(secrets(source))
+    start_log(verbose, quiet)
+    settings = load(config_file, [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)])
+    if first_run() and not quiet:
+        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+    extras = Extras(rerun, video, save_masks, decisions, state, record)
+    try:
+        with LiveRun(source, settings, output, extras, force=force) as run, stopping(run.stop):
+            told_s = time.monotonic()
+            for _ in run:
+                if not quiet and time.monotonic() - told_s > _TELL_S:
+                    told_s = time.monotonic()
+                    click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
+            if not quiet:
+                click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
+    except (KeyboardInterrupt, Terminated):
+        click.echo("vidtrack: stopped before the first picture, or at once", err=True)
+        return
+    click.echo(run.folder)
+
+
+def _live_settings(
+    every_frame: bool, roll: str | None, keeps: tuple[str, ...], **others: Any
+) -> list[tuple[str, float | bool]]:
+    """The options of this command that stand for a setting, as (name, value)."""
+    given: list[tuple[str, float | bool]] = [("live.every_frame", True)] if every_frame else []
+    if roll is not None:
+        given.append(("live.roll_s", _amount("--roll", roll, {"live.roll_s": _SECONDS})[1]))
+    return given + [_amount("--keep", text, {"live.keep_s": _SECONDS, "live.keep_bytes": _BYTES}) for text in keeps]
+
+
+def _amount(option: str, text: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, float]:
+    """The setting that the unit belongs to, and the amount in seconds or bytes. Raises click.BadParameter."""
+    match = re.fullmatch(r"(\d+\.?\d*) ?([a-zA-Z]+)", text)
+    for setting, factors in units.items():
+        if match and match[2] in factors:
+            return setting, float(match[1]) * factors[match[2]]
+    known = ", ".join(unit for factors in units.values() for unit in factors)
+    raise click.BadParameter(f"{text!r}: write a number and a unit, one of {known}", param_hint=option)
+
+
+def _line(status: LiveStatus) -> str:
+    """The run in one line."""
+    reading = status.reading
+    latency = reading["latency_ms"]
+    return (
+        f"frame {status.frame}, {reading['fps_in']:.1f} frames/s in, {status.fps_out:.1f} tracked, "
+        f"{len(status.tracks)} tracks, {reading['frames_dropped']} dropped, {reading['reconnects']} reconnects, "
+        f"latency {latency.get('p50', 0):.0f} ms"
+    )

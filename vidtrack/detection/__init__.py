@@ -1,0 +1,1 @@
+"""When a radar says "there is something": amplitude densities, CFAR, information reduction, optimal thresholds."""

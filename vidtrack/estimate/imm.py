@@ -1,0 +1,172 @@
+"""Interacting multiple models: a bank for each way to move, and how probable each way is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from vidtrack.errors import ConfigError
+from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.model import Motion
+from vidtrack.estimate.sensor import Sensor, wrapped
+from vidtrack.scan import Decision, Floats, Scan
+
+LEAST = 1e-9
+"""Smallest probability of a mode: none is ever ruled out for good."""
+
+
+class IMMBank:
+    """IMM filters in rows (Blom and Bar-Shalom 1988).
+
+    models  motion models, the first the usual one; all have the same dim
+    stay_s  mean time [s] for which each model holds before another takes over
+
+    Models may have more components than position and velocity; what another model does not know keeps its own
+    values in the mixing. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
+    """
+
+    def __init__(self, models: Sequence[Motion], stay_s: Sequence[float]) -> None:
+        if len(models) != len(stay_s) or len(models) < 2:
+            raise ConfigError(
+                f"IMM: {len(models)} models and {len(stay_s)} stays; give two models or more, a stay each"
+            )
+        if len({model.dim for model in models}) > 1:
+            raise ConfigError("IMM: the models move in different numbers of dimensions")
+        if not min(stay_s) > 0:
+            raise ConfigError(f"IMM: a model stays {min(stay_s):g} s; it must be above zero")
+        self.model = models[0]
+        self.banks = [KalmanBank(model) for model in models]
+        self.stay_s = np.asarray(stay_s, float)
+        self.prior = self.stay_s / self.stay_s.sum()
+        self.mode = np.empty((0, len(models)))
+        self.hits = np.empty(0, np.int64)
+        self.scale = np.empty(0)
+        self.x, self.P = self._moments(self.banks, self.mode)
+
+    def __len__(self) -> int:
+        return len(self.x)
+
+    def ahead(self, dt: float) -> tuple[Floats, Floats]:
+        """x, P after dt seconds; changes nothing."""
+        return self._moments(*self._moved(dt))
+
+    def predict(self, dt: float) -> None:
+        """Mix the modes and move all rows dt seconds on."""
+        self.banks, self.mode = self._moved(dt)
+        self.x, self.P = self._moments(self.banks, self.mode)
+
+    def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
+        """zhat (T, m) and its covariance (T, m, m) over all modes; the innovation covariance is that plus R."""
+        each = [bank.predicted_measurement(sensor) for bank in self.banks]
+        first = each[0][0]
+        off = np.stack([wrapped(zhat - first, sensor.angles) for zhat, _ in each])
+        mean, cov = _mixture(self.mode.T, off, np.stack([cov for _, cov in each]))
+        return wrapped(first + mean, sensor.angles), cov
+
+    def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
+        """Successor rows of each mode, with the weights as that mode sees them, and the modes' new probabilities.
+
+        P(mode, measurement) = beta P(mode) N_mode / sum over modes of P(mode) N_mode; a miss tells nothing of modes.
+        """
+        parent, row = decision.parent, decision.row
+        before = self.mode[parent].T
+        share = np.empty((len(self.banks), len(row)))
+        for j, bank in enumerate(self.banks):
+            zhat, cov = bank.predicted_measurement(sensor)
+            v = wrapped(scan.z[decision.measurement] - zhat[parent[row]], sensor.angles)
+            share[j] = np.log(before[j, row]) + _log_normal(v, cov[parent[row]] + scan.R[decision.measurement])
+        share = decision.beta * np.exp(share - logsumexp(share, axis=0))
+        missed = decision.beta0 * before
+        mode = missed + np.stack([np.bincount(row, each, len(parent)) for each in share])
+        mode = np.maximum(mode, LEAST)
+        for j, bank in enumerate(self.banks):
+            own = replace(decision, beta=share[j] / mode[j, row], beta0=missed[j] / mode[j])
+            bank.update(own, scan, sensor)
+        self.mode = (mode / mode.sum(axis=0)).T
+        self.hits = self.hits[parent] + (decision.beta0 < 0.5)
+        self.scale = self.scale[parent]
+        self.x, self.P = self._moments(self.banks, self.mode)
+
+    def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
+        """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
+        for bank in self.banks:
+            bank.append(position, cov, scale)
+        self._enter(len(position), scale)
+
+    def insert(self, x: Floats, P: Floats, scale: Floats) -> None:
+        """New rows with known moments x (B, n), P (B, n, n) of position and velocity; scale (B,)."""
+        shared, position = 2 * self.model.dim, list(self.model.position)
+        for bank in self.banks:
+            x1, P1 = bank.model.birth(x[:, position], P[:, position][:, :, position], scale)
+            x1[:, :shared], P1[:, :shared, :shared] = x[:, :shared], P[:, :shared, :shared]
+            bank.insert(x1, P1, scale)
+        self._enter(len(x), scale)
+
+    def keep(self, rows: np.ndarray) -> None:
+        """Drop all rows but these indices."""
+        for bank in self.banks:
+            bank.keep(rows)
+        self.mode, self.hits, self.scale = self.mode[rows], self.hits[rows], self.scale[rows]
+        self.x, self.P = self.x[rows], self.P[rows]
+
+    def _enter(self, count: int, scale: Floats) -> None:
+        self.mode = np.concatenate([self.mode, np.tile(self.prior, (count, 1))])
+        self.hits = np.concatenate([self.hits, np.ones(count, np.int64)])
+        self.scale = np.concatenate([self.scale, scale])
+        self.x, self.P = self._moments(self.banks, self.mode)
+
+    def _moved(self, dt: float) -> tuple[list[KalmanBank], Floats]:
+        """The banks after mixing and dt seconds, and the modes' probabilities then."""
+        switch = self._switching(dt)
+        mode = self.mode @ switch
+        moved = []
+        for j, bank in enumerate(self.banks):
+            weight = (self.mode * switch[:, j] / mode[:, j : j + 1]).T
+            lifted = [_lifted(other, bank, 2 * self.model.dim) for other in self.banks]
+            mixed = copy(bank)
+            mixed.x, mixed.P = _mixture(weight, np.stack([x for x, _ in lifted]), np.stack([P for _, P in lifted]))
+            mixed.predict(dt)
+            moved.append(mixed)
+        return moved, mode
+
+    def _switching(self, dt: float) -> Floats:
+        """(r, r) probability to go from one model to another within dt seconds."""
+        stay = np.exp(-dt / self.stay_s)
+        r = len(stay)
+        leave = np.repeat(((1 - stay) / (r - 1))[:, None], r, axis=1)
+        np.fill_diagonal(leave, stay)
+        return leave
+
+    def _moments(self, banks: Sequence[KalmanBank], mode: Floats) -> tuple[Floats, Floats]:
+        """x (T, n), P (T, n, n) of position and velocity over all modes."""
+        n = 2 * self.model.dim
+        return _mixture(mode.T, np.stack([b.x[:, :n] for b in banks]), np.stack([b.P[:, :n, :n] for b in banks]))
+
+
+def _lifted(source: KalmanBank, target: KalmanBank, shared: int) -> tuple[Floats, Floats]:
+    """Moments of one mode in the state of another: what the source does not hold, the target keeps (Yuan 2012)."""
+    if source.model.states == target.model.states:
+        return source.x, source.P
+    x, P = target.x.copy(), target.P.copy()
+    x[:, :shared], P[:, :shared, :shared] = source.x[:, :shared], source.P[:, :shared, :shared]
+    P[:, :shared, shared:] = 0.0
+    P[:, shared:, :shared] = 0.0
+    return x, P
+
+
+def _mixture(weight: Floats, x: Floats, P: Floats) -> tuple[Floats, Floats]:
+    """Mean (T, n) and covariance (T, n, n) of mixtures: weight (r, T), x (r, T, n), P (r, T, n, n)."""
+    mean = np.einsum("rt,rti->ti", weight, x)
+    off = x - mean
+    cov = np.einsum("rt,rtij->tij", weight, P) + np.einsum("rt,rti,rtj->tij", weight, off, off)
+    return mean, cov
+
+
+def _log_normal(v: Floats, S: Floats) -> Floats:
+    """(B,) ln N(v; 0, S) of v (B, m), S (B, m, m)."""
+    d2 = np.einsum("ba,ba->b", v, np.linalg.solve(S, v[:, :, None])[:, :, 0])
+    return -0.5 * (d2 + np.linalg.slogdet(S)[1] + v.shape[1] * np.log(2 * np.pi))

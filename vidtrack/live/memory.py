@@ -1,0 +1,96 @@
+"""Where a live run stands, so that another one can go on from there."""
+
+from __future__ import annotations
+
+import logging
+import time
+from pathlib import Path
+from threading import Thread
+
+from vidtrack.output.linefile import Every
+from vidtrack.state import State, gather, read_state, restore, write_state
+from vidtrack.tracking.tracker import Tracker
+from vidtrack.video.foreground import Background
+from vidtrack.video.frame import Frame
+
+log = logging.getLogger(__name__)
+
+_SAVE_S = 10.0
+_BLOCK = 10_000  # ids reserved at a time: many times more than one picture can hold
+_NEXT_ID = "tracker.register.next_id"
+
+
+class Memory:
+    """Everything that the tracks of the next frame depend on.
+
+    like           a frame of the size and kind that all frames are brought to
+    frame, time_s  of the last frame; -1 and 0 before the first
+    unix_s         when that was
+    """
+
+    STATE = ("detector", "tracker", "frame", "time_s", "unix_s", "width", "height", "coloured")
+
+    def __init__(self, detector: Background, tracker: Tracker, like: Frame) -> None:
+        self.detector = detector
+        self.tracker = tracker
+        self.height, self.width = like.shape
+        self.coloured = like.u is not None
+        self.frame = -1
+        self.time_s = 0.0
+        self.unix_s = time.time()
+
+    def note(self, frame: Frame) -> None:
+        """This frame is the last one now."""
+        self.frame, self.time_s, self.unix_s = frame.index, frame.time_s, time.time()
+
+    def gather(self) -> State:
+        """A copy as plain data."""
+        return gather(self)
+
+    def restore(self, state: State) -> None:
+        """Take over a saved memory. Raises FormatError if other settings made it."""
+        restore(self, state)
+
+
+class StateFile:
+    """A memory on the disk, saved regularly. Ids are reserved there before they are used: none is issued twice.
+
+    found  what an earlier run left; None without one
+    lost   times that it could not be saved
+
+    Raises FormatError for a file that is no saved state.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lost = 0
+        self.found = read_state(path) if path.exists() else None
+        self._due = Every(_SAVE_S)
+        self._reserved = 0
+        self._writing: Thread | None = None
+
+    def offer(self, memory: Memory) -> None:
+        """Save if it is time, beside the tracker."""
+        next_id = memory.tracker.register.next_id
+        scarce = self._reserved - next_id < _BLOCK // 2
+        if not (scarce or self._due()) or (self._writing is not None and self._writing.is_alive()):
+            return
+        self._reserved = next_id + _BLOCK
+        state = memory.gather() | {_NEXT_ID: self._reserved}
+        if self._writing is None:  # nothing is reserved yet
+            self._write(state)
+        self._writing = Thread(target=self._write, args=(state,), name="save-state", daemon=True)
+        self._writing.start()
+
+    def close(self, memory: Memory, timeout_s: float) -> None:
+        """Save the end: ids that were reserved and not used are free again."""
+        if self._writing is not None:
+            self._writing.join(timeout_s)
+        self._write(memory.gather())
+
+    def _write(self, state: State) -> None:
+        try:
+            write_state(self.path, state)
+        except OSError as error:
+            self.lost += 1
+            log.warning("cannot save the state in %s: %s; it is tried again", self.path, error.strerror or error)

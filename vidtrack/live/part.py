@@ -1,0 +1,92 @@
+"""The files of one part of a live run: the same as those of a run over a video."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from vidtrack.errors import StoppedEarly
+from vidtrack.output.counts import HEADER
+from vidtrack.output.decisions import DecisionLog
+from vidtrack.output.linefile import LineFile, sort_rows
+from vidtrack.output.mot import MotFile
+from vidtrack.output.parquet import write_parquet
+from vidtrack.output.plot import TrajectoryPlot
+from vidtrack.output.repair import read_tracks
+from vidtrack.output.sink import Step
+from vidtrack.output.summary import Summary
+from vidtrack.output.tables import VIDEO, csv_text, schema, track_rows
+from vidtrack.traffic.lines import LineCounter
+from vidtrack.video.frame import Image
+
+
+class Part:
+    """Tables that grow, and what is made of them when the part ends. Raises StoppedEarly when the disk refuses.
+
+    shape    (H, W) of the source
+    scene    gives the (H, W, 3) background for tracks.png
+    summary  makes the summary at a path
+    counter  counts on through all parts; None without lines
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        shape: tuple[int, int],
+        scene: Callable[[], Image],
+        summary: Callable[[Path], Summary],
+        counter: LineCounter | None,
+        decisions: bool,
+    ) -> None:
+        self.folder = folder
+        self._counter = counter
+        with ExitStack() as stack:  # if the disk is full, what is open by then is closed
+            self._summary = summary(folder / "summary.json")
+            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in VIDEO) + "\n")
+            stack.callback(self._tracks.close)
+            self._mot = MotFile(folder / "mot.txt")
+            stack.callback(self._mot.close)
+            self._counts = self._decisions = None
+            if counter is not None:
+                self._counts = LineFile(folder / "counts.csv", HEADER)
+                stack.callback(self._counts.close)
+            if decisions:
+                self._decisions = DecisionLog(folder / "decisions.csv")
+                stack.callback(self._decisions.close)
+            self._plot = TrajectoryPlot(folder / "tracks.png", shape, scene, counter.lines if counter else ())
+            self._files = stack.pop_all()
+
+    def write(self, steps: Sequence[Step], crossings: str) -> None:
+        """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
+        shown = [step for step in steps if len(step.tracks)]
+        if shown:
+            self._tracks.add(csv_text(track_rows(shown)))
+        if self._counts is not None:
+            self._counts.add(crossings)
+        for step in steps:
+            self._mot.step(step)
+            self._plot.step(step)
+            if self._decisions is not None:
+                self._decisions.step(step)
+            with suppress(StoppedEarly):  # it only repeats what the tables hold
+                self._summary.step(step)
+        self._mot.flush()
+        for file in (self._tracks, self._counts):
+            if file is not None:
+                file.flush()
+                file.sync()
+
+    def finish(self) -> None:
+        """Close the tables, sort them, and add tracks.parquet and tracks.png."""
+        with ExitStack() as stack:
+            self._summary.interrupted = False
+            stack.callback(self._summary.close)
+            stack.callback(self._plot.close)
+            stack.callback(self._add_parquet)
+            if self._counts is not None:
+                stack.callback(sort_rows, self._counts.path, columns=1, header=True)
+            stack.push(self._files)
+
+    def _add_parquet(self) -> None:
+        write_parquet(self.folder / "tracks.parquet", schema(VIDEO), [read_tracks(self._tracks.path)])

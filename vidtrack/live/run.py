@@ -1,0 +1,183 @@
+"""A live run: a camera tracked into a folder of results until it is told to stop. The page to read first here."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any
+
+from vidtrack.config import Settings
+from vidtrack.live.keep import Keep, parts_of
+from vidtrack.live.memory import Memory, StateFile
+from vidtrack.live.outputs import Extras, Outputs, Subject
+from vidtrack.live.recorder import Recorder
+from vidtrack.output.folder import open_run, usable
+from vidtrack.output.sink import Step
+from vidtrack.output.status import Account, StatusBoard
+from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.traffic.lines import LineCounter, parse_lines
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.address import parse_address
+from vidtrack.video.live.connection import Connection
+from vidtrack.video.live.source import LiveSource
+from vidtrack.video.resources import keep_freed_memory, opencv_single_threaded
+from vidtrack.video.span import Span
+
+_HOUR_S = 3600.0
+_END_S = 1.5  # in which everything has to be finished after the last frame
+
+
+class LiveRun:
+    """Iterates over the steps of a camera while the results are written; use it with `with`.
+
+    name    of the source, without credentials
+    folder  where the results are
+    board   what the run looks like now, for other threads
+
+    `stop` ends the iteration, and after the first picture nothing else does: a lost camera is opened again for
+    ever, and results that cannot be written are counted.
+    Raises SourceError, ConfigError, FormatError, OutputError at the start.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        settings: Settings,
+        output: Path | None = None,
+        extras: Extras | None = None,
+        *,
+        force: bool = False,
+        connect: Callable[[], Connection] | None = None,
+    ) -> None:
+        extras, live = extras or Extras(), settings.live
+        self._settings = settings
+        self._address = parse_address(address, live.timeout_s)
+        self.name = self._address.name
+        roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
+        keep = Keep(live.keep_s, live.keep_bytes)
+        self._state_file = None if extras.state is None else StateFile(extras.state)
+        self._recorder: Recorder | None = None
+        self._outputs: Outputs | None = None
+        with ExitStack() as stack:  # whatever fails below, what is open by then is closed
+            if extras.record is not None:
+                keep.roots.append(usable(extras.record))
+                self._recorder = Recorder(extras.record, settings, roll_s, keep)
+                stack.callback(self._recorder.close)
+            self._source = source = stack.enter_context(self._open_source(connect))
+            keep_freed_memory()
+            if settings.detector.kind not in ("mog2", "knn"):  # they are OpenCV's, and long enough for its threads
+                stack.enter_context(opencv_single_threaded())
+            lines = parse_lines(settings.output.lines, source.width, source.height)
+            counter = LineCounter(lines) if lines else None
+            explain = extras.decisions or extras.rerun is not None
+            tracker = build_tracker(settings.tracker, (source.width, source.height), explain=explain)
+            self._memory = Memory(build_detector(settings), tracker, source.like)
+            if self._state_file is not None and self._state_file.found is not None:
+                self._memory.restore(self._state_file.found)
+            continued = output is not None and roll_s is not None and bool(parts_of(output))
+            self.folder = usable(output) if output and continued else open_run(output, self.name, force)
+            keep.roots.append(self.folder)
+            self.board = StatusBoard(self._address.shown, self._account, source.latency_s, settings.output, counter)
+            subject = Subject(
+                self._address.shown, source.like.shape, source.fps, self._memory.detector.scene, self._reading, counter
+            )
+            self._outputs = Outputs(self.folder, subject, settings, extras, roll_s, keep)
+            self._open = stack.pop_all()
+
+    def __iter__(self) -> Iterator[Step]:
+        assert self._outputs is not None
+        memory = self._memory
+        for step in video_steps(self._frames(), memory.detector, memory.tracker, self._settings):
+            self._outputs.step(step)
+            self.board.step(step)
+            yield step
+
+    def stop(self) -> None:
+        """Let the iteration end after the frame in work; from any thread, or a signal handler."""
+        self._source.stop()
+
+    def __enter__(self) -> LiveRun:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._outputs is not None
+        until_s = monotonic() + _END_S
+        self._open.close()
+        self.board.close()
+        self._outputs.close(until_s)
+        if self._state_file is not None:
+            self._state_file.close(self._memory, until_s)
+
+    def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
+        """The camera; numbers and times go on from a saved state."""
+        found = None if self._state_file is None else self._state_file.found
+        if found is None:
+            return LiveSource(self._address, self._settings.live, self._recorder, connect=connect)
+        since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
+        like = Frame.blank((found["height"], found["width"]), found["coloured"])
+        return LiveSource(
+            self._address,
+            self._settings.live,
+            self._recorder,
+            first=found["frame"] + 1,
+            origin_s=monotonic() - since_s,
+            like=like,
+            connect=connect,
+        )
+
+    def _frames(self) -> Iterator[Frame]:
+        """The frames to track; before each one, what is to be kept of the memory that it meets."""
+        memory, recorder, span = self._memory, self._recorder, Span.of(self._settings.source)
+        for frame in self._source:
+            if frame is None or not span.begun(frame.time_s):
+                continue
+            if span.over(frame.time_s):
+                break
+            if recorder is not None:
+                place = self._source.place
+                recorder.log_frame(frame, place, memory.gather() if recorder.begins(place) else None)
+            if self._state_file is not None:
+                self._state_file.offer(memory)
+            yield frame
+            memory.note(frame)
+
+    def _reading(self) -> Mapping[str, Any]:
+        """The run's own account, for the summary and the page."""
+        source, stats = self._source, self._source.stats
+        began = datetime.fromtimestamp(time.time() - source.latency_s(0.0), UTC)
+        return {
+            "fps": round(source.fps, 6),
+            "fps_in": round(stats.rate(monotonic()), 2),
+            "width": source.width,
+            "height": source.height,
+            "began": began.isoformat(timespec="milliseconds"),
+            "frames_received": stats.received,
+            "frames_read": stats.frames_read,
+            "frames_dropped": stats.frames_dropped,
+            "decode_errors": stats.decode_errors,
+            "reconnects": stats.reconnects,
+            "stalls": stats.stalls,
+            "truncated": False,
+            "latency_ms": self.board.latency_ms(),
+            "lost": self._lost(),
+        }
+
+    def _lost(self) -> dict[str, int]:
+        """Frames, packets and states that could not be written."""
+        lost = {} if self._outputs is None else self._outputs.lost
+        if self._recorder is not None:
+            lost["recording"] = self._recorder.lost
+        if self._state_file is not None:
+            lost["state"] = self._state_file.lost
+        return lost
+
+    def _account(self) -> Account:
+        stats = self._source.stats
+        return Account(stats.state, self._reading(), list(stats.problems))

@@ -1,0 +1,64 @@
+"""tracks.png of a radar run: plots and tracks in kilometres, as seen from above."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vidtrack.estimate.sensor import POSITION
+from vidtrack.output.colours import colour
+from vidtrack.output.folder import replacing
+from vidtrack.output.sink import Step
+from vidtrack.scan import Floats, Scan
+
+_NUMBERED = 60
+"""Most tracks that get their number; with more of them nothing could be read."""
+
+
+class RadarPlot:
+    """Sink that draws all plots in grey and each track in its colour, its number at its end.
+
+    radar  (x, y) of the radar
+    """
+
+    def __init__(self, path: Path, radar: tuple[float, float]) -> None:
+        self._path = path
+        self._radar = radar
+        self._plots: list[np.ndarray] = []
+        self._tracks: dict[int, list[Floats]] = {}
+
+    def step(self, step: Step) -> None:
+        """Keep one scan."""
+        if len(step.scan):
+            self._plots.append(located(step.scan)[:, :2].astype(np.float32))
+        for track_id, xy in zip(step.tracks.id.tolist(), step.tracks.xy[:, :2], strict=True):
+            self._tracks.setdefault(track_id, []).append(xy)
+
+    def close(self) -> None:
+        """Write the picture."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(9, 9), layout="constrained")
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        if self._plots:
+            axes.plot(*(np.concatenate(self._plots).T / 1000), ".", color="0.6", markersize=2, zorder=1)
+        axes.plot(self._radar[0] / 1000, self._radar[1] / 1000, "^", color="black", markersize=7, zorder=2)
+        for track_id, points in self._tracks.items():
+            x, y = np.array(points).T / 1000
+            ink = tuple(0.8 * level / 255 for level in reversed(colour(track_id)))
+            axes.plot(x, y, color=ink, linewidth=1.5, zorder=3)
+            if len(self._tracks) <= _NUMBERED:
+                axes.annotate(str(track_id), (x[-1], y[-1]), color=ink, fontsize=8, zorder=4)
+        axes.set(xlabel="east, km", ylabel="north, km", title=f"{len(self._tracks)} tracks")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.grid(color="0.9")
+        with replacing(self._path) as new:
+            canvas.print_png(str(new))
+
+
+def located(scan: Scan) -> Floats:
+    """(M, d) positions of a scan's measurements."""
+    return (scan.sensor or POSITION).locate(scan.z, scan.R)[0]

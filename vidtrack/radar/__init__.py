@@ -1,0 +1,1 @@
+"""Radar plots become scans: plot tables, coordinates, measurement models."""

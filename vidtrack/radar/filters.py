@@ -1,0 +1,46 @@
+"""Motion models and estimators by the names that users give them, in metres and seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vidtrack.config import RadarSettings
+from vidtrack.estimate.acceleration import ConstantAcceleration, Singer
+from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.fixed_gain import FixedGainBank
+from vidtrack.estimate.imm import IMMBank
+from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.turn import CoordinatedTurn
+from vidtrack.estimate.unscented import UnscentedBank
+from vidtrack.radar.scans import Measurements
+
+
+def motion(settings: RadarSettings, dim: int) -> Motion:
+    """The motion model that the settings name."""
+    speed, accel, hold_s = settings.max_speed / 2, settings.accel, settings.hold_s
+    if settings.model == "ca":
+        return ConstantAcceleration(dim, change=accel, hold_s=hold_s, speed=speed, accel=accel)
+    if settings.model == "singer":
+        return Singer(dim, accel=accel, hold_s=hold_s, speed=speed)
+    if settings.model == "ct":
+        return CoordinatedTurn(dim, accel=accel, hold_s=hold_s, speed=speed)
+    return ConstantVelocity(dim, accel=accel, hold_s=hold_s, speed=speed)
+
+
+def estimator(settings: RadarSettings, found: Measurements) -> Callable[[Motion], Estimator]:
+    """What makes the settings' bank of filters from a motion model."""
+    if settings.estimator == "ukf":
+        return UnscentedBank
+    if settings.estimator == "imm":
+        quiet = ConstantVelocity(
+            found.dim, accel=settings.quiet_accel, hold_s=settings.hold_s, speed=settings.max_speed / 2
+        )
+        return lambda model: IMMBank([quiet, model], [settings.quiet_s, settings.manoeuvre_s])
+    if settings.estimator == "alpha-beta":
+        variance = np.diagonal(found.R, axis1=1, axis2=2).mean()
+        return lambda model: FixedGainBank(model, float(np.sqrt(variance)))
+    return KalmanBank

@@ -1,0 +1,135 @@
+"""Radar plots from a table: checked, in order of scan and time."""
+
+from __future__ import annotations
+
+import difflib
+import logging
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vidtrack.config import RadarSettings
+from vidtrack.errors import PlotFormatError
+from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
+from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.table import Table, nearest, read_table
+from vidtrack.scan import Floats, Ints
+
+_log = logging.getLogger(__name__)
+
+MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
+KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
+
+
+@dataclass(frozen=True, slots=True)
+class Plots:
+    """All plots of a file, sorted by scan, then time.
+
+    scan       (N,) number of the scan; numbers without plots are empty scans
+    time_s     (N,) when each plot was measured
+    z          (N, m) range [m], azimuth [rad][, elevation [rad]] or x, y[, z] [m]; then the range rate [m/s], if any
+    sigma      (N, m) standard deviations of z, in its units
+    polar, dim, doppler   what z is: polar or Cartesian, in two or three dimensions, with or without range rate
+    amplitude  (N,) None where the file has none
+    bad_rows   rows that were left out
+    """
+
+    scan: Ints
+    time_s: Floats
+    z: Floats
+    sigma: Floats
+    polar: bool
+    dim: int
+    doppler: bool
+    amplitude: Floats | None
+    bad_rows: int
+
+    def __len__(self) -> int:
+        return len(self.scan)
+
+
+def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots:
+    """Read a CSV or Parquet table of plots.
+
+    Rows may come in any order. Standard deviations come from columns, else from the settings.
+    Raises SourceError when there is no such file; PlotFormatError for missing columns, a file without plots,
+    and bad rows, which settings.skip_bad_rows leaves out instead, with a warning.
+    """
+    settings = settings or RadarSettings()
+    table = read_table(Path(path), KNOWN)
+    measured = _measured(table)
+    _hint_at_misspelt(table)
+    sigma = {name: _sigma(table, name, settings) for name in measured}
+    check_numbers(table, measured)
+    check_order(table, measured)
+    if table.faults and not settings.skip_bad_rows:
+        raise PlotFormatError(f"{table.complaint()}; correct them, or leave them out with --skip-bad-rows")
+    if not table.good.any():
+        raise PlotFormatError(f"{table.complaint()}; no good row is left")
+    if table.faults:
+        _log.warning("%s; left out", table.complaint())
+    return _sorted(table, measured, sigma)
+
+
+def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:
+    """The good rows in radians, by scan and time."""
+    rows = np.flatnonzero(table.good)
+    scan, time_s = (table.columns[name][rows] for name in TIME)
+    order = np.lexsort((time_s, scan))
+    rows = rows[order]
+    z, sigmas = (np.column_stack([source[name][rows] for name in measured]) for source in (table.columns, sigma))
+    in_degrees = [name.endswith("_deg") for name in measured]
+    z[:, in_degrees], sigmas[:, in_degrees] = np.radians(z[:, in_degrees]), np.radians(sigmas[:, in_degrees])
+    polar, doppler = measured[0] == POLAR[0], measured[-1] == DOPPLER
+    if polar:
+        z[:, 1] = wrap(z[:, 1])
+    amplitude = table.columns[AMPLITUDE][rows] if AMPLITUDE in table.columns else None
+    return Plots(
+        scan[order].astype(np.int64), time_s[order], z, sigmas, polar, len(measured) - doppler, doppler, amplitude,
+        bad_rows=len(table.faults),
+    )  # fmt: skip
+
+
+def _measured(table: Table) -> list[str]:
+    """The columns that are measurements, in their order in z: polar ones where the file has both kinds."""
+    for name in TIME:
+        if name not in table.columns:
+            raise PlotFormatError(f"{table.path} has no column {name!r}; {nearest(name, table.names)}")
+    for kind in (POLAR, CARTESIAN):
+        if set(kind[:2]) <= table.columns.keys():
+            return [name for name in (*kind, DOPPLER) if name in table.columns]
+    half = [kind for kind in (POLAR, CARTESIAN) if set(kind[:2]) & table.columns.keys()] or [POLAR, CARTESIAN]
+    missing = [name for kind in half for name in kind[:2] if name not in table.columns]
+    raise PlotFormatError(
+        f"{table.path} has no column {missing[0]!r}; {nearest(missing[0], table.names)}; a plot needs "
+        f"{' and '.join(POLAR[:2])}, or {' and '.join(CARTESIAN[:2])}"
+    )
+
+
+def _hint_at_misspelt(table: Table) -> None:
+    """Warn of a column that was probably meant to be an optional one: leaving it out in silence would mislead."""
+    absent = {_bare(name): name for name in KNOWN if name not in table.names}
+    for name in table.names:
+        near = [] if name in KNOWN else difflib.get_close_matches(_bare(name), absent, n=1, cutoff=0.9)
+        if near:
+            _log.warning("%s: column %r is not used; is it %r?", table.path, name, absent[near[0]])
+
+
+def _bare(name: str) -> str:
+    """A column's name without case, punctuation and unit."""
+    words = re.split(r"[\W_]+", name.lower())
+    return "".join(word for word in words if word not in ("m", "s", "deg", "rad", "km", "degrees"))
+
+
+def _sigma(table: Table, name: str, settings: RadarSettings) -> Floats:
+    """(N,) standard deviations of a measured column, in its unit."""
+    column = f"sigma_{name}"
+    if column in table.columns:
+        return table.columns[column]
+    setting = "sigma_position_m" if name in CARTESIAN else column
+    value = getattr(settings, setting)
+    if setting not in settings.model_fields_set:
+        _log.warning("%s has no column %s: radar.%s = %g is assumed", table.path, column, setting, value)
+    return np.full(len(table.line), float(value))

@@ -1,0 +1,145 @@
+"""Measurement models of a radar: what it would measure of states in metres.
+
+A constant-velocity state has each velocity right after its position: [x, vx, y, vy, ...]. Range rate is positive
+for a target that goes away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vidtrack.radar.coordinates import to_polar, unbiased
+from vidtrack.scan import Floats
+
+NEAREST_M = 1e-6
+"""The line of sight has no direction at the sensor itself: no target is nearer than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class RangeAzimuth:
+    """z = range [m], azimuth [rad][, range rate [m/s]] of a target in the plane.
+
+    origin   (x, y) of the radar [m]
+    doppler  the range rate is measured too
+    """
+
+    angles: ClassVar[tuple[int, ...]] = (1,)
+    origin: tuple[float, float] = (0.0, 0.0)
+    doppler: bool = False
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, 2 or 3) expected measurements, azimuth in -pi..pi."""
+        return _expected(x, position, self.origin, self.doppler)
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(T, 2 or 3, n) Jacobians of h."""
+        return _jacobian(x, position, self.origin, self.doppler)
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """Positions (M, 2) and covariances (M, 2, 2): the unbiased conversion."""
+        return _located(z, R, self.origin)
+
+
+@dataclass(frozen=True, slots=True)
+class RangeAzimuthElevation:
+    """z = range [m], azimuth [rad], elevation [rad][, range rate [m/s]].
+
+    origin   (x, y, z) of the radar [m]
+    doppler  the range rate is measured too
+    """
+
+    angles: ClassVar[tuple[int, ...]] = (1,)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    doppler: bool = False
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, 3 or 4) expected measurements, azimuth in -pi..pi."""
+        return _expected(x, position, self.origin, self.doppler)
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(T, 3 or 4, n) Jacobians of h."""
+        return _jacobian(x, position, self.origin, self.doppler)
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """Positions (M, 3) and covariances (M, 3, 3): the unbiased conversion."""
+        return _located(z, R, self.origin)
+
+
+@dataclass(frozen=True, slots=True)
+class PositionRangeRate:
+    """z = position [m] in two or three dimensions and range rate [m/s], seen from `origin`."""
+
+    angles: ClassVar[tuple[int, ...]] = ()
+    origin: tuple[float, ...] = (0.0, 0.0)
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, d + 1) positions and expected range rates."""
+        p, v = _relative(x, position, self.origin)
+        return np.column_stack([x[:, position], _range_rate(p, v)])
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(T, d + 1, n) Jacobians of h."""
+        p, v = _relative(x, position, self.origin)
+        dim = len(position)
+        H = np.zeros((len(x), dim + 1, x.shape[1]))
+        H[:, range(dim), position] = 1.0
+        _range_rate_jacobian(H[:, dim], p, v, position)
+        return H
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """The measured positions as they are."""
+        dim = z.shape[1] - 1
+        return z[:, :dim], R[:, :dim, :dim]
+
+
+def _relative(x: Floats, position: tuple[int, ...], origin: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Positions (T, d) as seen from the sensor, and velocities (T, d)."""
+    return x[:, position] - origin, x[:, [column + 1 for column in position]]
+
+
+def _distance(p: Floats) -> Floats:
+    return np.maximum(np.linalg.norm(p, axis=1), NEAREST_M)
+
+
+def _range_rate(p: Floats, v: Floats) -> Floats:
+    """(T,) p' v / |p|."""
+    return np.asarray((p * v).sum(axis=1) / _distance(p))
+
+
+def _expected(x: Floats, position: tuple[int, ...], origin: tuple[float, ...], doppler: bool) -> Floats:
+    if not doppler:
+        return to_polar(x[:, position] - origin)
+    p, v = _relative(x, position, origin)
+    return np.column_stack([to_polar(p), _range_rate(p, v)])
+
+
+def _jacobian(x: Floats, position: tuple[int, ...], origin: tuple[float, ...], doppler: bool) -> Floats:
+    p = x[:, position] - origin
+    dim = len(position)
+    r, ground = _distance(p), _distance(p[:, :2])
+    H = np.zeros((len(x), dim + doppler, x.shape[1]))
+    H[:, 0, position] = p / r[:, None]
+    H[:, 1, position[0]] = p[:, 1] / ground**2
+    H[:, 1, position[1]] = -p[:, 0] / ground**2
+    if dim == 3:
+        H[:, 2, position[:2]] = -p[:, :2] * (p[:, 2] / (r**2 * ground))[:, None]
+        H[:, 2, position[2]] = ground / r**2
+    if doppler:
+        _range_rate_jacobian(H[:, dim], *_relative(x, position, origin), position)
+    return H
+
+
+def _range_rate_jacobian(row: Floats, p: Floats, v: Floats, position: tuple[int, ...]) -> None:
+    """Fill row (T, n): d/dp = v / |p| - p (p' v) / |p|^3, d/dv = p / |p|."""
+    r = _distance(p)[:, None]
+    row[:, position] = v / r - p * _range_rate(p, v)[:, None] / r**2
+    row[:, [column + 1 for column in position]] = p / r
+
+
+def _located(z: Floats, R: Floats, origin: tuple[float, ...]) -> tuple[Floats, Floats]:
+    dim = len(origin)
+    position, cov = unbiased(z[:, :dim], R[:, :dim, :dim])
+    return position + origin, cov

@@ -1,0 +1,142 @@
+"""Number columns of a CSV or Parquet file, and what is wrong in which line."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute
+import pyarrow.csv
+import pyarrow.parquet
+from numpy.typing import NDArray
+
+from vidtrack.errors import PlotFormatError, SourceError
+from vidtrack.scan import Floats, Ints
+
+Faults = dict[int, str]
+"""What is wrong, by line of the file; the first fault of a line is kept."""
+
+SHOWN = 5
+"""Faults that a message spells out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A file's columns as numbers, NaN where a cell is none.
+
+    names   of all columns in the file; `columns` holds those that were wanted
+    line    (N,) where each row stands: the header of a CSV is line 1, blank lines do not count;
+            rows of a Parquet file count from 1
+    faults  lines and cells that are no numbers
+    """
+
+    path: Path
+    names: list[str]
+    columns: dict[str, Floats]
+    line: Ints
+    faults: Faults
+
+    def refuse(self, bad: NDArray[np.bool_], name: str, rule: str) -> None:
+        """Note the rows of a mask (N,) whose value in column `name` breaks a rule."""
+        for row in np.flatnonzero(bad):
+            self.note(int(row), f"{name} is {self.columns[name][row]:.10g}; {rule}")
+
+    def note(self, row: int, fault: str) -> None:
+        """Note what is wrong with a row."""
+        self.faults.setdefault(int(self.line[row]), fault)
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """(N,) rows without a fault."""
+        return ~np.isin(self.line, list(self.faults))
+
+    def complaint(self) -> str:
+        """All faults in words, the first few in full."""
+        return _complaint(self.path, self.faults)
+
+
+def read_table(path: Path, wanted: Iterable[str]) -> Table:
+    """The wanted columns that a CSV or Parquet file has, told apart by content.
+
+    Raises SourceError when there is no such file, PlotFormatError when it is neither or has no rows.
+    """
+    try:
+        with path.open("rb") as file:
+            parquet = file.read(4) == b"PAR1"
+    except OSError as error:
+        raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
+    faults: Faults = {}
+    try:
+        table = pyarrow.parquet.read_table(path) if parquet else _read_csv(path, faults)
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise PlotFormatError(f"{path} is not a readable CSV or Parquet file of plots: {reason}") from None
+    table = table.rename_columns([name.strip() for name in table.column_names])
+    _refuse_repeated_names(path, table.column_names)
+    if not len(table):
+        raise PlotFormatError(_complaint(path, faults) if faults else f"{path} holds no plots")
+    line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
+    columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
+    return Table(path, table.column_names, columns, line, faults)
+
+
+def nearest(wanted: str, names: Iterable[str]) -> str:
+    """The names that resemble a wanted one, in words."""
+    names = list(names)
+    near = difflib.get_close_matches(wanted, names, n=3, cutoff=0.5) or names[:6]
+    return f"the nearest {'is' if len(near) == 1 else 'are'} {', '.join(map(repr, near))}" if near else "it has none"
+
+
+def _complaint(path: Path, faults: Faults) -> str:
+    count = len(faults)
+    shown = [f"line {line}: {fault}" for line, fault in sorted(faults.items())[:SHOWN]]
+    more = [f"and {count - SHOWN} more"] if count > SHOWN else []
+    return f"{path}: {count} bad {'row' if count == 1 else 'rows'}: " + "; ".join(shown + more)
+
+
+def _read_csv(path: Path, faults: Faults) -> pa.Table:
+    """All cells as text; rows with too few or too many of them become faults."""
+
+    def uneven(row: pyarrow.csv.InvalidRow) -> str:
+        faults[row.number] = f"{row.actual_columns} cells where the header has {row.expected_columns}"
+        return "skip"
+
+    content = path.read_bytes()
+    header = content.decode("utf-8-sig").partition("\n")[0].strip("\r").replace('"', "").split(",")
+    return pyarrow.csv.read_csv(
+        pa.BufferReader(content),
+        read_options=pyarrow.csv.ReadOptions(use_threads=False),  # rows are numbered in one thread only
+        parse_options=pyarrow.csv.ParseOptions(invalid_row_handler=uneven),
+        convert_options=pyarrow.csv.ConvertOptions(column_types={name: pa.string() for name in header}),
+    )
+
+
+def _lines(rows: int, skipped: list[int]) -> Ints:
+    """(rows,) line of each row of a CSV, without those that were skipped."""
+    return np.delete(np.arange(2, rows + len(skipped) + 2), np.array(skipped, np.int64) - 2)
+
+
+def _refuse_repeated_names(path: Path, names: list[str]) -> None:
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise PlotFormatError(f"{path} has two columns {min(twice)!r}; keep one")
+
+
+def _numbers(column: pa.ChunkedArray, name: str, line: Ints, faults: Faults) -> Floats:
+    """A column as floats; each text that is no number becomes a fault."""
+    try:
+        if pa.types.is_string(column.type):
+            column = pa.compute.utf8_trim_whitespace(column)
+        return np.array(column.cast(pa.float64()).to_numpy(), dtype=float)
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        values = np.full(len(column), np.nan)
+        for row, cell in enumerate(column.to_pylist()):
+            try:
+                values[row] = cell
+            except (TypeError, ValueError):
+                faults.setdefault(int(line[row]), f"{name} is {cell!r}; a number is needed")
+        return values

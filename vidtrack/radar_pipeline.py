@@ -1,0 +1,47 @@
+"""From radar plots to tracks: plots, scans, tracker. No pictures, and no OpenCV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from vidtrack.associate.gate import Gate
+from vidtrack.config import Settings
+from vidtrack.radar.filters import estimator, motion
+from vidtrack.radar.plots import read_plots
+from vidtrack.radar.scans import Measurements, clutter_density, measurements
+from vidtrack.scan import Tracks
+from vidtrack.steps import scan_steps
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.methods import METHODS
+from vidtrack.tracking.tracker import Tracker
+
+
+def track_plots(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[int, Tracks]]:
+    """Number of each scan of a plot table (CSV, Parquet) and the tracks after it, lazily.
+
+    Raises SourceError and PlotFormatError for a table that cannot be used.
+    """
+    settings = settings or Settings()
+    found = measurements(read_plots(path, settings.radar), settings.radar)
+    for step in scan_steps(found, build_radar_tracker(settings, found)):
+        yield step.index, step.tracks
+
+
+def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False) -> Tracker:
+    """The tracker that the settings describe, for these measurements in metres."""
+    radar, common = settings.radar, settings.tracker
+    return Tracker(
+        model=motion(radar, found.dim),
+        estimator=estimator(radar, found),
+        associate=METHODS[common.method](),
+        gate=Gate(common.gate_probability, common.distance, radar.euclidean_radius_m),
+        life=LifeCycle(
+            confirm_hits=common.confirm_hits,
+            confirm_window=common.confirm_window,
+            coast_scans=radar.coast_scans,
+        ),
+        detection_probability=radar.detection_probability,
+        clutter_density=radar.clutter_density or clutter_density(found),
+        explain=explain,
+    )

@@ -1,0 +1,98 @@
+"""Deferred decisions: a track is a tree whose leaves, rows of the bank, are what it may have done so far."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from vidtrack.associate.problem import Problem
+from vidtrack.scan import Decision, Event, Floats, Ints
+from vidtrack.tracking.register import Register
+
+Mask = np.ndarray
+
+
+class Forest(Protocol):
+    """The trees of a tracker, one leaf a row of its bank and register; leaves of one tree have one track id.
+
+    shown  rows of the tracks that are believed at present, at most one of each tree
+    sure   (T,) rows whose tree is no matter of doubt any more
+    """
+
+    @property
+    def shown(self) -> Ints: ...
+
+    @property
+    def sure(self) -> Mask: ...
+
+    def grow(
+        self, problem: Problem, register: Register, starts: Mask, clutter: float, events: list[Event]
+    ) -> tuple[Decision, Mask]:
+        """Decide on a scan: the successors of the rows, and the measurements (M,) that start trees.
+
+        The new trees become the last rows, in the order of their measurements. starts (M,) measurements that may
+        start one; clutter density of false measurements. Takes the rows of the register over to the successors.
+        """
+
+    def settle(self, register: Register, t: float, events: list[Event]) -> None:
+        """Make up its mind about who is shown, once all rows of the scan are there."""
+
+    def keep(self, kept: Mask) -> None:
+        """Drop all rows but these; trees that are not yet in the bank stay."""
+
+    def add(self, count: int) -> None:
+        """Trees with a known first leaf, as last rows."""
+
+
+@runtime_checkable
+class Deferred(Protocol):
+    """An association rule that decides later: MHT, Split."""
+
+    def forest(self) -> Forest:
+        """A new tracker's trees."""
+
+
+class Window:
+    """What each row took in the last scans.
+
+    past  (T, N) running numbers of the measurements, newest first; -1 for none
+    age   (T,) scans since the tree began
+    seen  measurements so far
+    """
+
+    STATE = ("past", "age", "seen")
+
+    def __init__(self, scans: int) -> None:
+        self.past = np.empty((0, scans), np.int64)
+        self.age = np.empty(0, np.int64)
+        self.seen = 0
+
+    def __len__(self) -> int:
+        return len(self.age)
+
+    def move(self, parent: Ints, taken: Ints, born: Ints, measurements: int) -> None:
+        """One scan on: successors of parent (K,) took measurement taken (K,) or -1; then trees born of born (B,)."""
+        number = np.where(taken < 0, -1, taken + self.seen)
+        past = np.full((len(parent) + len(born), self.past.shape[1]), -1)
+        past[: len(parent), 1:] = self.past[parent, :-1]
+        past[:, 0] = np.concatenate([number, born + self.seen])
+        self.past = past
+        self.age = np.concatenate([self.age[parent] + 1, np.zeros(len(born), np.int64)])
+        self.seen += measurements
+
+    def keep(self, kept: Mask) -> None:
+        """Drop all rows but these."""
+        self.past, self.age = self.past[kept], self.age[kept]
+
+    def add(self, count: int) -> None:
+        """Rows that took nothing yet."""
+        self.past = np.concatenate([self.past, np.full((count, self.past.shape[1]), -1)])
+        self.age = np.concatenate([self.age, np.full(count, self.past.shape[1])])
+
+
+def one_each(parent: Ints, measurement: Ints) -> Decision:
+    """Successors (K,) of parents that take one measurement, or none (-1)."""
+    row = np.flatnonzero(measurement >= 0)
+    missed: Floats = (measurement < 0).astype(float)
+    return Decision(parent, row, measurement[row], np.ones(len(row)), missed)

@@ -1,0 +1,152 @@
+"""From the hypotheses of one scan to those of the next (Reid 1979; Cox and Hingorani 1996)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vidtrack.associate.kbest import k_best
+from vidtrack.compiled import CACHE
+from vidtrack.scan import Floats, Ints
+from vidtrack.tracking.hypotheses import Hypotheses, Mask, log_sum
+
+NEVER = -1e6
+"""ln of a factor that is zero in a limit: P_D of zero or one, no clutter. The fewest such factors then win."""
+
+
+def log(value: Floats | float) -> Floats:
+    """ln, at least NEVER."""
+    with np.errstate(divide="ignore"):
+        return np.maximum(np.log(value), NEVER)
+
+
+def children(
+    parents: Hypotheses,
+    group: Ints,
+    pair_row: Ints,
+    pair_measurement: Ints,
+    log_ratio: Floats,
+    log_missed: Floats,
+    log_new: Floats,
+    most: int,
+    slack: float,
+) -> Hypotheses:
+    """The `most` likeliest children of all hypotheses of each cluster, and their probabilities.
+
+    group (M,) cluster of each measurement; pairs (P,) of leaves and measurements with log_ratio = ln(P_D N(v; 0, S)
+    / clutter density); log_missed (T,) = ln(1 - P_D); log_new (M,) = ln(new density / clutter density). In each
+    child every measurement continues one leaf of its parent, starts a track or is false (Reid's formula over the
+    clutter density of all measurements, SPEC 001). Children less probable than the likeliest by over `slack` [ln]
+    are left out.
+
+    The children's leaves are codes: pair p is p, leaf t missed is P + t, a track that measurement j starts is
+    P + T + j.
+    """
+    clusters, measurements = len(parents.first) - 1, len(group)
+    in_cluster = np.argsort(group, kind="stable")
+    begin = np.searchsorted(group[in_cluster], np.arange(clusters + 1))
+    of_measurement = np.argsort(pair_measurement, kind="stable")
+    pairs = np.searchsorted(pair_measurement[of_measurement], np.arange(measurements + 1))
+    return Hypotheses(
+        *_children(
+            parents.first, parents.log_p, parents.start, parents.leaf, begin, in_cluster, pairs, of_measurement,
+            pair_row, log_ratio, log_missed, log_new, most, slack,
+        )
+    )  # fmt: skip
+
+
+@njit(cache=CACHE, nogil=True)
+def _children(
+    first: Ints, log_p: Floats, start: Ints, leaf: Ints, begin: Ints, in_cluster: Ints,
+    pairs: Ints, of_measurement: Ints, pair_row: Ints, log_ratio: Floats, log_missed: Floats, log_new: Floats,
+    most: int, slack: float,
+) -> tuple[Ints, Floats, Ints, Ints]:  # fmt: skip
+    n_pairs, leaves = len(pair_row), len(log_missed)
+    local, got = np.full(leaves, -1), np.full(leaves, -1)
+    out_first, out_start = [0], [0]
+    out_p, out_code = [0.0 for _ in range(0)], [0 for _ in range(0)]  # empty, of a type the compiler knows
+    for c in range(len(first) - 1):
+        a, b = first[c], first[c + 1]
+        members = [0 for _ in range(0)]
+        for e in range(start[a], start[b]):
+            if local[leaf[e]] < 0:
+                local[leaf[e]] = len(members)
+                members.append(leaf[e])
+        offset, held = -log_p[a:b], np.zeros((b - a, len(members)), np.bool_)
+        for i in range(b - a):
+            for e in range(start[a + i], start[a + i + 1]):
+                held[i, local[leaf[e]]] = True
+                offset[i] -= log_missed[leaf[e]]
+        own = in_cluster[begin[c] : begin[c + 1]]
+        edge, column, cost = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
+        bound, alone = np.zeros(len(own) + 1, np.int64), np.zeros((len(own), 2))
+        for i in range(len(own)):
+            for s in range(pairs[own[i]], pairs[own[i] + 1]):
+                p = of_measurement[s]
+                t = pair_row[p]
+                if local[t] >= 0:
+                    edge.append(p)
+                    column.append(local[t])
+                    cost.append(log_missed[t] - log_ratio[p])
+            bound[i + 1] = len(edge)
+            alone[i, 1] = -log_new[own[i]]
+        problem, choice, total = k_best(offset, held, bound, np.array(column), np.array(cost), alone, most, slack)
+        total = -total - log_sum(-total)
+        for n in range(len(problem)):
+            h = a + problem[n]
+            for i in range(len(own)):
+                if choice[n, i] >= 0:
+                    p = edge[choice[n, i]]
+                    got[pair_row[p]] = p
+                elif choice[n, i] == -2:
+                    out_code.append(n_pairs + leaves + own[i])
+            for e in range(start[h], start[h + 1]):
+                t = leaf[e]
+                out_code.append(n_pairs + t if got[t] < 0 else got[t])
+                got[t] = -1
+            out_p.append(total[n])
+            out_start.append(len(out_code))
+        out_first.append(len(out_p))
+        for t in members:
+            local[t] = -1
+    return np.array(out_first), np.array(out_p), np.array(out_start), np.array(out_code)
+
+
+@njit(cache=CACHE, nogil=True)
+def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, young: Mask) -> Mask:
+    """(H,) hypotheses that agree with the likeliest of their cluster about one scan in the past.
+
+    Of each leaf: tree (T,), decided (T,) the measurement it took in that scan, young (T,) whether the scan began
+    its tree. Others agree with a track that only one of the two has: one of them has given it up since.
+    """
+    agrees = np.ones(len(start) - 1, np.bool_)
+    taken = np.empty(tree.max() + 1 if len(tree) else 0, np.int64)
+    has = np.zeros(len(taken), np.bool_)
+    for c in range(len(first) - 1):
+        best = first[c]
+        begun = 0
+        for e in range(start[best], start[best + 1]):
+            t = leaf[e]
+            has[tree[t]], taken[tree[t]] = True, decided[t]
+            begun += young[t]
+        for h in range(best + 1, first[c + 1]):
+            others = 0
+            for e in range(start[h], start[h + 1]):
+                t = leaf[e]
+                others += young[t]
+                agrees[h] &= taken[tree[t]] == decided[t] if has[tree[t]] else not young[t]
+            agrees[h] &= others == begun
+        for e in range(start[best], start[best + 1]):
+            has[tree[leaf[e]]] = False
+    return agrees
+
+
+@njit(cache=CACHE, nogil=True)
+def likeliest(start: Ints, value: Floats, most: int) -> Mask:
+    """(P,) the `most` pairs of largest value in each row; row t has the pairs start[t]..start[t + 1]."""
+    chosen = np.ones(len(value), np.bool_)
+    for t in range(len(start) - 1):
+        if start[t + 1] - start[t] > most:
+            order = np.argsort(-value[start[t] : start[t + 1]], kind="mergesort")
+            chosen[start[t] + order[most:]] = False
+    return chosen

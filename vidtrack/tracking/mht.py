@@ -1,0 +1,208 @@
+"""Multiple hypothesis tracking (Reid 1979), with k-best assignments (Cox and Hingorani 1996)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.associate.clusters import clusters
+from vidtrack.associate.problem import Problem
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Decision, Event, Floats, Ints
+from vidtrack.tracking.forest import Window, one_each
+from vidtrack.tracking.generation import NEVER, agreeing, children, likeliest, log
+from vidtrack.tracking.hypotheses import Hypotheses, surviving
+from vidtrack.tracking.register import Register
+
+SURE = 0.9
+"""A track is confirmed only when the hypotheses that have it are together at least so probable."""
+NEW_SHARE = 0.1
+"""Density of new targets per density of clutter, where none is given."""
+
+Mask = np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class MHT:
+    """Multiple hypotheses: what a measurement was is decided scans later, by what came after.
+
+    n_scan       a scan is decided so many scans later, as the likeliest hypothesis has it
+    hypotheses   likeliest ones kept in each cluster
+    threshold    less probable ones are dropped
+    mass         the likeliest that sum to this probability are enough
+    branches     likeliest measurements a leaf may take
+    new_density  density of new targets' first measurements [per unit of measurement space]; None: a tenth of the
+                 clutter density
+
+    A track is confirmed when its life cycle says so and no hypothesis doubts it any more. Blobs shared by several
+    vehicles (Groups) are not recognised by this rule.
+    """
+
+    n_scan: int = 3
+    hypotheses: int = 100
+    threshold: float = 1e-4
+    mass: float = 0.9999
+    branches: int = 10
+    new_density: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.n_scan <= 20:
+            raise ConfigError(f"n_scan is {self.n_scan}; it must lie in 1..20 (hypotheses=1 decides at once)")
+        for name in ("hypotheses", "branches"):
+            if not 1 <= getattr(self, name) <= 100_000:
+                raise ConfigError(f"{name} is {getattr(self, name)}; it must lie in 1..100000")
+        if not 0 <= self.threshold < 1:
+            raise ConfigError(f"threshold is {self.threshold}; it must be at least 0 and below 1")
+        if not 0 < self.mass <= 1:
+            raise ConfigError(f"mass is {self.mass}; it must be above 0, at most 1")
+        if self.new_density is not None and not 0 <= self.new_density < np.inf:
+            raise ConfigError(f"density of new targets is {self.new_density}; it must be a finite number from 0 on")
+
+    def forest(self) -> HypothesisForest:
+        """A new tracker's trees."""
+        return HypothesisForest(self)
+
+
+class HypothesisForest:
+    """Trees of which hypotheses choose leaves.
+
+    told  (T,) rows whose tree has been shown
+    """
+
+    STATE = ("hypotheses", "window", "sure", "told", "shown")
+
+    def __init__(self, rule: MHT) -> None:
+        self.rule = rule
+        self.hypotheses = Hypotheses.none()
+        self.window = Window(rule.n_scan)
+        self.sure = np.empty(0, bool)
+        self.told = np.empty(0, bool)
+        self.shown = np.empty(0, np.int64)
+
+    def grow(
+        self, problem: Problem, register: Register, starts: Mask, clutter: float, events: list[Event]
+    ) -> tuple[Decision, Mask]:
+        """Cluster, generate, prune, decide the scan N back."""
+        rule, count = self.rule, problem.measurements
+        problem = problem.only(likeliest(problem.pairs.start, problem.pairs.log_l, rule.branches))
+        pairs, rows = problem.pairs, problem.rows
+        tree = np.unique(register.id, return_inverse=True)[1]
+        parents, group = self._clustered(tree, pairs.row, pairs.measurement, count)
+        log_ratio = (log(problem.detection) - log(problem.clutter))[pairs.row] + pairs.log_l
+        most, slack = rule.hypotheses, float(-log(rule.threshold))
+        found = children(
+            parents, group, pairs.row, pairs.measurement, log_ratio, log(problem.missed),
+            np.where(starts, self._log_new(clutter), NEVER), most, slack,
+        )  # fmt: skip
+        found = found.only(surviving(found.first, found.log_p, rule.threshold, most, rule.mass))
+
+        source = np.concatenate([pairs.row, np.arange(rows)])  # leaf that a code comes from; births come after
+        none = np.full(count, -1)
+        whose = np.concatenate([tree[source], rows + np.arange(count)])
+        then = np.concatenate([self.window.past[source, -1], none])
+        young = np.concatenate([self.window.age[source] + 1, none]) == rule.n_scan
+        found = found.only(agreeing(found.first, found.start, found.leaf, whose, then, young))
+
+        used = np.zeros(len(source) + count, bool)
+        used[found.leaf] = True
+        self.hypotheses = found._replace(leaf=(np.cumsum(used) - 1)[found.leaf])
+        grown, born = used[: len(source)], used[len(source) :]
+        parent = source[grown]
+        taken = np.concatenate([pairs.measurement, np.full(rows, -1)])[grown]
+        self.window.move(parent, taken, np.flatnonzero(born), count)
+        gone = np.setdiff1d(register.id, register.id[parent])
+        events.extend(Event(problem.scan.t, int(i), "delete", "no likely hypothesis holds it") for i in gone)
+        register.keep(parent)
+        self.told = np.concatenate([self.told[parent], np.zeros(born.sum(), bool)])
+        self.shown = self.hypotheses.best
+        return one_each(parent, taken), born
+
+    def settle(self, register: Register, t: float, events: list[Event]) -> None:
+        """The likeliest hypothesis is shown, and what may have begun with a measurement that it calls false.
+
+        A tree that is not shown any more will come back, if ever, under another id.
+        """
+        best, newest = self.hypotheses.best, self.window.past[:, 0]
+        begun = np.flatnonzero((self.window.age == 0) & ~np.isin(newest, newest[best]))
+        self.shown = np.concatenate([best, begun])
+        now = np.isin(register.id, register.id[self.shown])
+        for old, new in zip(*register.rename(self.told & ~now), strict=True):
+            events.append(Event(t, int(old), "delete", "the likeliest hypothesis has no such track"))
+            events.append(Event(t, int(new), "birth", f"less likely hypotheses go on with track {old}"))
+        self.told = now
+        self.sure = self._probability(register.id) >= SURE
+
+    def keep(self, kept: Mask) -> None:
+        """Drop all rows but these; hypotheses that differ in others only become one."""
+        kept = np.concatenate([kept, np.ones(len(self.window) - len(kept), bool)])
+        label = self._cluster_of_leaf()
+        label[~kept] = -1
+        found = self.hypotheses.marginal(label)
+        self.hypotheses = found._replace(leaf=(np.cumsum(kept) - 1)[found.leaf])
+        self.window.keep(kept)
+        self.told = self.told[kept]
+        self.shown = self.hypotheses.best
+
+    def add(self, count: int) -> None:
+        """Trees in the only hypothesis of a cluster of their own."""
+        first, more = len(self.window), np.arange(1, count + 1)
+        old = self.hypotheses
+        self.hypotheses = Hypotheses(
+            np.concatenate([old.first, old.first[-1] + more]),
+            np.concatenate([old.log_p, np.zeros(count)]),
+            np.concatenate([old.start, old.start[-1] + more]),
+            np.concatenate([old.leaf, first + more - 1]),
+        )
+        self.window.add(count)
+        self.shown = np.concatenate([self.shown, first + more - 1])
+        self.told = np.concatenate([self.told, np.ones(count, bool)])
+        self.sure = np.concatenate([self.sure, np.ones(count, bool)])
+
+    def _clustered(self, tree: Ints, row: Ints, measurement: Ints, count: int) -> tuple[Hypotheses, Ints]:
+        """The hypotheses in the clusters that this scan makes, and the cluster (M,) of each measurement.
+
+        Trees that took no measurement in common in the undecided scans are independent; a measurement in the gates
+        of several clusters makes them one; one in nobody's gate is a cluster by itself.
+        """
+        apart = self.hypotheses.marginal(self._linked(tree))
+        cluster = np.zeros(len(tree), np.int64)
+        cluster[apart.leaf] = apart.cluster
+        joined = clusters(cluster[row], measurement, len(apart.first) - 1, count)
+        names, group = np.unique(joined, return_inverse=True)
+        owner = np.full(count, -1)
+        owner[measurement] = group[cluster[row]]
+        alone = owner < 0
+        owner[alone] = len(names) + np.arange(alone.sum())
+        slack = float(-log(self.rule.threshold))
+        return apart.merged(group, len(names) + int(alone.sum()), self.rule.hypotheses, slack), owner
+
+    def _linked(self, tree: Ints) -> Ints:
+        """(T,) leaves that depend on each other have the same number."""
+        past = self.window.past
+        leaf, scan = np.nonzero(past >= 0)
+        number = past[leaf, scan]
+        number -= number.min(initial=0)
+        trees = number.max(initial=-1) + 1 + tree
+        every = np.arange(len(tree))
+        return clusters(
+            np.concatenate([leaf, every]), np.concatenate([number, trees]), len(tree), int(trees.max(initial=-1)) + 1
+        )
+
+    def _cluster_of_leaf(self) -> Ints:
+        """(T,) cluster of each row."""
+        cluster = np.full(len(self.window), -1)
+        cluster[self.hypotheses.leaf] = self.hypotheses.cluster
+        return cluster
+
+    def _probability(self, name: Ints) -> Floats:
+        """(T,) sum of the probabilities of the hypotheses that have a leaf of each row's tree of this name."""
+        tree = np.unique(name, return_inverse=True)[1]
+        p = np.repeat(np.exp(self.hypotheses.log_p), np.diff(self.hypotheses.start))
+        held: Floats = np.bincount(tree[self.hypotheses.leaf], p, len(name)).astype(float)
+        return held[tree]
+
+    def _log_new(self, clutter: float) -> float:
+        """ln of the density of new targets over that of clutter."""
+        new = self.rule.new_density
+        return float(np.log(NEW_SHARE) if new is None else log(new) - log(clutter))

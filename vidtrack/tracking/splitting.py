@@ -1,0 +1,161 @@
+"""Track splitting, or branching (Smith and Buechler 1975): each report a track may have had makes a branch of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri
+
+from vidtrack.associate.problem import Problem
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Decision, Event, Floats, Ints
+from vidtrack.tracking.forest import Window, one_each
+from vidtrack.tracking.generation import likeliest, log
+from vidtrack.tracking.register import Register
+
+Mask = np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Track splitting: every gated report, and the miss, continues a track in a branch of its own.
+
+    n_scan       branches that took the same measurements in so many scans are one
+    leaves       likeliest branches kept of each track
+    branches     likeliest measurements a branch may take
+    probability  share of true branches that the test of their score admits: the sum of v' S^-1 v over the last
+                 n_scan scans is chi-square distributed
+
+    Nothing is exclusive: a measurement may serve several tracks. A branch that had nothing in common with its
+    track's likeliest in n_scan scans, and no miss, becomes a track of its own; what lies in a gate starts none.
+    """
+
+    n_scan: int = 3
+    leaves: int = 20
+    branches: int = 10
+    probability: float = 0.999
+
+    def __post_init__(self) -> None:
+        for name, most in (("n_scan", 20), ("leaves", 10_000), ("branches", 10_000)):
+            if not 1 <= getattr(self, name) <= most:
+                raise ConfigError(f"{name} is {getattr(self, name)}; it must lie in 1..{most}")
+        if not 0 < self.probability < 1:
+            raise ConfigError(f"branch probability is {self.probability}; it must lie between 0 and 1")
+
+    def forest(self) -> BranchForest:
+        """A new tracker's trees."""
+        return BranchForest(self)
+
+
+class BranchForest:
+    """Trees whose branches know nothing of each other.
+
+    score  (T, N) v' S^-1 v of the last scans, newest first, zero for a miss
+    log_l  (T,) log-likelihood ratio of each branch, target against none
+    """
+
+    STATE = ("window", "score", "log_l", "shown")
+
+    def __init__(self, rule: Split) -> None:
+        self.rule = rule
+        self.window = Window(rule.n_scan)
+        self.score = np.empty((0, rule.n_scan))
+        self.log_l = np.empty(0)
+        self.shown = np.empty(0, np.int64)
+
+    @property
+    def sure(self) -> Mask:
+        """(T,) true: branches are no matter of doubt for others."""
+        return np.ones(len(self.window), bool)
+
+    def grow(
+        self, problem: Problem, register: Register, starts: Mask, clutter: float, events: list[Event]
+    ) -> tuple[Decision, Mask]:
+        """Branch, drop what scores badly, merge what has become the same, let go what is a track of its own."""
+        gated = np.zeros(problem.measurements, bool)
+        gated[problem.pairs.measurement] = True
+        born = np.flatnonzero(starts & ~gated)
+        problem = problem.only(likeliest(problem.pairs.start, problem.pairs.log_l, self.rule.branches))
+        pairs, every = problem.pairs, np.arange(problem.rows)
+        log_ratio = (log(problem.detection) - log(problem.clutter))[pairs.row] + pairs.log_l
+        parent = np.concatenate([pairs.row, every])
+        taken = np.concatenate([pairs.measurement, np.full(len(every), -1)])
+        newest = np.concatenate([pairs.nis, np.zeros(len(every))])
+        self.score = np.column_stack([newest, self.score[parent, :-1]])
+        self.log_l = self.log_l[parent] + np.concatenate([log_ratio, log(problem.missed)])
+        self.window.move(parent, taken, born, problem.measurements)
+
+        tree = register.id[parent]
+        alive = self._plausible(tree, problem.cov.shape[1])
+        alive = alive[self._different(tree[alive], self.window.past[alive], self.window.age[alive], self.log_l[alive])]
+        alive = np.sort(alive[_rank(tree[alive], self.log_l[alive]) < self.rule.leaves])
+        self.window.keep(np.concatenate([alive, len(parent) + np.arange(len(born))]))
+        self.score = np.concatenate([self.score[alive], np.zeros((len(born), self.rule.n_scan))])
+        self.log_l = np.concatenate([self.log_l[alive], np.zeros(len(born))])
+        t, before = problem.scan.t, register.id
+        register.keep(parent[alive])
+        for track in np.setdiff1d(before, register.id):
+            events.append(Event(t, int(track), "delete", "another track took the same measurements"))
+        self._show(np.concatenate([register.id, -1 - np.arange(len(born))]))
+        return one_each(parent[alive], taken[alive]), np.isin(np.arange(problem.measurements), born)
+
+    def settle(self, register: Register, t: float, events: list[Event]) -> None:
+        """The likeliest branch that has nothing in common with its tree's likeliest becomes a tree of its own."""
+        self._show(register.id)
+        past, log_l = self.window.past, self.log_l
+        trees, tree = np.unique(register.id, return_inverse=True)
+        best = np.empty(len(trees), np.int64)
+        best[tree[self.shown]] = self.shown
+        apart = np.flatnonzero((past >= 0).all(axis=1) & (past != past[best[tree]]).all(axis=1))
+        leaving = apart[_rank(tree[apart], log_l[apart]) == 0]
+        for old, new in zip(*register.rename(leaving), strict=True):
+            events.append(Event(t, int(new), "birth", f"a branch of track {old} went its own way"))
+        self._show(register.id)
+
+    def keep(self, kept: Mask) -> None:
+        """Drop all rows but these."""
+        kept = np.concatenate([kept, np.ones(len(self.window) - len(kept), bool)])
+        self.window.keep(kept)
+        self.score, self.log_l = self.score[kept], self.log_l[kept]
+        self.shown = np.empty(0, np.int64)  # until it is settled
+
+    def add(self, count: int) -> None:
+        """Trees of one branch each."""
+        self.shown = np.concatenate([self.shown, len(self.window) + np.arange(count)])
+        self.window.add(count)
+        self.score = np.concatenate([self.score, np.zeros((count, self.rule.n_scan))])
+        self.log_l = np.concatenate([self.log_l, np.zeros(count)])
+
+    def _plausible(self, tree: Ints, dim: int) -> Ints:
+        """Rows whose score passes, and the likeliest of each tree whatever its score."""
+        updates = (self.window.past[: len(tree)] >= 0) & (self.score > 0)
+        limit = chdtri(np.maximum(1, dim * updates.sum(axis=1)), 1 - self.rule.probability)
+        return np.flatnonzero((self.score.sum(axis=1) <= limit) | (_rank(tree, self.log_l) == 0))
+
+    def _different(self, tree: Ints, past: Ints, age: Ints, log_l: Floats) -> Ints:
+        """One of the rows that took the same measurements: a tree's likeliest, then the oldest, then the likeliest.
+
+        Rows with a miss are the same in one tree only. A tree whose likeliest is another's too goes altogether.
+        """
+        whose = np.where((past >= 0).all(axis=1), -1, tree)
+        best = _rank(tree, log_l) == 0
+        order = np.lexsort((-log_l, -age, ~best, whose, *past.T))
+        same = (past[order[1:]] == past[order[:-1]]).all(axis=1) & (np.diff(whose[order]) == 0)
+        first = np.ones(len(order), bool)
+        first[1:] = ~same
+        lost = np.setdiff1d(tree[best], tree[order[first]][best[order[first]]])
+        return order[first & ~np.isin(tree[order], lost)]
+
+    def _show(self, tree: Ints) -> None:
+        """Each tree shows its likeliest branch."""
+        self.shown = np.flatnonzero(_rank(tree, self.log_l) == 0)
+
+
+def _rank(tree: Ints, log_l: Floats) -> Ints:
+    """(T,) place of each row among those of its tree, the likeliest first."""
+    order = np.lexsort((-log_l, tree))
+    first = np.searchsorted(tree[order], tree[order])
+    rank = np.empty(len(tree), np.int64)
+    rank[order] = np.arange(len(tree)) - first
+    return rank

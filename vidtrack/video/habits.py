@@ -1,0 +1,129 @@
+"""What stored detections tell of their own detector: which scores to trust, how boxes shake, how objects move.
+
+A real object is found again where it was, a false one seldom: the share of boxes of a score that have a like in
+the frames next to theirs says how often that score is right. On MOT15 and KITTI detections it rises with the score
+as the share of true boxes does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from vidtrack.compiled import CACHE
+from vidtrack.scan import Floats, Ints
+
+REACH, ALIKE = 0.5, 1.35
+"""A like: a box in the next frame within REACH of its longer side, its sides at most ALIKE times as long or short."""
+TRUSTED, BEST = 0.8, 0.9
+"""A score is trusted if its boxes are found again at least TRUSTED times as often as those of rank BEST and better."""
+LONGEST_S = 1.0
+"""s; longest lag over which motion is compared."""
+ENOUGH = 30
+"""Fewer boxes in a row tell nothing about shaking and motion."""
+MARGIN = 1.5
+"""Neighbouring frames err alike, and chains of boxes break where motion is wild: both are larger than they look."""
+LEAST_ACCEL = 0.2
+TINY = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Habits:
+    """Of a detector and its scene. Object size is the longer side of a box.
+
+    sure_score  least trusted score, as the share of detections that do not score higher
+    jitter      object sizes; standard deviation of a box's centre
+    accel       object sizes/s^2; standard deviation of the acceleration of objects in the picture
+
+    The last two are None where the file is too short to tell.
+    """
+
+    sure_score: float
+    jitter: float | None
+    accel: float | None
+
+
+def habits(frame: Ints, box: Floats, rank: Floats, fps: float, hold_s: float) -> Habits:
+    """Habits of the detector that gave boxes (N, 4) in frames (N,), sorted by frame, with ranks (N,) in 0..1.
+
+    hold_s  s; correlation time of the acceleration
+    """
+    centre = box[:, :2] + box[:, 2:] / 2
+    order = np.lexsort((centre[:, 0], frame))
+    frame, centre, size, rank = frame[order], centre[order], box[order, 2:], rank[order]
+    start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
+    after, before = _likes(start, centre, size, 1), _likes(start, centre, size, -1)
+    neighbours = (frame > frame[0]).astype(float) + (frame < frame[-1])
+    found = ((after >= 0).astype(float) + (before >= 0)) / np.maximum(neighbours, 1)
+    follows = (after >= 0) & (before[after] == np.arange(len(after)))
+    jitter, accel = _motion(np.where(follows, after, -1), centre, size.max(axis=1), fps, hold_s)
+    return Habits(_sure_score(rank, found), jitter, accel)
+
+
+def _sure_score(rank: Floats, found: Floats) -> float:
+    """Least rank whose boxes are found again often enough; a higher score is never taken for less (isotonic fit)."""
+    from scipy.optimize import isotonic_regression
+
+    levels, which, count = np.unique(rank, return_inverse=True, return_counts=True)
+    share = isotonic_regression(np.bincount(which, found) / count, weights=count).x
+    best = share[which][rank >= min(BEST, levels[-1])].mean()
+    return float(levels[share >= TRUSTED * best][0])
+
+
+def _motion(
+    follower: Ints, centre: Floats, size: Floats, fps: float, hold_s: float
+) -> tuple[float | None, float | None]:
+    """Jitter and acceleration from the second differences of centres (N, 2) along chains of boxes.
+
+    follower (N,) is the same object's box in the next frame, -1 for none. The variance of
+    (c(t) - 2 c(t + lag) + c(t + 2 lag)) / size is 6 jitter^2 + 2/3 accel^2 hold_s lag^3 on each axis, if boxes err
+    independently and the acceleration is white; lags of 1, 2, 4, ... frames tell the two apart.
+    """
+    from scipy.optimize import nnls
+
+    lags, variances = [], []
+    frames = 1
+    while frames <= max(2.0, LONGEST_S * fps):
+        middle, end = follower, np.where(follower >= 0, follower[follower], -1)
+        chain = end >= 0
+        if chain.sum() < ENOUGH:
+            break
+        bend = (centre[chain] - 2 * centre[middle[chain]] + centre[end[chain]]) / size[chain, None]
+        lags.append(frames / fps)
+        variances.append(max(float(np.mean(bend**2)), TINY))
+        follower, frames = end, 2 * frames
+    if len(lags) < 2:
+        return None, None
+    lag, variance = np.array(lags), np.array(variances)
+    terms = np.column_stack([np.full(len(lag), 6.0), 2 / 3 * hold_s * lag**3])
+    parts, _ = nnls(terms / variance[:, None], np.ones(len(lag)))
+    jitter, accel = MARGIN * np.sqrt(parts)
+    return float(jitter), max(float(accel), LEAST_ACCEL)
+
+
+@njit(cache=CACHE, nogil=True)
+def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
+    """(N,) nearest like of each box in the frame `step` away, -1 for none.
+
+    Boxes start[k]..start[k + 1] are those of frame k, in the order of their centres' first axis.
+    """
+    like = np.full(len(centre), -1)
+    frames = len(start) - 1
+    for k in range(max(0, -step), min(frames, frames - step)):
+        others = centre[start[k + step] : start[k + step + 1], 0]
+        for i in range(start[k], start[k + 1]):
+            reach = REACH * max(size[i, 0], size[i, 1])
+            nearest = reach * reach
+            first = start[k + step] + np.searchsorted(others, centre[i, 0] - reach)
+            for j in range(first, start[k + step + 1]):
+                dx, dy = centre[j, 0] - centre[i, 0], centre[j, 1] - centre[i, 1]
+                if dx > reach:
+                    break
+                alike = True
+                for axis in range(2):
+                    alike &= size[i, axis] < ALIKE * size[j, axis] and size[j, axis] < ALIKE * size[i, axis]
+                if alike and dx * dx + dy * dy < nearest:
+                    nearest, like[i] = dx * dx + dy * dy, j
+    return like

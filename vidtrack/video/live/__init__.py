@@ -1,0 +1,1 @@
+"""Live capture: cameras and streams become frames with true times, whatever happens to the connection."""

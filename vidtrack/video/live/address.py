@@ -1,0 +1,93 @@
+"""Addresses of live sources: what they mean to FFmpeg, and how they may be shown."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from vidtrack.errors import SourceError
+
+HIDDEN = "***"
+_SCHEMES = ("rtsp", "rtsps", "http", "https")
+_USER = re.compile(r"://([^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$)).*@)")
+_SECRET_FIELD = re.compile(r"([?&;](?:pass\w*|pwd|user\w*|usr|auth\w*|token|\w*key|secret|sig\w*)=)[^&;#\s]*", re.I)
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where a live source is.
+
+    url      what FFmpeg opens; it may hold a password and is left out of the repr
+    shown    the same without credentials: for logs, errors, results
+    name     what to call the run
+    format   FFmpeg's input format; None: by the address
+    options  FFmpeg's options for opening it
+    """
+
+    url: str = field(repr=False)
+    shown: str
+    name: str
+    format: str | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_device(self) -> bool:
+        """Whether this is a camera of this machine."""
+        return self.format == "v4l2"
+
+
+def parse_address(source: str, timeout_s: float) -> Address:
+    """A camera index, a V4L2 device, or an rtsp://, rtsps://, http://, https:// address.
+
+    timeout_s  for FFmpeg's own sockets, beside the reader's
+
+    Raises SourceError for anything else.
+    """
+    if source.isdecimal():
+        source = f"/dev/video{int(source)}"
+    shown = redact(source)
+    scheme, separator, _ = source.partition("://")
+    if not separator:
+        return _device(Path(source))
+    if scheme not in _SCHEMES:
+        raise SourceError(f"cannot read {shown}: {scheme}:// is not supported; use {', '.join(_SCHEMES)}, or a camera")
+    microseconds = str(round(timeout_s * 1e6))
+    options = {"rw_timeout": microseconds}
+    if scheme.startswith("rtsp"):
+        # TCP: lost UDP packets become grey smears that look like vehicles.
+        options = {"rtsp_transport": "tcp", "timeout": microseconds, "allowed_media_types": "video"}
+    return Address(source, shown, urlsplit(shown).netloc.rpartition("@")[2] or scheme, None, options)
+
+
+def redact(address: str) -> str:
+    """The address without user name, password or secret query fields.
+
+    A password may hold "@", "/" or "?" that should have been escaped: rather too much is hidden than too little.
+    """
+    if _USER.search(address):
+        address = re.sub("://.*@", f"://{HIDDEN}@", address)
+    return _SECRET_FIELD.sub(rf"\1{HIDDEN}", address)
+
+
+def secrets(address: str) -> list[str]:
+    """The parts of the address that `redact` hides."""
+    return [text for text in _between(address, redact(address)) if text]
+
+
+def _between(whole: str, shown: str) -> list[str]:
+    pattern = "(.*)".join(re.escape(part) for part in shown.split(HIDDEN))
+    match = re.fullmatch(pattern, whole)
+    return list(match.groups()) if match else []
+
+
+def _device(path: Path) -> Address:
+    if path.is_file():
+        raise SourceError(f"{path} is a file, not a camera; read it with vidtrack track")
+    if not path.exists():
+        raise SourceError(
+            f"no such device {path}; give a camera index, a device such as /dev/video0, or an rtsp:// or http:// stream"
+        )
+    return Address(str(path), str(path), path.name, "v4l2")

@@ -1,0 +1,146 @@
+"""One connection to a live source: opened, read and decoded until something goes wrong."""
+
+from __future__ import annotations
+
+import errno
+import socket
+from collections.abc import Iterator, Sequence
+from time import monotonic
+from urllib.parse import urlsplit
+
+import av
+import av.format
+
+from vidtrack.errors import SourceError
+from vidtrack.video.live.address import Address
+from vidtrack.video.planes import planar
+
+_RAW = "rawvideo"
+_PROBE_S = 2.0  # FFmpeg looks at a stream for up to 5 s by itself; nothing it finds after 2 s matters here
+
+
+class Refused(SourceError):  # noqa: N818
+    """The source said no, and will say so again: authentication, permission, no video in it."""
+
+
+class Stalled(SourceError):  # noqa: N818
+    """The connection stands and nothing comes."""
+
+
+class Connection:
+    """An open stream.
+
+    fps    nominal frames/s, None if the stream does not say
+    codec  FFmpeg's name of the coding
+    is_raw whether packets are plain pixels; its pictures are then planar
+
+    options  NAME=VALUE for FFmpeg, beside and above the address's own
+
+    Raises Refused, Stalled or another SourceError when it cannot be opened, never naming a password.
+    """
+
+    def __init__(self, address: Address, timeout_s: float, options: Sequence[str] = ()) -> None:
+        self._address = address
+        self._timeout_s = timeout_s
+        self._container = _open(address, timeout_s, options)
+        self.stream = _video_stream(self._container, address)
+        self._coder = self.stream.codec_context
+        self._coder.thread_type = "SLICE"  # frame threads hold back a picture each
+        self._coder.copy_opaque = True
+        self.fps = float(self.stream.average_rate or 0) or None
+        self.codec = self._coder.name
+        self.is_raw = self.codec == _RAW
+        # Formats without time stamps get invented ones.
+        flags = self._container.format.flags
+        self._has_stamps = not flags & av.format.Flags.no_timestamps.value  # type: ignore[operator]
+
+    def packets(self) -> Iterator[av.Packet]:
+        """Packets of the video. Ends with Stalled after the time-out, or with another SourceError; never by itself."""
+        began = heard = monotonic()
+        reason = "the stream ended"
+        try:
+            for packet in self._container.demux():
+                quiet = monotonic() - heard > 0.9 * self._timeout_s
+                if quiet:  # what comes now is what FFmpeg had held back
+                    break
+                if packet.stream is self.stream and packet.size:
+                    heard = monotonic()
+                    yield packet
+        except av.FFmpegError as error:
+            reason = error.strerror or str(error.errno)
+        if monotonic() - heard > 0.9 * self._timeout_s:
+            raise Stalled(f"{self._address.shown} is connected, but nothing came for {self._timeout_s:g} s")
+        raise SourceError(f"lost {self._address.shown} after {monotonic() - began:.1f} s: {reason}")
+
+    def decode(self, packet: av.Packet | None) -> list[av.VideoFrame]:
+        """The pictures that a packet completes; None: those the decoder holds back. Raises av.FFmpegError."""
+        pictures = self._coder.decode(packet)
+        return [planar(picture) for picture in pictures] if self.is_raw else pictures
+
+    def stamp_s(self, picture: av.VideoFrame) -> float | None:
+        """The picture's own time, on the camera's clock."""
+        return picture.time if self._has_stamps else None
+
+    def start_decoder_anew(self) -> list[av.VideoFrame]:
+        """Forget everything before the next packet, as if it were the first; returns the pictures held back."""
+        pictures = self.decode(None)
+        self._coder.flush_buffers()
+        return pictures
+
+    def close(self) -> None:
+        """Hang up."""
+        self._container.close()
+
+
+def _open(address: Address, timeout_s: float, options: Sequence[str]) -> av.container.InputContainer:
+    began = monotonic()
+    own = dict(option.split("=", 1) for option in options)
+    chosen = {"analyzeduration": str(round(_PROBE_S * 1e6)), **address.options, **own}
+    try:
+        return av.open(address.url, format=address.format, options=chosen, timeout=timeout_s, metadata_errors="ignore")
+    except av.FFmpegError as error:
+        raise _complaint(address, error, timed_out=monotonic() - began > 0.9 * timeout_s, timeout_s=timeout_s) from None
+
+
+def _video_stream(container: av.container.InputContainer, address: Address) -> av.VideoStream:
+    streams = container.streams.video
+    if container.duration and not address.is_device and not container.format.name.startswith("rtsp"):
+        container.close()
+        raise Refused(f"{address.shown} is a recording, not live; download it and use vidtrack track")
+    if not streams or streams[0].codec_context is None:
+        container.close()
+        raise Refused(f"{address.shown} holds no video that FFmpeg can decode")
+    return streams[0]
+
+
+def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout_s: float) -> SourceError:
+    """What went wrong, in words that help; FFmpeg's own message would show the password."""
+    start = f"cannot open {address.shown}:"
+    if isinstance(error, (av.error.HTTPUnauthorizedError, av.error.HTTPForbiddenError)):
+        code = "401" if isinstance(error, av.error.HTTPUnauthorizedError) else "403"
+        return Refused(
+            f"{start} the camera refuses the user or the password ({code}); "
+            "write them as rtsp://USER:PASSWORD@HOST/..., special characters as %XX"
+        )
+    if isinstance(error, av.error.HTTPNotFoundError):
+        return SourceError(f"{start} the camera knows no such path (404)")
+    if isinstance(error, PermissionError):
+        return Refused(f"{start} permission denied; add your user to the group of the device, mostly video")
+    if address.is_device:
+        return Refused(f"{start} it is no camera ({error.strerror})")
+    if timed_out:
+        return Stalled(f"{start} no answer in {timeout_s:g} s")
+    if isinstance(error, ConnectionRefusedError):
+        return SourceError(f"{start} connection refused; is the camera on, and the port right?")
+    if error.errno == errno.EIO and not _resolves(address.url):
+        return SourceError(f"{start} the host name is unknown")
+    if error.errno == errno.EIO or isinstance(error, av.error.InvalidDataError):
+        return SourceError(f"{start} what comes is not a video stream")
+    return SourceError(f"{start} {error.strerror}")
+
+
+def _resolves(url: str) -> bool:
+    try:
+        return bool(socket.getaddrinfo(urlsplit(url).hostname, None))
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,191 @@
+"""The thread that keeps a camera connected and takes its pictures."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from threading import Event, Thread
+from time import monotonic
+from typing import Any
+
+import av
+
+from vidtrack.config import LiveSettings
+from vidtrack.errors import SourceError
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.backoff import Backoff
+from vidtrack.video.live.clock import CaptureClock
+from vidtrack.video.live.connection import Connection, Refused, Stalled
+from vidtrack.video.live.mailbox import Mailbox
+from vidtrack.video.live.stats import LiveStats
+from vidtrack.video.live.tape import Place, Tape
+from vidtrack.video.planes import to_frame
+
+log = logging.getLogger(__name__)
+
+_TRIES = 3
+_EDGE_S = 0.003  # a packet that had to be waited for so long has only now arrived
+_BEHIND_S = 1.0  # without such a packet, decoding is too slow and goes on with the next key picture
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A picture as it came in.
+
+    frame  its planes; time_s is on the monotonic clock, index has no meaning yet
+    fps    nominal rate of its stream, None if unknown
+    place  of its packet in the recording
+    """
+
+    frame: Frame
+    fps: float | None
+    place: Place
+
+
+class Reader:
+    """Connects, reads, decodes, and connects again with growing pauses, until `stop`.
+
+    connect  makes a Connection
+    shots    where pictures go; closed with an error when the source cannot be opened at the start
+    alive_s  monotonic time of the thread's last sign of life
+    """
+
+    def __init__(
+        self,
+        connect: Callable[[], Connection],
+        shots: Mailbox[Shot],
+        stats: LiveStats,
+        settings: LiveSettings,
+        tape: Tape,
+        clock: CaptureClock,
+    ) -> None:
+        self._connect = connect
+        self._shots = shots
+        self._stats = stats
+        self._settings = settings
+        self._backoff = Backoff(settings.backoff_s, settings.backoff_longest_s, Random())
+        self._tape = tape
+        self._clock = clock
+        self._stopping = Event()
+        self._failures = 0  # since the last picture
+        self._connections = 0
+        self.alive_s = monotonic()
+        # A daemon: FFmpeg cannot always be interrupted, and the program must end when it is told to.
+        self._thread = Thread(target=self._run, name="camera", daemon=True)
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> None:
+        """End as soon as FFmpeg returns; wait so long for it."""
+        self._stopping.set()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._read()
+            except SourceError as error:
+                if self._stopping.is_set():
+                    break
+                self._failures += 1
+                never_seen = self._stats.received == 0
+                if never_seen and (isinstance(error, Refused) or self._failures == _TRIES):
+                    self._shots.close(error)
+                    break
+                self._complain(error, "trying again" if never_seen else "trying again for as long as it takes")
+                self._wait()
+        self._stats.state = "ended"
+
+    def _complain(self, error: SourceError, then: str) -> None:
+        """Tell the first failure; those that follow until a picture comes are only noted."""
+        self._stats.stalls += isinstance(error, Stalled)
+        if self._failures == 1:
+            self._stats.warn(f"{error}; {then}")
+        else:
+            self._stats.note(str(error))
+
+    def _wait(self) -> None:
+        self._stats.state = "waiting"
+        until = monotonic() + self._backoff.next_s()
+        while not self._stopping.is_set() and (left := until - monotonic()) > 0:
+            self.alive_s = monotonic()
+            self._stopping.wait(min(left, 1.0))
+
+    def _read(self) -> None:
+        """One connection, from its opening to its end, which is an error, or to `stop`."""
+        self._stats.state = "connecting"
+        self.alive_s = monotonic()
+        connection = self._connect()
+        try:
+            self._connections += 1
+            self._clock.reconnected()
+            self._read_packets(connection)
+        finally:
+            self._tape.hang_up()
+            connection.close()
+
+    def _read_packets(self, connection: Connection) -> None:
+        """Decode everything, and deliver from where it is live: after what FFmpeg gathered while it looked at it."""
+        live = skipping = False
+        edge_s = pictured_s = asked_s = monotonic()
+        for packet in connection.packets():
+            if self._stopping.is_set():
+                break
+            now_s = self.alive_s = monotonic()
+            if now_s - asked_s > _EDGE_S:
+                edge_s = now_s
+            slow = now_s - edge_s > _BEHIND_S
+            live = live or slow or edge_s == now_s
+            if packet.is_keyframe or (slow and not self._settings.every_frame):
+                skipping = not packet.is_keyframe
+            if self._tape.cut(connection, packet):
+                self._deliver(connection, connection.start_decoder_anew(), now_s)
+            packet.opaque = self._tape.place()
+            pictures = [] if skipping else self._decoded(connection, packet)
+            self._tape.take(packet, pictures, now_s)
+            self._stats.frames_dropped += skipping
+            if pictures:
+                pictured_s = now_s
+            elif now_s - pictured_s > self._settings.timeout_s:
+                raise Stalled(f"no picture could be decoded for {self._settings.timeout_s:g} s; is the stream damaged?")
+            if live:
+                self._deliver(connection, pictures, now_s)
+            asked_s = monotonic()
+
+    def _decoded(self, connection: Connection, packet: av.Packet) -> list[av.VideoFrame]:
+        """The whole pictures that the packet completes; a patched one would look like traffic."""
+        try:
+            pictures = connection.decode(packet)
+        except av.FFmpegError as error:
+            self._stats.count_error(f"a picture cannot be decoded: {error.strerror}")
+            return []
+        for picture in pictures:
+            if picture.is_corrupt:
+                self._stats.count_error("a picture is damaged")
+        return [picture for picture in pictures if not picture.is_corrupt]
+
+    def _deliver(self, connection: Connection, pictures: list[av.VideoFrame], now_s: float) -> None:
+        """Put pictures with their times into the box."""
+        for picture in pictures:
+            self._welcome(connection, picture)
+            time_s = self._clock.time_s(connection.stamp_s(picture), now_s)
+            self._stats.arrived(now_s)
+            place: Any = picture.opaque or self._tape.place()
+            shot = Shot(to_frame(0, time_s, picture), connection.fps, place)
+            if not self._stopping.is_set():
+                self._stats.frames_dropped += self._shots.put(shot)
+
+    def _welcome(self, connection: Connection, picture: av.VideoFrame) -> None:
+        """Say what changed when pictures come again."""
+        if self._stats.state == "running":
+            return
+        self._stats.state = "running"
+        what = f"{picture.width}x{picture.height} {connection.codec}"
+        if self._connections > 1:
+            self._stats.reconnects += 1
+            log.warning("pictures come again: %s", what)
+        else:
+            log.info("connected: %s", what)
+        self._failures = 0
+        self._backoff.reset()

@@ -1,0 +1,138 @@
+"""A live source as frames: the newest ones, with true times, for as long as somebody iterates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from time import monotonic
+from types import TracebackType
+
+from vidtrack.config import LiveSettings
+from vidtrack.video.clock import FALLBACK_FPS
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.address import Address
+from vidtrack.video.live.clock import CaptureClock
+from vidtrack.video.live.connection import Connection
+from vidtrack.video.live.mailbox import Mailbox
+from vidtrack.video.live.reader import Reader, Shot
+from vidtrack.video.live.stats import LiveStats
+from vidtrack.video.live.tape import NoTape, Place, Tape
+from vidtrack.video.planes import matched
+
+IDLE_S = 0.25
+"""How long an iteration waits for a frame before it says that there is none."""
+
+_NEWEST, _EVERY = 2, 16  # frames that may wait for the tracker
+_STUCK = 4  # time-outs without a sign of life after which a reading thread is given up
+_END_S = 0.3  # that a thread gets to end by itself
+
+
+class LiveSource:
+    """Frames of a live source; None when none came for IDLE_S. Iterate from one thread.
+
+    like           a frame of the size and kind of all
+    width, height  of the first picture [px]; later ones of another size are scaled to it
+    fps            nominal frames/s
+    stats          what came and what went wrong
+    place          where the last frame is in the recording
+    origin_s       monotonic time of time_s = 0
+
+    settings   of the capture
+    tape       takes the packets; None: nothing does
+    first      number of the first frame
+    origin_s   None: the first picture has time 0
+    like       a frame of the size and kind that all are brought to; None: the first one
+    connect    how a connection is made; None: to the address, by FFmpeg
+
+    Opening waits for the first picture. Raises SourceError if the source refuses, or fails three times before it.
+    """
+
+    def __init__(
+        self,
+        address: Address,
+        settings: LiveSettings,
+        tape: Tape | None = None,
+        *,
+        first: int = 0,
+        origin_s: float | None = None,
+        like: Frame | None = None,
+        connect: Callable[[], Connection] | None = None,
+    ) -> None:
+        self._address = address
+        self._settings = settings
+        self._connect = connect or (lambda: Connection(address, settings.timeout_s, settings.ffmpeg))
+        self._tape = tape or NoTape()
+        self._shots: Mailbox[Shot] = Mailbox(_EVERY if settings.every_frame else _NEWEST, waits=settings.every_frame)
+        self._clock = CaptureClock(patient=settings.every_frame)
+        self._index = first
+        self._told_size = self._stopped = False
+        self.stats = LiveStats()
+        self.place: Place = (0, 0)
+        self._reader = self._read_on()
+        shot = self._first_shot()
+        self._waiting: Shot | None = shot
+        self.like = like or shot.frame
+        self.origin_s = shot.frame.time_s if origin_s is None else origin_s
+        self.height, self.width = self.like.shape
+        self.fps = shot.fps or FALLBACK_FPS
+
+    def __iter__(self) -> LiveSource:
+        return self
+
+    def __next__(self) -> Frame | None:
+        if self._stopped:
+            raise StopIteration
+        shot, self._waiting = self._waiting or self._shots.get(IDLE_S), None
+        if shot is None:
+            self._watch()
+            return None
+        self.place = shot.place
+        frame = replace(shot.frame, index=self._index, time_s=shot.frame.time_s - self.origin_s)
+        self._index += 1
+        self.stats.frames_read += 1
+        if frame.shape != self.like.shape and not self._told_size:
+            self._told_size = True
+            size = f"{frame.shape[1]}x{frame.shape[0]}"
+            self.stats.warn(f"pictures are {size} now; scaled to {self.width}x{self.height} as before")
+        return matched(frame, self.like)
+
+    def latency_s(self, time_s: float) -> float:
+        """How long ago a frame's time was."""
+        return monotonic() - self.origin_s - time_s
+
+    def stop(self) -> None:
+        """Let the iteration end soon; from any thread, or a signal handler."""
+        self._stopped = True
+
+    def __enter__(self) -> LiveSource:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._shots.close()
+        self._reader.stop(_END_S)
+
+    def _read_on(self) -> Reader:
+        return Reader(self._connect, self._shots, self.stats, self._settings, self._tape, self._clock)
+
+    def _first_shot(self) -> Shot:
+        try:
+            while (shot := self._shots.get(IDLE_S)) is None:
+                self._watch()
+        except BaseException:
+            self.close()
+            raise
+        return shot
+
+    def _watch(self) -> None:
+        """Replace a reading thread that hangs inside a driver, where no time-out reaches."""
+        if monotonic() - self._reader.alive_s > _STUCK * self._settings.timeout_s:
+            self.stats.stalls += 1
+            self.stats.warn(f"reading {self._address.shown} hangs in the system; it is opened anew")
+            self._reader.stop(0.0)
+            self._reader = self._read_on()

@@ -1,0 +1,49 @@
+"""What happened to a live source so far."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass, field
+
+from vidtrack.video.stats import SourceStats, log
+
+_REMEMBERED = 20
+
+
+@dataclass(slots=True)
+class LiveStats(SourceStats):
+    """Counts that grow while a camera is read, and what it does now.
+
+    received    pictures that came, read or dropped
+    reconnects  connections made after the first
+    stalls      times that it was connected and nothing came
+    state       "connecting", "running", "waiting" (before another attempt) or "ended"
+    problems    (Unix time [s], what) of the last problems
+    """
+
+    received: int = 0
+    reconnects: int = 0
+    stalls: int = 0
+    state: str = "connecting"
+    problems: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
+    _arrivals: deque[float] = field(default_factory=lambda: deque(maxlen=100), repr=False)
+
+    def warn(self, message: str) -> None:
+        """Log a warning and keep it among the last problems: a camera may have thousands in a year."""
+        self.note(message)
+        log.warning(message)
+
+    def note(self, message: str) -> None:
+        """Keep a problem without telling it."""
+        self.problems.append((time.time(), message))
+
+    def arrived(self, now_s: float) -> None:
+        """Count a picture."""
+        self.received += 1
+        self._arrivals.append(now_s)
+
+    def rate(self, now_s: float) -> float:
+        """Pictures per second lately, falling when none come."""
+        times = list(self._arrivals)
+        return (len(times) - 1) / max(now_s - times[0], 1e-3) if len(times) > 1 else 0.0

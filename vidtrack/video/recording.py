@@ -1,0 +1,118 @@
+"""A recording of a live run as a source: the frames that were tracked then, at their times."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import av
+
+from vidtrack.errors import FormatError, SourceError
+from vidtrack.state import State, read_state
+from vidtrack.video.clock import FALLBACK_FPS
+from vidtrack.video.frame import Frame
+from vidtrack.video.planes import matched, to_frame
+from vidtrack.video.stats import SourceStats
+
+VIDEO, FRAMES, STATE, SETTINGS = "video.mkv", "frames.csv", "state.npz", "settings.json"
+FRAMES_HEADER = "frame,time_s,packet\n"
+
+
+def is_recording(path: str) -> bool:
+    """Whether this is a folder that --record wrote, or one part of it."""
+    folder = Path(path)
+    return folder.is_dir() and bool(_parts(folder))
+
+
+def recorded_settings(path: str) -> dict[str, Any]:
+    """The settings that a recording was made with. Raises FormatError."""
+    file = _parts(Path(path))[0] / SETTINGS
+    try:
+        settings: dict[str, Any] = json.loads(file.read_text())
+    except (OSError, ValueError) as error:
+        raise FormatError(f"cannot read {file}: {error}") from None
+    return settings
+
+
+class Recording:
+    """The frames of a recording that were tracked, with their numbers and times; iterate once.
+
+    name, width, height, fps, frames, stats  as for Source
+    like      a frame of the size and kind of all
+    remember  is given the memory of the live run before the first frame of each part; set it before iterating
+
+    Raises SourceError if there is nothing in it, FormatError if it is damaged.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._parts = [part for part in _parts(Path(path)) if _row_count(part)]
+        if not self._parts:
+            raise SourceError(f"the recording {path} holds no frame that was tracked")
+        state = read_state(self._parts[0] / STATE)
+        self.like = Frame.blank((state["height"], state["width"]), state["coloured"])
+        self.name = Path(path).resolve().name
+        self.height, self.width = self.like.shape
+        self.fps = FALLBACK_FPS
+        self.frames = sum(_row_count(part) for part in self._parts)
+        self.stats = SourceStats()
+        self.remember: Callable[[State], None] = lambda state: None
+
+    def __iter__(self) -> Iterator[Frame]:
+        for part in self._parts:
+            self.remember(read_state(part / STATE))
+            for frame in self._replayed(part):
+                self.stats.frames_read += 1
+                yield matched(frame, self.like)
+
+    def close(self) -> None:
+        """Nothing stays open between two frames."""
+
+    def _replayed(self, part: Path) -> Iterator[Frame]:
+        """The pictures of one part that are on its list."""
+        wanted = _rows(part)
+        try:
+            with av.open(f"file:{part / VIDEO}") as container:
+                coder = container.streams.video[0].codec_context
+                coder.thread_type = "SLICE"
+                coder.copy_opaque = True
+                for number, packet in enumerate(container.demux(video=0)):
+                    packet.opaque = number
+                    for picture in _decoded(coder, packet):
+                        if picture.opaque in wanted:
+                            frame, time_s = wanted[picture.opaque]
+                            yield to_frame(frame, time_s, picture)
+        except (av.FFmpegError, IndexError) as error:
+            self.stats.mark_truncated(f"the end of {part / VIDEO} cannot be read: {error}")
+
+
+def _decoded(coder: av.VideoCodecContext, packet: av.Packet) -> list[av.VideoFrame]:
+    """What was not whole was not tracked: it is on no list."""
+    try:
+        return list(coder.decode(packet if packet.size else None))
+    except av.FFmpegError:
+        return []
+
+
+def _parts(folder: Path) -> list[Path]:
+    candidates = [folder, *sorted(entry for entry in folder.iterdir() if entry.is_dir())]
+    return [part for part in candidates if (part / VIDEO).is_file() and (part / STATE).is_file()]
+
+
+def _row_count(part: Path) -> int:
+    return len(_rows(part))
+
+
+def _rows(part: Path) -> dict[int, tuple[int, float]]:
+    """Number and time of each frame that was tracked, by the number of its packet."""
+    try:
+        lines = (part / FRAMES).read_text().splitlines(keepends=True)
+    except FileNotFoundError:
+        return {}
+    rows = csv.reader(line for line in lines[1:] if line.endswith("\n"))  # a kill may have cut the last one
+    try:
+        return {int(packet): (int(frame), float(time_s)) for frame, time_s, packet in rows}
+    except ValueError as error:
+        raise FormatError(f"{part / FRAMES} is damaged: {error}") from None
