@@ -11,6 +11,9 @@ from vidtrack.errors import ConfigError
 from vidtrack.estimate.model import at_rest, positions, velocities
 from vidtrack.scan import Floats, Ints
 
+LONG = 10.0
+"""Correlation times beyond which a step is made of two halves."""
+
 
 @dataclass(frozen=True, slots=True)
 class ConstantAcceleration:
@@ -122,6 +125,9 @@ class Singer:
 
     def _discretised(self, dt: float) -> tuple[Floats, Floats]:
         """F and Q (3, 3) of one axis: da/dt = -a / hold_s + w, of intensity 2 accel^2 / hold_s (Van Loan 1978)."""
+        if dt > LONG * self.hold_s:  # the matrix below holds exp(dt / hold_s)
+            F, Q = self._discretised(dt / 2)
+            return F @ F, F @ Q @ F.T + Q
         A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -1 / self.hold_s]])
         W = np.diag([0, 0, 2 * self.accel**2 / self.hold_s])
         block = expm(np.block([[-A, W], [np.zeros((3, 3)), A.T]]) * dt)

@@ -20,6 +20,8 @@ class Motion(Protocol):
     per_size   the noise is in object sizes instead of pixels or metres
     """
 
+    def __hash__(self) -> int: ...
+
     @property
     def dim(self) -> int: ...
 

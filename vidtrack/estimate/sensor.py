@@ -17,7 +17,8 @@ class Sensor(Protocol):
             the first two may be one; its values lie in -pi..pi.
     """
 
-    angles: ClassVar[tuple[int, ...]]
+    @property
+    def angles(self) -> tuple[int, ...]: ...
 
     def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
         """(T, m) expected measurements of states x (T, n) whose positions are in columns `position`."""

@@ -19,7 +19,7 @@ class UnscentedBank(KalmanBank):
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         """x, P after dt seconds, from the points moved each by its own motion; changes nothing."""
-        rows, n = self.x.shape
+        n = self.x.shape[1]
         points, weight = sigma_points(self.x, self.P)
         flat = points.reshape(-1, n)
         F = self.model.transition(dt, flat)
