@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from vidtrack.config import Settings, as_toml, load, names
+from vidtrack.config import Settings, load, names
 from vidtrack.errors import ConfigError
+from vidtrack.explain import as_toml
 
 
 def leaves(group=Settings, prefix=""):

@@ -32,6 +32,7 @@ FLOORS = (
     "detection",
     "formats",
     "scan",
+    "explain",
     "config",
     "state",
     "errors",

@@ -118,8 +118,10 @@ def coupled_clusters(folder: Path | None) -> None:
         for method in CLUSTER.values():
             off = np.abs(weights(problem, method.decide(problem)) - exact).max()
             cells.append(f"{decision_ms(method, problem):9.3f}{off:9.1e}")
-        for name in PEERS if folder else ():
-            if len(problem.pairs) > PEERS[name]:
+        for name, most in PEERS.items():
+            if folder is None:
+                break
+            if len(problem.pairs) > most:
                 cells.append(f"{'-':>18s}")
                 continue
             seconds, table = run_peer(name, zhat, problem, folder)
@@ -133,7 +135,7 @@ def run_peer(name: str, zhat: Floats, problem: Problem, folder: Path) -> tuple[f
     with tempfile.TemporaryDirectory() as place:
         given, result = Path(place) / "data.npz", Path(place) / "result.npz"
         np.savez(
-            given, zhat=zhat, cov=problem.cov, z=problem.scan.z, R=problem.scan.noise,
+            given, zhat=zhat, cov=problem.cov, z=problem.scan.z, R=problem.scan.R[0],
             detection=problem.detection[0], clutter=problem.clutter[0], gate=GATE, rounds=3,
         )  # fmt: skip
         subprocess.run([python_of("numpy2", folder), worker, name, given, result], check=True)
@@ -146,7 +148,8 @@ def belief_error(count: int = 1000) -> None:
     rng = np.random.default_rng(0)
     worst = np.empty(count)
     for k in range(count):
-        _, problem = cluster(*rng.integers(2, (9, 11)), rng, gate=rng.choice([0.9, 0.99, 0.999]))
+        tracks, measurements = rng.integers(2, (9, 11))
+        _, problem = cluster(int(tracks), int(measurements), rng, gate=rng.choice([0.9, 0.99, 0.999]))
         exact, close = (weights(problem, CLUSTER[name].decide(problem)) for name in ("exact", "belief"))
         worst[k] = np.abs(exact - close).max()
     print(f"\nbelief propagation, {count} random clusters: largest error of a weight {worst.max():.3f}, ", end="")

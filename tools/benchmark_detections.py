@@ -153,9 +153,7 @@ def print_line(name: str, values: dict[str, float]) -> None:
 def main() -> None:
     """Track, score, print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument(
-        "--peers-in", type=Path, metavar="DIR", help="of the peers' environment; none: ours only"
-    )
+    parser.add_argument("--peers-in", type=Path, metavar="DIR", help="of the peers' environment; none: ours only")
     parser.add_argument("--method", nargs="+", default=["gnn"], help="of ours (default gnn)")
     parser.add_argument("--sequences", action="store_true", help="also every sequence by itself")
     parser.add_argument("--truth", nargs="+", default=["Car", "Van"], help="labels of KITTI (default Car Van)")

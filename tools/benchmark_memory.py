@@ -4,7 +4,8 @@
 
 The frames of VIDEO (default: the bundled junction) go round after round through detector, tracker and all
 files of a run, their times going on. What the process holds is printed after each round, and at the end the
-slope over the rounds after the first four, in MB a round.
+slope over the rounds after the first four, in MB a round, with its standard error: what the C library
+keeps free goes up and down by some MB.
 """
 
 from __future__ import annotations
@@ -65,8 +66,8 @@ def main() -> None:
     parser.add_argument("video", type=Path, nargs="?", default=SAMPLE)
     parser.add_argument("--loops", type=int, default=20)
     options = parser.parse_args()
-    if options.loops < WARM_UP + 2:
-        parser.error(f"--loops must be at least {WARM_UP + 2}: the first {WARM_UP} do not count for the slope")
+    if options.loops < WARM_UP + 4:
+        parser.error(f"--loops must be at least {WARM_UP + 4}: the first {WARM_UP} do not count for the slope")
     with tempfile.TemporaryDirectory() as place:
         path, frames = repeated(options.video, options.loops, Path(place))
         memory = []
@@ -74,8 +75,8 @@ def main() -> None:
             memory.append(megabytes)
             print(f"round {loop:2d}  {frames * loop:6d} frames  {megabytes:7.1f} MB")
     settled = memory[WARM_UP:]
-    slope = np.polyfit(np.arange(len(settled)), settled, 1)[0]
-    print(f"slope {slope:.3f} MB a round of {frames} frames, {1e6 * slope / frames:.0f} bytes a frame")
+    line, covariance = np.polyfit(np.arange(len(settled)), settled, 1, cov=True)
+    print(f"slope {line[0]:.3f} MB a round of {frames} frames (standard error {np.sqrt(covariance[0, 0]):.3f})")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vidtrack.simulate import simulate
-from vidtrack.simulate.write import write_truth, write_video
+from vidtrack.simulate.video_write import write_truth, write_video
 
 SAMPLES = Path(__file__).parent.parent / "samples"
 SEEDS = {"junction": 16, "crossing": 7}

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from vidtrack.scan import Tracks as Tracks
     from vidtrack.tracking.groups import Groups as Groups
     from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
+    from vidtrack.tracking.log_ratio import LogRatio as LogRatio
     from vidtrack.tracking.mht import MHT as MHT
     from vidtrack.tracking.splitting import Split as Split
     from vidtrack.tracking.tracker import Tracker as Tracker
@@ -47,6 +48,7 @@ _HOME = {
     "Groups": "tracking.groups",
     "JPDA": "associate.jpda",
     "LifeCycle": "tracking.lifecycle",
+    "LogRatio": "tracking.log_ratio",
     "MHT": "tracking.mht",
     "NN": "associate.hard",
     "OutputError": "errors",

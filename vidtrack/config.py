@@ -7,14 +7,12 @@ with the nearest name or the allowed range. `vidtrack config --explain` prints t
 from __future__ import annotations
 
 import difflib
-import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
-from pydantic.fields import FieldInfo
 
 from vidtrack.errors import ConfigError
 
@@ -131,7 +129,11 @@ class DetectionSettings(_Group):
     jitter: float | None = Field(None, gt=0)
     """object sizes; standard deviation of a box's centre; None: from second differences of chains of boxes"""
     accel: float | None = Field(None, gt=0)
-    """object sizes/s^2; standard deviation of the acceleration in each direction; None: as for jitter"""
+    """object sizes/s^2; tracker.accel for them, and in proportion tracker.cross; None: as for jitter"""
+    confirm_hits: int = Field(4, ge=1, le=63)
+    """M: hits within the window that confirm a track, the first one counted; confirm_s and confirm_travel do not"""
+    confirm_window: int = Field(6, ge=1, le=63)
+    """N: scans of the window"""
     box_s: float = Field(0.05, gt=0)
     """s; time constant with which a track's box follows its detections' boxes"""
 
@@ -141,6 +143,8 @@ class TrackerSettings(_Group):
 
     method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] = "gnn"
     """association by one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), later (split, mht)"""
+    n_scan: int = Field(3, ge=1, le=20)
+    """scans after which split and mht decide"""
     distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"
     """confidence region with the full covariance, with the variances per axis only (eq. 8), or plain distance"""
     gate_probability: float = Field(0.999, ge=0, le=1)
@@ -155,10 +159,20 @@ class TrackerSettings(_Group):
     """s; correlation time of the acceleration"""
     speed: float = Field(4.0, gt=0)
     """object sizes/s; standard deviation of a new vehicle's unknown velocity"""
+    life: Literal["m-of-n", "llr"] = "m-of-n"
+    """what confirms a track: M hits within N scans, or its log-likelihood ratio (llr), which also ends it"""
     confirm_hits: int = Field(3, ge=1, le=63)
     """M: hits within the window that confirm a track, the first one counted"""
     confirm_window: int = Field(4, ge=1, le=63)
     """N: scans of the window"""
+    false_track: float = Field(1e-3, ge=1e-8, lt=0.5)
+    """llr: probability that a track of false measurements is confirmed"""
+    missed_track: float = Field(1e-4, ge=1e-8, lt=0.5)
+    """llr: probability that the track of a real object is deleted"""
+    detection_probability: float | None = Field(0.9, ge=0, le=1)
+    """probability that a frame shows a vehicle; None: from the tracks so far. Radar has its own"""
+    clutter_density: float | None = Field(1e-5, ge=0)
+    """false measurements per frame and px^2; None: from what the tracks leave. Radar has its own"""
     confirm_s: float = Field(0.2, ge=0)
     """s; no track of a video is confirmed before this age"""
     confirm_travel: float = Field(0.3, ge=0)
@@ -184,6 +198,10 @@ class TrackerSettings(_Group):
 
 
 class OutputSettings(_Group):
+    smooth: bool = False
+    """tracks are smoothed: each row uses the measurements after it too"""
+    smooth_lag_s: float | None = Field(None, gt=0)
+    """s; how far ahead smoothing looks, rows appearing one to two times as late; None: to the end, when all appear"""
     lines: tuple[str, ...] = ()
     """counting lines, each NAME:x1,y1,x2,y2 in source pixels"""
     trail_s: float = Field(2.0, ge=0, le=60)
@@ -217,10 +235,10 @@ class RadarSettings(_Group):
     """kalman, converted: plots become unbiased positions; ekf, ukf: range and angles as measured; imm: two models"""
     model: Literal["cv", "ca", "singer", "ct"] = "cv"
     """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
-    detection_probability: float = Field(0.9, gt=0, lt=1)
-    """probability that a scan shows a target"""
+    detection_probability: float | None = Field(0.9, gt=0, lt=1)
+    """probability that a scan shows a target; None: from the tracks so far"""
     clutter_density: float | None = Field(None, gt=0)
-    """false plots per scan and unit of the measurement space (m^2, m^3, m rad, ...); None: from the file's plots"""
+    """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from what the tracks leave"""
     max_speed: float = Field(400.0, gt=0)
     """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
     accel: float = Field(8.0, gt=0)
@@ -235,6 +253,8 @@ class RadarSettings(_Group):
     """s; mean time that imm's other mode lasts"""
     euclidean_radius_m: float = Field(2000.0, gt=0)
     """m; gate of the euclidean distance"""
+    life: Literal["m-of-n", "llr"] = "llr"
+    """what confirms a track, as tracker.life: clutter asks for the score, which also ends tracks that it does not fit"""
     coast_scans: int = Field(5, ge=1, le=62)
     """a track is given up after this many scans without a plot"""
     trail_s: float = Field(60.0, ge=0)
@@ -370,43 +390,3 @@ def names(group: type[BaseModel] = Settings, prefix: str = "") -> Iterable[str]:
         kind = info.annotation
         if isinstance(kind, type) and issubclass(kind, BaseModel):
             yield from names(kind, f"{prefix}{name}.")
-
-
-def as_toml(settings: Settings, *, explain: bool = False) -> str:
-    """The settings as a TOML file that `load` reads; with `explain`, each with its meaning, unit and range."""
-    return "\n".join(_toml_group(settings, "", explain)) + "\n"
-
-
-def _toml_group(group: BaseModel, path: str, explain: bool) -> list[str]:
-    lines: list[str] = []
-    below: list[str] = []
-    for name, info in type(group).model_fields.items():
-        value = getattr(group, name)
-        if isinstance(value, BaseModel):
-            below += ["", f"[{path}{name}]", *_toml_group(value, f"{path}{name}.", explain)]
-            continue
-        if explain:
-            lines += ["", f"# {info.description}{_range(info)}"]
-        lines.append(f"# {name} =  (from the data)" if value is None else f"{name} = {_toml_value(value)}")
-    return lines + below
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, Path):
-        value = str(value)
-    return json.dumps(value, ensure_ascii=False)  # TOML spells booleans, numbers, strings and lists as JSON does
-
-
-def _range(info: FieldInfo) -> str:
-    """Allowed values in brackets: choices, or bounds."""
-    choices = [value for value in get_args(info.annotation) if isinstance(value, str)]
-    if choices:
-        return f" [{', '.join(choices)}]"
-    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
-    bounds = [
-        f"{sign} {getattr(rule, name):g}"
-        for rule in info.metadata
-        for name, sign in signs.items()
-        if hasattr(rule, name)
-    ]
-    return f" [{', '.join(bounds)}]" if bounds else ""

@@ -14,11 +14,10 @@ from vidtrack.associate.trust import Trust
 from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE, Scan, Tracks
+from vidtrack.scan import TENTATIVE, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
-from vidtrack.tracking.lifecycle import LifeCycle
-from vidtrack.tracking.methods import METHODS
+from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
@@ -55,26 +54,30 @@ def build_tracker(
     *,
     whole: DetectionSettings | None = None,
     explain: bool = False,
+    smooth: bool = False,
 ) -> Tracker:
     """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height).
 
     whole  each box is one whole object, from a detector that tells objects apart: boxes may overlap but are
            never shared, their size and score are evidence, and M hits of N confirm a track without it having to travel
     """
+    accel = settings.accel if whole is None or whole.accel is None else whole.accel
     return Tracker(
         model=ConstantVelocity(
             dim=2,
-            accel=settings.accel if whole is None or whole.accel is None else whole.accel,
-            cross=settings.cross if whole is None else None,
+            accel=accel,
+            cross=accel * settings.cross / settings.accel,
             speed=settings.speed,
             hold_s=settings.hold_s,
             per_size=True,
         ),
-        associate=METHODS[settings.method](),
+        associate=rule(settings),
         gate=Gate(settings.gate_probability, settings.distance, settings.euclidean_radius_px),
-        life=LifeCycle(
-            confirm_hits=settings.confirm_hits,
-            confirm_window=settings.confirm_window,
+        life=life(
+            settings.life,
+            settings,
+            (whole or settings).confirm_hits,
+            (whole or settings).confirm_window,
             confirm_s=0.0 if whole else settings.confirm_s,
             confirm_travel=0.0 if whole else settings.confirm_travel,
             coast_s=settings.coast_s,
@@ -85,8 +88,11 @@ def build_tracker(
         shape=Shape() if whole else None,
         trust=Trust(whole.sure_score) if whole and whole.sure_score is not None else None,
         bounds=bounds,
-        box_s=whole.box_s if whole else settings.box_s,
+        detection_probability=settings.detection_probability,
+        clutter_density=settings.clutter_density,
+        box_s=(whole or settings).box_s,
         explain=explain,
+        smooth=smooth,
     )
 
 
@@ -111,16 +117,6 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         clock.append(perf_counter())
         seconds = dict(zip(("read", "detect", "blobs", "track"), np.diff(clock).tolist(), strict=True))
         yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds)
-        ended = perf_counter()
-
-
-def detection_steps(detections: Iterable[tuple[int, float, Scan]], tracker: Tracker) -> Iterator[Step]:
-    """Stored detections through the tracker."""
-    ended = perf_counter()
-    for index, time_s, scan in detections:
-        began = perf_counter()
-        tracks = tracker.step(scan)
-        yield Step(index, time_s, scan, tracks, None, None, {"read": began - ended, "track": perf_counter() - began})
         ended = perf_counter()
 
 

@@ -9,11 +9,10 @@ from vidtrack.associate.gate import Gate
 from vidtrack.config import Settings
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.plots import read_plots
-from vidtrack.radar.scans import Measurements, clutter_density, measurements
+from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.scan import Tracks
 from vidtrack.steps import scan_steps
-from vidtrack.tracking.lifecycle import LifeCycle
-from vidtrack.tracking.methods import METHODS
+from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.tracker import Tracker
 
 
@@ -34,14 +33,12 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
     return Tracker(
         model=motion(radar, found.dim),
         estimator=estimator(radar, found),
-        associate=METHODS[common.method](),
+        associate=rule(common),
         gate=Gate(common.gate_probability, common.distance, radar.euclidean_radius_m),
-        life=LifeCycle(
-            confirm_hits=common.confirm_hits,
-            confirm_window=common.confirm_window,
-            coast_scans=radar.coast_scans,
-        ),
+        life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         detection_probability=radar.detection_probability,
-        clutter_density=radar.clutter_density or clutter_density(found),
+        clutter_density=radar.clutter_density,
+        surveyed=surveyed(found),
         explain=explain,
+        smooth=settings.output.smooth,
     )

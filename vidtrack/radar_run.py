@@ -15,6 +15,7 @@ from vidtrack.output.folder import open_run
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.results import Results
 from vidtrack.output.sink import Step
+from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable
 from vidtrack.output.threaded import Threaded
@@ -51,18 +52,16 @@ class RadarRun:
         tracker = build_radar_tracker(settings, found, explain=decisions or rerun is not None)
         self.name, self.scans = Path(path).stem, found.count
         self.folder = open_run(output, self.name, force)
-        account = {
-            "plots": len(plots),
-            "bad_rows": plots.bad_rows,
-            "clutter_density": tracker.clutter_density,
-            "truncated": False,
-        }
-        summary = Summary(self.folder / "summary.json", path, settings, lambda: account, unit="scans")
+        account = {"plots": len(plots), "bad_rows": plots.bad_rows, "truncated": False}
+        summary = Summary(
+            self.folder / "summary.json", path, settings, lambda: account | tracker.rates.as_dict(), unit="scans"
+        )
         with ExitStack() as stack:  # whatever fails below, what is open by then is closed
             results = stack.enter_context(Results(summary))
             table = TrackTable(self.folder, RADAR if found.dim == 2 else RADAR_3D)
             plot = RadarPlot(self.folder / "tracks.png", settings.radar.position[:2])
-            results.add(Confirmed(table, plot, hold_s=math.inf))  # scans may be far apart, and a file ends
+            sinks = smoothed_first(settings.output, table, plot)
+            results.add(Confirmed(*sinks, hold_s=math.inf))  # scans may be far apart, and a file ends
             if decisions:
                 results.add(DecisionLog(self.folder / "decisions.csv", index="scan"))
             if rerun is not None:

@@ -18,10 +18,12 @@ from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.results import Results
 from vidtrack.output.sink import Step
+from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
-from vidtrack.pipeline import build_detector, build_tracker, detection_steps, video_steps
+from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.steps import scan_steps
 from vidtrack.traffic.lines import LineCounter, parse_lines
 from vidtrack.video.detections import Detections, is_detections, open_detections
 from vidtrack.video.recording import Recording, is_recording
@@ -60,7 +62,10 @@ class Run:
             bounds = (opened.width, opened.height)
             whole = opened.settings if isinstance(opened, Detections) else None
             explain = decisions or rerun is not None
-            tracker = build_tracker(settings.tracker, bounds, whole=whole, explain=explain)
+            smooth = settings.output.smooth
+            self._tracker = tracker = build_tracker(
+                settings.tracker, bounds, whole=whole, explain=explain, smooth=smooth
+            )
             detector = None
             if not isinstance(opened, Detections):
                 keep_freed_memory()
@@ -71,7 +76,7 @@ class Run:
                     opened.remember = Memory(detector, tracker, opened.like).restore
                 self._steps = video_steps(opened, detector, tracker, settings)
             else:
-                self._steps = detection_steps(opened, tracker)
+                self._steps = scan_steps(((index, scan) for index, _, scan in opened), tracker)
             lines = parse_lines(settings.output.lines, opened.width, opened.height)
             self.name, self.frames = opened.name, opened.frames
             self.folder = open_run(output, opened.name, force)
@@ -83,7 +88,8 @@ class Run:
                 results.add(CountsFile(self.folder / "counts.csv", counter))
             plot = TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines)
             hold_s = LIVE_HOLD_S if isinstance(opened, Recording) else HOLD_S
-            results.add(Confirmed(TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot, hold_s=hold_s))
+            sinks = smoothed_first(settings.output, TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot)
+            results.add(Confirmed(*sinks, hold_s=hold_s))
             if decisions:
                 results.add(DecisionLog(self.folder / "decisions.csv"))
             if masks is not None:
@@ -121,6 +127,7 @@ class Run:
             "reconnects": 0,
             "stalls": 0,
             "truncated": stats.truncated,
+            **self._tracker.rates.as_dict(),
         }
 
 

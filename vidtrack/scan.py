@@ -249,6 +249,9 @@ class Tracks:
     measurement    (T,) index of the heaviest measurement of this scan; -1 for none
     nis            (T,) normalised innovation squared of this update; NaN for none
     position, velocity   columns of x, one per axis
+    prior_x, prior_P, gain   (T, n), (T, n, n), (T, n, n) where a smoother was announced: moments before this scan, and
+                   P F' prior_P^-1 of the scan before (what an error of prior_x says about that scan's x); NaN for
+                   tracks that continue nothing of the snapshot before; n is zero where none was
     """
 
     t: float
@@ -269,6 +272,9 @@ class Tracks:
     run: Ints | None = None
     events: tuple[Event, ...] = field(default=())
     choices: Choices | None = None
+    prior_x: Floats | None = None
+    prior_P: Floats | None = None  # noqa: N815
+    gain: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.id)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -62,11 +63,16 @@ def write_state(path: Path, state: State) -> None:
     block = BytesIO()
     np.savez(block, allow_pickle=False, **{_PLAIN: np.frombuffer(json.dumps(plain).encode(), np.uint8)}, **arrays)
     new = path.with_name(path.name + ".new")
-    with open(new, "wb") as file:
-        file.write(block.getbuffer())
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(new, path)
+    try:
+        with open(new, "wb") as file:
+            file.write(block.getbuffer())
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(new, path)
+    except OSError:
+        with suppress(OSError):
+            new.unlink(missing_ok=True)
+        raise
 
 
 def read_state(path: Path) -> State:
@@ -74,7 +80,8 @@ def read_state(path: Path) -> State:
     try:
         with np.load(path, allow_pickle=False) as file:
             state: State = {name: file[name] for name in file.files}
-        return {**state, **json.loads(state.pop(_PLAIN).tobytes())}
+        plain = json.loads(state.pop(_PLAIN).tobytes())
+        return {**state, **plain}
     except OSError as error:
         raise FormatError(f"cannot read the state {path}: {error.strerror or error}") from None
     except (ValueError, KeyError, AttributeError, EOFError, zipfile.BadZipFile) as error:

@@ -21,7 +21,9 @@ def enumerated(offset, held, start, column, cost, alone):
         ]
         for choice in product(*options):
             columns = [column[k] for k in choice if k >= 0]
-            if len(set(columns)) == len(columns):
+            if len(set(columns)) == len(columns) and all(
+                k >= 0 or alone[i, -1 - k] < np.inf for i, k in enumerate(choice)
+            ):
                 costs = [cost[k] if k >= 0 else alone[i, -1 - k] for i, k in enumerate(choice)]
                 found[h, choice] = offset[h] + sum(costs)
     return found
@@ -32,7 +34,9 @@ def random_problems(rng, problems, rows, columns, ties):
     allowed = rng.random((rows, columns)) < 0.7
     row, column = np.nonzero(allowed)
     start = np.searchsorted(row, np.arange(rows + 1))
-    return draw(problems), rng.random((problems, columns)) < 0.8, start, column, draw(len(row)), draw(rows, 2)
+    alone = draw(rows, 2)
+    alone[rng.random((rows, 2)) < 0.3] = np.inf
+    return draw(problems), rng.random((problems, columns)) < 0.8, start, column, draw(len(row)), alone
 
 
 @given(

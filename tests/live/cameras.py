@@ -15,6 +15,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from command_line import SAMPLES
 
 from vidtrack.errors import SourceError
 from vidtrack.video.live.connection import Stalled
@@ -68,6 +69,7 @@ class _Site(BaseHTTPRequestHandler):
 
     def do_GET(self):
         server = self.server
+        server.visits += 1
         if self.path == "/private" and "Authorization" not in self.headers:
             self.send_response(401)
             self.send_header("WWW-Authenticate", 'Basic realm="camera"')
@@ -76,8 +78,9 @@ class _Site(BaseHTTPRequestHandler):
             kind = {"/video.mjpg": "multipart/x-mixed-replace; boundary=part", "/video.ts": "video/mp2t"}[self.path]
             self._start(kind)
             blocks = server.parts() if self.path == "/video.mjpg" else server.transport()
+            connection = server.connection
             for block in blocks:
-                if server.closing.is_set():
+                if server.closing.is_set() or server.connection != connection:
                     return
                 self.wfile.write(block)
         elif self.path == "/page":
@@ -99,7 +102,10 @@ class _Site(BaseHTTPRequestHandler):
 
 
 class HttpCamera(ThreadingHTTPServer):
-    """Serves `pictures` (H, W, 3) round and round at `fps`, as MJPEG and as MPEG-TS; use it with `with`."""
+    """Serves `pictures` (H, W, 3) round and round at `fps`, as MJPEG and as MPEG-TS; use it with `with`.
+
+    Counting `connection` up hangs up.
+    """
 
     daemon_threads = True
 
@@ -107,6 +113,7 @@ class HttpCamera(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Site)
         self.pictures = pictures
         self.fps = fps
+        self.connection = self.visits = 0
         self.closing = Event()
         Thread(target=self.serve_forever, kwargs={"poll_interval": 0.05}, daemon=True).start()
 
@@ -214,6 +221,12 @@ def script_of(*connections):
         return following
 
     return connect
+
+
+def crossing():
+    """(K, 240, 320, 3) the sample's pictures."""
+    with av.open(str(SAMPLES / "crossing.avi")) as film:
+        return [frame.to_ndarray(format="bgr24") for frame in film.decode(video=0)]
 
 
 def grey(level, size=(48, 64)):

@@ -18,7 +18,7 @@ def test_jitter_of_the_network_is_not_seen():
     late = np.abs(np.random.default_rng(1).normal(0, 0.03, 200))
     got = times(stamps + 1000, stamps + 50 + late)
     steps = np.diff(got[50:])
-    assert np.abs(steps - 0.04).max() < 0.004
+    assert np.abs(steps - 0.04).max() < 0.005
     assert np.abs(np.diff(np.sort(stamps + late)) - 0.04).max() > 0.03
 
 
@@ -27,7 +27,7 @@ def test_a_hiccup_keeps_the_spacing():
     arrivals = stamps.copy()
     arrivals[50:75] = arrivals[75]  # a second's worth comes at once
     got = times(stamps, arrivals)
-    assert np.abs(np.diff(got) - 0.04).max() < 1e-3
+    assert np.abs(np.diff(got) - 0.04).max() < 3e-3
 
 
 def test_a_pause_of_the_camera_is_a_gap():

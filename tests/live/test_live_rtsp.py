@@ -1,13 +1,17 @@
 """The real thing: GStreamer's RTSP server, killed, frozen, delayed, and asked with the wrong password."""
 
+import json
+import os
 import time
+from threading import Thread
 
 import numpy as np
 import pytest
 from cameras import RtspCamera, needs_rtsp, wait_for, within
 
-from vidtrack.config import LiveSettings
+from vidtrack.config import LiveSettings, Settings
 from vidtrack.errors import SourceError
+from vidtrack.live.run import LiveRun
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Refused
 from vidtrack.video.live.source import LiveSource
@@ -110,3 +114,32 @@ def test_killed_and_restarted_with_another_size():
         assert after.time_s > before.time_s
         assert source.stats.reconnects == 1
         assert "160x120 now" in " ".join(what for _, what in source.stats.problems)
+
+
+def test_a_run_outlives_every_restart(compiled, tmp_path):
+    """Killed at random moments; VIDTRACK_LONG=1 does it 20 times instead of 3."""
+    restarts = 20 if os.environ.get("VIDTRACK_LONG") else 3
+    random = np.random.default_rng(restarts)
+    camera = RtspCamera("--size", "320x240")
+
+    def restart():
+        nonlocal camera
+        for k in range(restarts):
+            time.sleep(0.3 + random.random())
+            camera.kill()
+            camera = RtspCamera("--size", ("240x180", "320x240")[k % 2], port=camera.port)
+            wait_for(lambda k=k: run.board.now().reading["reconnects"] > k, 30.0)
+        run.stop()
+
+    with LiveRun(camera.url(), Settings(live=SETTINGS), tmp_path / "out") as run:
+        restarting = Thread(target=restart)
+        restarting.start()
+        steps = [(step.time_s, int(np.count_nonzero(step.tracks.status))) for step in run]
+        restarting.join()
+    camera.kill()
+    times, tracks = np.array(steps).T
+    assert np.all(np.diff(times) > 0)
+    assert tracks.max() <= 3  # there is one ball
+    found = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert found["reconnects"] == restarts
+    assert found["tracks"] <= 3 * (restarts + 1)

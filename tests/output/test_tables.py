@@ -187,6 +187,20 @@ def test_mot_is_sorted_although_gaps_come_late(tmp_path, monkeypatch):
     assert [row[:2] for row in mot_rows(tmp_path / "mot.txt")] == [(1, 1), (1, 2), (2, 1), (2, 2), (3, 1), (3, 2)]
 
 
+def test_mot_holds_later_rows_back_while_a_gap_is_open(tmp_path, monkeypatch):
+    clock = iter(range(0, 10_000, 10))
+    monkeypatch.setattr("vidtrack.output.linefile.time.monotonic", lambda: next(clock))  # each step is written at once
+    sink = MotFile(tmp_path / "mot.txt")
+    sink.step(make_step(0, [(1, "c", 10, 0), (2, "c", 0, 0)]))
+    sink.step(make_step(1, [(1, "o", 20, 0), (2, "c", 0, 0)]))
+    sink.step(make_step(2, [(1, "o", 30, 0), (2, "c", 0, 0)]))
+    assert [row[:2] for row in mot_rows(tmp_path / "mot.txt")] == [(1, 1), (1, 2)]
+    sink.step(make_step(3, [(2, "c", 0, 0)]))  # 1 is dead
+    assert [row[:2] for row in mot_rows(tmp_path / "mot.txt")] == [(1, 1), (1, 2), (2, 2), (3, 2), (4, 2)]
+    sink.close()
+    assert len(mot_rows(tmp_path / "mot.txt")) == 5
+
+
 def test_settled_gaps_by_hand():
     rows = np.zeros((5, 8))
     rows[:, 0] = [1, 2, 2, 2, 3]

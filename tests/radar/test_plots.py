@@ -145,6 +145,13 @@ def test_good_rows_are_not_lost_when_bad_ones_are_skipped(tmp_path, caplog, row,
     assert named in caplog.text
 
 
+def test_rows_of_parquet_are_counted_from_one(tmp_path):
+    columns = {"scan": [0, 1, 2], "time_s": [0.0, 1.0, 2.0], "x_m": [1.0, None, 3.0], "y_m": [0.0, 0.0, 2e6]}
+    pq.write_table(pa.table(columns), tmp_path / "p.parquet")
+    with pytest.raises(PlotFormatError, match=r"row 2: x_m is nan.*row 3: y_m .*wrong units suspected"):
+        read_plots(tmp_path / "p.parquet")
+
+
 def test_many_bad_rows_are_counted_and_the_first_are_shown(tmp_path):
     path = write(tmp_path / "p.csv", *[f"{k},{k},-1,0,5,0.1" for k in range(9)])
     with pytest.raises(PlotFormatError, match=r"9 bad rows: line 2: .* line 6: .*and 4 more"):

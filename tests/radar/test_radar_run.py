@@ -122,6 +122,13 @@ def test_scan_numbers_are_those_of_the_file(tmp_path):
     assert table.frame.tolist() == [10, 11, 12, 13, 14, 15]
 
 
+def test_range_rates_are_left_out_where_a_filter_cannot_use_them(tmp_path):
+    header = "scan,time_s,range_m,azimuth_deg,doppler_m_s"
+    write(tmp_path / "plots.csv", *(f"{k},{k},{5000 + 100 * k},0,100" for k in range(6)), header=header)
+    settings = load(assignments=["radar.estimator=alpha-beta"])
+    assert [len(tracks) for _, tracks in track_plots(tmp_path / "plots.csv", settings)] == [1] * 6
+
+
 def test_doppler_makes_the_velocity_known_at_once(tmp_path):
     header = "scan,time_s,x_m,y_m,doppler_m_s,sigma_x_m,sigma_y_m,sigma_doppler_m_s"
     rows = [f"{k},{k},0,{5000 + 100 * k},100,50,50,1" for k in range(6)]

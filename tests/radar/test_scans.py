@@ -7,7 +7,7 @@ from plot_files import HEADER, write
 from vidtrack.config import RadarSettings
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.plots import read_plots
-from vidtrack.radar.scans import clutter_density, measurements
+from vidtrack.radar.scans import clutter_density, measurements, surveyed
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
 
 
@@ -59,11 +59,29 @@ def test_a_range_rate_stays_one(tmp_path, estimator, kind, size):
 
 def test_the_clutter_density_is_plots_per_scan_and_area(tmp_path):
     rng = np.random.default_rng(1)
-    rows = [f"{k},{k},{x},{y}" for k in range(50) for x, y in rng.uniform(0, 1000, (20, 2))]
+    rows = [f"{k},{k},{x},{y}" for k in range(50) for x, y in rng.uniform(0, 1e6, (20, 2))]
     found = read(tmp_path, *rows, header="scan,time_s,x_m,y_m")
-    assert clutter_density(found) == pytest.approx(20e-6, rel=0.01)
+    assert clutter_density(found) == pytest.approx(20e-12, rel=0.01)
 
 
-def test_plots_in_a_row_still_have_a_density(tmp_path):
-    found = read(tmp_path, "0,0,0,5", "1,1,100,5", header="scan,time_s,x_m,y_m", sigma_position_m=10.0)
-    assert clutter_density(found) == pytest.approx(1 / (100 * 10 * np.sqrt(12)))
+def test_the_plots_of_one_target_do_not_look_like_clutter(tmp_path):
+    """The space around them that a target could reach within a scan counts as surveyed too."""
+    header = "scan,time_s,x_m,y_m,doppler_m_s"
+    found = read(tmp_path, "0,0,0,5,1", "1,2,100,5,1", header=header, sigma_position_m=10.0, max_speed=50.0)
+    error, reach = np.sqrt(12) * np.array([10.0, 10.0, 2.0]), np.array([200.0, 200.0, 100.0])
+    assert surveyed(found) == pytest.approx((np.array([100.0, 0.0, 0.0]) + error + reach).prod())
+
+
+def test_a_sector_to_the_south_is_no_wider_than_one_to_the_north(tmp_path):
+    found = [
+        read(tmp_path, *(f"{k},{k},{9000 + 10 * k},{azimuth + k},5,0.1" for k in range(20)), estimator="ekf")
+        for azimuth in (-10, 170)
+    ]
+    north, south = map(surveyed, found)
+    assert south == pytest.approx(north)
+    assert north > 190 * np.radians(19)
+
+
+def test_a_single_plot_has_a_surveyed_space(tmp_path):
+    for estimator in ("kalman", "ekf"):
+        assert surveyed(read(tmp_path, "0,0,1000,0,5,0.1", estimator=estimator)) > 0

@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidtrack as vt
+from vidtrack.state import gather, restore
 from vidtrack.tracking.hypotheses import Hypotheses, kept
+from vidtrack.tracking.methods import rule
 
 UNPRUNED = {"n_scan": 20, "hypotheses": 100_000, "threshold": 0.0, "mass": 1.0, "branches": 1000}
 ETERNAL = vt.LifeCycle(confirm_hits=1, confirm_window=63, coast_scans=62)
@@ -19,7 +21,7 @@ def reid_tracker(**model):
     """The tracker of the reference's examples: one dimension, everything gated, nothing pruned."""
     return vt.Tracker(
         vt.ConstantVelocity(dim=1, **model),
-        vt.MHT(new_density=0.01, **UNPRUNED),
+        vt.MHT(new_share=0.2, **UNPRUNED),
         gate=1.0,
         life=ETERNAL,
         detection_probability=0.9,
@@ -70,7 +72,7 @@ def test_two_scans_with_one_measurement_each():
 def test_number_of_hypotheses(tracks, measurements, count):
     tracker = reid_tracker(accel=1.0, speed=1.0)
     tracker.add(0.0, np.arange(2.0 * tracks).reshape(tracks, 2), np.tile(np.eye(2), (tracks, 1, 1)))
-    tracker.step(scan(0.0, *(0.3 * np.arange(measurements))))
+    tracker.step(scan(0.0, *(1.5 * np.arange(measurements))))
     assert len(probabilities(tracker)) == count
 
 
@@ -111,7 +113,8 @@ def reid(scans, detection, clutter, new, accel, speed):
 @settings(max_examples=25, deadline=None)
 def test_all_hypotheses_of_several_scans_are_those_of_an_enumeration(seed, counts):
     rng = np.random.default_rng(seed)
-    scans = [rng.uniform(-4, 4, n) for n in counts]
+    cells = [rng.permutation(np.arange(-4, 4))[:n] for n in counts]  # what lies in one cell may start one track only
+    scans = [cell + rng.uniform(0.0, 0.99, len(cell)) for cell in cells]
     tracker = reid_tracker(accel=1.5, speed=2.0)
     for k, z in enumerate(scans):
         tracker.step(scan(float(k), *z))
@@ -211,6 +214,14 @@ def test_limits_of_the_probabilities(detection, clutter, gate):
         assert np.isfinite(tracks.x).all()
 
 
+def test_without_births_no_hypothesis_has_any():
+    tracker = vt.Tracker(vt.ConstantVelocity(dim=1), vt.MHT(**UNPRUNED), gate=1.0, births=False, clutter_density=0.1)
+    tracker.add(0.0, np.zeros((1, 2)), np.eye(2)[None])
+    tracker.step(scan(0.0, 0.0, 4.0))
+    assert len(probabilities(tracker)) == 3
+    assert set(tracker.register.id.tolist()) == {1}
+
+
 def test_certain_detection_leaves_no_track_without_a_measurement():
     tracker = vt.Tracker(vt.ConstantVelocity(dim=1), vt.MHT(), gate=1.0, detection_probability=1.0, clutter_density=0.1)
     tracker.add(0.0, np.array([[0.0, 0.0], [9.0, 0.0]]), np.tile(np.eye(2), (2, 1, 1)))
@@ -257,7 +268,7 @@ def test_hypotheses_are_exclusive_and_runs_never_meet(seed):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"n_scan": 0}, {"hypotheses": 0}, {"threshold": 1.0}, {"mass": 0.0}, {"new_density": -1.0}, {"branches": 0}],
+    [{"n_scan": 0}, {"hypotheses": 0}, {"threshold": 1.0}, {"mass": 0.0}, {"new_share": 0.0}, {"branches": 0}],
 )
 def test_impossible_settings_are_refused(wrong):
     with pytest.raises(vt.ConfigError, match=str(next(iter(wrong.values())))):
@@ -273,3 +284,28 @@ def test_likelihood_of_no_track_sums_up_what_it_could_have_been():
         tracker.step(scan(t))
     assert len(tracker.bank) == 0
     assert exp(0) == pytest.approx(probabilities(tracker).sum())
+
+
+@pytest.mark.parametrize("method", ["mht", "split"])
+def test_settings_choose_the_rule_and_how_long_it_waits(method):
+    chosen = rule(vt.load_settings(assignments=[f"tracker.method={method}", "tracker.n_scan=5"]).tracker)
+    assert chosen == {"mht": vt.MHT(n_scan=5), "split": vt.Split(n_scan=5)}[method]
+
+
+@pytest.mark.parametrize("method", [vt.MHT(), vt.Split()])
+def test_a_saved_tracker_goes_on_as_if_it_had_not_stopped(method):
+    def new():
+        return vt.Tracker(vt.ConstantVelocity(accel=2.0, speed=5.0), method, clutter_density=1e-3)
+
+    rng = np.random.default_rng(0)
+    scans = [vt.Scan(float(k), rng.uniform(0, 40, (10, 2)), np.eye(2)) for k in range(12)]
+    stopped, straight = new(), new()
+    for s in scans[:6]:
+        stopped.step(s)
+        straight.step(s)
+    resumed = new()
+    restore(resumed, gather(stopped))
+    for s in scans[6:]:
+        one, other = resumed.step(s), straight.step(s)
+        np.testing.assert_array_equal(one.id, other.id)
+        np.testing.assert_array_equal(one.x, other.x)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -144,6 +145,28 @@ def test_a_soft_shadow_is_not_foreground():
     foreground = play(detector, street, 0.3, start=2, region=(*place, 0.6 * street.road[place]))
     assert covered(foreground, 60, 50) < 0.15
     assert covered(play(disturbance(shadow=False), street, 2), 60, 50) == 0
+
+
+def test_the_shadow_of_a_person_is_not_foreground_though_it_is_all_edge():
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    light = np.ones(street.road.shape)
+    light[50:56, 60:76] = 0.55
+    light = cv2.GaussianBlur(light, (0, 0), 1.3)
+    whole = np.s_[:, :, light * street.road]
+    assert not play(detector, street, 0.3, start=2, region=whole).mask.any()
+
+    untested = disturbance(shadow=False)
+    play(untested, street, 2)
+    assert play(untested, street, 0.3, start=2, region=whole).mask.any()
+
+
+def test_a_dark_patterned_car_shows_whole_though_there_is_no_colour_to_tell_it_from_shadow():
+    street, detector = Street(colour=False), disturbance()
+    play(detector, street, 2)
+    stripes = np.where(np.arange(CAR[0]) % 8 < 4, 60, 90)
+    foreground = play(detector, street, 0.3, start=2, region=(slice(50, 74), slice(60, 100), stripes))
+    assert covered(foreground, 60, 50) > 0.9
 
 
 @pytest.mark.parametrize("light", [0.6, 1.4])

@@ -36,6 +36,24 @@ class Side(NamedTuple):
     alone: Floats
 
 
+class Frontier(NamedTuple):
+    """What is remembered of the members of the side that is not taken in turn, all (n,).
+
+    left  edges still to come; bit: the bit that says whether the member is taken, last: the step after which that no
+    longer matters; both -1 before the member is met
+    """
+
+    left: Ints
+    bit: Ints
+    last: Ints
+
+
+@njit(cache=CACHE, nogil=True)
+def frontier(start: Ints) -> Frontier:
+    """Nobody met yet, of the members with the edges start[i]..start[i + 1]."""
+    return Frontier(np.diff(start), np.full(len(start) - 1, -1), np.full(len(start) - 1, -1))
+
+
 @njit(cache=CACHE, nogil=True)
 def reverse(start: Ints, other: Ints, count: int) -> tuple[Ints, Ints, Ints]:
     """start, other and pair of the `count` members of the other side."""
@@ -54,17 +72,16 @@ def reverse(start: Ints, other: Ints, count: int) -> tuple[Ints, Ints, Ints]:
 
 
 @njit(cache=CACHE, nogil=True)
-def plan(members: Ints, side: Side, degree: Ints, bit: Ints, last: Ints, largest: int) -> tuple[Ints, int]:
+def plan(members: Ints, side: Side, other: Frontier, largest: int) -> tuple[Ints, int]:
     """An order of the members that keeps few of the other side contested at a time, and the bits that takes.
 
-    The next member is the one that leaves the fewest more contested, or the first that leaves no more. degree (of
-    the other side) counts edges; bit and last, both -1 on entry, get the bit and the step after which each of the
-    other side is settled. The number of bits is -1 if steps times states would exceed `largest`.
+    The next member is the one that leaves the fewest more contested, or the first that leaves no more. The other
+    side is met on the way. The number of bits is -1 if steps times states would exceed `largest`.
     """
-    order, left = members.copy(), degree.copy()
-    free, width = (1 << WIDEST) - 1, 0
+    left, bit, last = other
+    order, free, width = members.copy(), (1 << WIDEST) - 1, 0
     for step in range(len(order)):
-        best, fewest = step, len(left) + 1
+        best, fewest = step, np.iinfo(np.int64).max
         for s in range(step, len(order)):
             opened = 0
             for e in range(side.start[order[s]], side.start[order[s] + 1]):
@@ -96,14 +113,15 @@ def plan(members: Ints, side: Side, degree: Ints, bit: Ints, last: Ints, largest
 
 @njit(cache=CACHE, nogil=True)
 def exact(
-    order: Ints, width: int, side: Side, bit: Ints, last: Ints, other_alone: Floats,
+    order: Ints, width: int, side: Side, other: Frontier, other_alone: Floats,
     factor: Floats, share: Floats, side_share: Floats, other_share: Floats,
 ) -> None:  # fmt: skip
     """Probabilities of the pairs, into `share`, and of being alone, into those of the two sides.
 
-    forward[k, s] sums the events of the first k members that leave the set s taken; going back, `beyond` sums what
-    the rest can add to each set. All terms are positive, so nothing cancels.
+    order, width and other are those of the plan. forward[k, s] sums the events of the first k members that leave the
+    set s taken; going back, `beyond` sums what the rest can add to each set. All terms are positive: nothing cancels.
     """
+    _, bit, last = other
     steps, size = len(order), 1 << width
     forward = np.zeros((steps + 1, size))
     forward[0, 0] = 1.0

@@ -141,7 +141,7 @@ class Gate:
         grid = Grid.over(scan.z[:, :2], runs, reach)
         row, measurement, d2, nis, log_s = _gated(zhat.shape[1], mode, angles)(
             zhat, cov, own, reach, limit,
-            scan.z, scan.R, grid.order, grid.key, grid.origin, grid.cell, grid.shape,
+            scan.z, scan.R, grid.order, grid.first, grid.origin, grid.cell, grid.shape,
         )  # fmt: skip
         start = np.searchsorted(row, np.arange(len(zhat) + 1))
         log_l = -0.5 * (nis + log_s + zhat.shape[1] * np.log(TURN))
@@ -199,25 +199,25 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Points sorted by (run, row of cells, column): the points of a row's cell range are contiguous."""
+    """Points sorted by (run, row of cells, column): cell c holds order[first[c]..first[c + 1]]."""
 
     order: Ints
-    key: Ints
+    first: Ints
     origin: Floats
     cell: Floats
     shape: Ints
 
     @classmethod
     def over(cls, z: Floats, run: Ints, reach: Floats) -> Grid:
-        """z (M, 1 or 2) points; the cell follows the mean gate, bounded to about one point a cell."""
+        """z (M, 1 or 2) points, runs numbered from 0; cells follow the mean gate, some four to a point at most."""
         z = z if z.shape[1] == 2 else np.column_stack([z[:, 0], np.zeros(len(z))])
         origin, extent = _extent(z)
-        most = max(1.0, np.ceil(np.sqrt(len(z))) * 2)
+        runs = int(run.max(initial=0)) + 1
+        most = np.ceil(2 * np.sqrt(max(1, len(z)) / runs))
         cell = np.maximum(np.maximum(_typical(reach), extent / most), 1e-9)
         shape = (extent / cell).astype(np.int64) + 1
-        key = _keys(z, run, origin, cell, shape)
-        order = np.argsort(key, kind="stable")
-        return cls(order, key[order], origin, cell, shape)
+        order, first = _sorted(z, run, runs, origin, cell, shape)
+        return cls(order, first, origin, cell, shape)
 
 
 @njit(cache=CACHE, nogil=True)
@@ -242,14 +242,21 @@ def _typical(reach: Floats) -> Floats:
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")
-def _keys(z: Floats, run: Ints, origin: Floats, cell: Floats, shape: Ints) -> Ints:
-    """(M,) number of each point's cell: runs apart, rows of cells apart, columns in sequence."""
-    key = np.empty(len(z), np.int64)
+def _sorted(z: Floats, run: Ints, runs: int, origin: Floats, cell: Floats, shape: Ints) -> tuple[Ints, Ints]:
+    """The points (M,) in the order of their cells, runs apart, and where each cell begins."""
+    key, order = np.empty(len(z), np.int64), np.empty(len(z), np.int64)
+    first = np.zeros(runs * shape[0] * shape[1] + 1, np.int64)
     for j in range(len(z)):
         column = min(np.int64((z[j, 0] - origin[0]) / cell[0]), shape[0] - 1)
         line = min(np.int64((z[j, 1] - origin[1]) / cell[1]), shape[1] - 1)
         key[j] = (run[j] * shape[1] + line) * shape[0] + column
-    return key
+        first[key[j] + 1] += 1
+    first = np.cumsum(first)
+    place = first.copy()
+    for j in range(len(z)):
+        order[place[key[j]]] = j
+        place[key[j]] += 1
+    return order, first
 
 
 @lru_cache
@@ -263,9 +270,10 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
 
     def gated(
         zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats,
-        z: Floats, R: Floats, order: Ints, key: Ints, origin: Floats, cell: Floats, shape: Ints,
+        z: Floats, R: Floats, order: Ints, first: Ints, origin: Floats, cell: Floats, shape: Ints,
     ) -> tuple[Ints, Ints, Floats, Floats, Floats]:  # fmt: skip
         rows = len(zhat)
+        runs = (len(first) - 1) // (shape[0] * shape[1])
         size = 4 * rows + 16
         row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
         d2, nis, log_s = np.empty(size), np.empty(size), np.empty(size)
@@ -274,8 +282,8 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
         seen = np.full(len(z) if turns else 0, -1)
         for t in range(rows):
-            first = n
-            if len(key) == 0 or limit[t] == 0.0:
+            begin = n
+            if limit[t] == 0.0 or own[t] >= runs:
                 continue
             for turn in range(-turns, turns + 1):
                 outside = False
@@ -290,10 +298,8 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
                     continue
                 for line in range(low[1], high[1] + 1):
                     base = (own[t] * shape[1] + line) * shape[0]
-                    at_key = np.searchsorted(key, base + low[0])
-                    while at_key < len(key) and key[at_key] <= base + high[0]:
-                        j = order[at_key]
-                        at_key += 1
+                    for at_point in range(first[base + low[0]], first[base + high[0] + 1]):
+                        j = order[at_point]
                         if turns:  # a gate wider than a turn meets a measurement from both sides
                             if seen[j] == t:
                                 continue
@@ -332,14 +338,14 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
                         row[n], measurement[n], d2[n] = t, j, distance
                         nis[n], log_s[n] = whitened, 2.0 * np.log(det)
                         n += 1
-            for k in range(first + 1, n):  # the grid's order depends on the cell size; results must not
-                while k > first and measurement[k - 1] > measurement[k]:
+            for k in range(begin + 1, n):  # the grid's order depends on the cell size; results must not
+                while k > begin and measurement[k - 1] > measurement[k]:
                     measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
                     d2[k - 1], d2[k] = d2[k], d2[k - 1]
                     nis[k - 1], nis[k] = nis[k], nis[k - 1]
                     log_s[k - 1], log_s[k] = log_s[k], log_s[k - 1]
                     k -= 1
-        return row[:n].copy(), measurement[:n].copy(), d2[:n].copy(), nis[:n].copy(), log_s[:n].copy()
+        return row[:n], measurement[:n], d2[:n], nis[:n], log_s[:n]
 
     return specialised(gated, m, mode, *angles)
 

@@ -11,7 +11,7 @@ from numba import njit
 from vidtrack.associate.assignment import solve
 from vidtrack.associate.belief import propagate
 from vidtrack.associate.clusters import clusters
-from vidtrack.associate.events import Side, exact, plan, reverse
+from vidtrack.associate.events import Side, exact, frontier, plan, reverse
 from vidtrack.associate.likeliest import likeliest
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import CACHE
@@ -82,10 +82,8 @@ def _marginals(
     first, back, pair = reverse(start, measurement, len(unused))
     rows = Side(start, measurement, np.arange(len(measurement)), miss)
     columns = Side(first, back, pair, unused)
-    row_degree, column_degree = np.diff(start), np.diff(first)
+    row_frontier, column_frontier = frontier(start), frontier(first)
     beta, beta0, idle = np.zeros(len(row)), np.zeros(len(miss)), np.zeros(len(unused))
-    row_bit, row_last = np.full(len(miss), -1), np.full(len(miss), -1)
-    column_bit, column_last = np.full(len(unused), -1), np.full(len(unused), -1)
     approximate = np.zeros(len(miss), np.bool_)
     met, place = np.zeros(len(unused), np.bool_), np.empty(len(unused), np.int64)
     cluster = clusters(row, measurement, len(miss), len(unused))
@@ -97,20 +95,20 @@ def _marginals(
             end += 1
         tracks = members[begin:end]
         begin = end
-        if row_degree[tracks[0]] == 0:
+        if start[tracks[0]] == start[tracks[0] + 1]:
             beta0[tracks[0]] = 1.0
             continue
         contested = _met(tracks, rows, met)
         if star:
             solved = likeliest(tracks, contested, rows, columns, place, factor, beta, beta0, largest)
         else:
-            by_row, row_width = plan(tracks, rows, column_degree, column_bit, column_last, largest)
-            by_column, column_width = plan(contested, columns, row_degree, row_bit, row_last, largest)
+            by_row, row_width = plan(tracks, rows, column_frontier, largest)
+            by_column, column_width = plan(contested, columns, row_frontier, largest)
             solved = row_width >= 0 or column_width >= 0
             if row_width >= 0 and (column_width < 0 or len(by_row) << row_width < len(by_column) << column_width):
-                exact(by_row, row_width, rows, column_bit, column_last, unused, factor, beta, beta0, idle)
+                exact(by_row, row_width, rows, column_frontier, unused, factor, beta, beta0, idle)
             elif solved:
-                exact(by_column, column_width, columns, row_bit, row_last, miss, factor, beta, idle, beta0)
+                exact(by_column, column_width, columns, row_frontier, miss, factor, beta, idle, beta0)
         if not solved:
             approximate[tracks] = True
             propagate(tracks, contested, rows, columns, factor, beta, beta0)

@@ -11,8 +11,8 @@ from vidtrack.associate.assignment import solve
 from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats, Ints
 
-IMPOSSIBLE = 1e12
-"""Cost of a row that has no choice left."""
+IMPOSSIBLE, FEASIBLE = 1e12, 1e11
+"""Cost of a row that has no choice left, and what everything else stays below."""
 
 
 @njit(cache=CACHE, nogil=True)
@@ -22,8 +22,9 @@ def k_best(
     """The `most` cheapest assignments over all problems, without those costlier than the cheapest by over `slack`.
 
     All problems h have the same rows; row i takes edge k (start[i] <= k < start[i + 1]), that is column[k] at
-    cost[k], or its own alternative a at alone[i, a]. A column serves one row. Problem h adds offset[h] and has
-    only the columns held[h]. Returns problem (S,), choice (S, rows) and cost (S,); a choice is an edge, or -1 - a.
+    cost[k], or its own alternative a at alone[i, a], infinite where it has none. A column serves one row. Problem h
+    adds offset[h] and has only the columns held[h]. Returns problem (S,), choice (S, rows) and cost (S,); a choice is
+    an edge, or -1 - a.
 
     A node of the search is a problem whose first rows are fixed as in its parent's solution and whose next row
     may not choose what its ancestors chose. It is solved only when its bound, its parent's cost plus the smallest
@@ -61,7 +62,7 @@ def k_best(
             exact = _complete(
                 held[h], start, column, cost, alone, depth[node], fixed, bans, choices[solved], gaps[solved]
             )
-            if exact < IMPOSSIBLE:
+            if exact < FEASIBLE:
                 solution[node] = solved
                 solved += 1
                 heappush(heap, (offset[h] + exact, node))
@@ -70,7 +71,7 @@ def k_best(
         found += 1
         for i in range(depth[node], rows):
             gap = gaps[solution[node], i]
-            if gap < IMPOSSIBLE:
+            if gap < FEASIBLE:
                 heappush(heap, (bound + gap, len(problem)))
                 problem.append(h)
                 parent.append(node)

@@ -21,6 +21,7 @@ Examples:
 @settings_options
 def command(explain: bool, config_file: Path | None, assignments: tuple[str, ...]) -> None:
     """Print the effective settings as TOML, ready for --config. Settings taken from the data are commented out."""
-    from vidtrack.config import as_toml, load
+    from vidtrack.config import load
+    from vidtrack.explain import as_toml
 
     click.echo(as_toml(load(config_file, assignments), explain=explain), nl=False)

@@ -62,6 +62,13 @@ def association_options(function: Function) -> Function:
     return function
 
 
+def smooth_option(function: Function) -> Function:
+    """--smooth, for sources that end."""
+    return click.option(
+        "--smooth", is_flag=True, default=None, help="Let each row know what came after it; rows appear later."
+    )(function)
+
+
 def settings_options(function: Function) -> Function:
     """--config and --set."""
     function = click.option(

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vidtrack.cli.options import association_options, common, settings_options, start_log
+from vidtrack.cli.options import association_options, common, settings_options, smooth_option, start_log
 
 
 @click.command(
@@ -23,6 +23,7 @@ Examples:
 @common("Folder for the results.  [default: runs/NAME]")
 @settings_options
 @association_options
+@smooth_option
 @click.option(
     "--estimator",
     type=click.Choice(["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta"]),
@@ -79,4 +80,5 @@ _SETTING = {
     "estimator": "radar.estimator",
     "model": "radar.model",
     "skip_bad_rows": "radar.skip_bad_rows",
+    "smooth": "output.smooth",
 }

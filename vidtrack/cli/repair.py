@@ -21,10 +21,13 @@ Examples:
 def command(folder: Path, quiet: bool) -> None:
     """Rebuild tracks.parquet in DIR from tracks.csv, cut half-written lines, sort mot.txt and counts.csv.
 
-    A killed run stays marked as interrupted in summary.json. A finished run is left as it is.
+    A killed run stays marked as interrupted in summary.json. A finished run is left as it is. Of a live run in
+    parts, every part is repaired.
     """
+    from vidtrack.live.keep import parts_of
     from vidtrack.output.repair import repair
 
-    rows = repair(folder)
-    if not quiet:
-        click.echo(f"{folder}: {rows} rows in tracks.csv and tracks.parquet", err=True)
+    for part in parts_of(folder) or [folder]:
+        rows = repair(part)
+        if not quiet:
+            click.echo(f"{part}: {rows} rows in tracks.csv and tracks.parquet", err=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -54,7 +55,9 @@ Examples:
 )
 @click.argument("scenario", type=click.Choice(VIDEO + RADAR), metavar="SCENARIO")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder to write.  [default: runs/SCENARIO]")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="The same seed gives the same files.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="The same seed gives the same files."
+)
 @click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15]")
 @click.option("--size", type=_Size(), help="The same scene at this size.  [default: 320x240, junction 240x180]")
 @click.option("--noise", default=2.0, show_default=True, help="Sensor noise, standard deviation in grey levels.")
@@ -68,22 +71,7 @@ Examples:
 @click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
 @click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
 @click.option("--quiet", is_flag=True, help="No progress bar.")
-def command(
-    scenario: str,
-    output: Path | None,
-    seed: int,
-    fps: float | None,
-    size: tuple[int, int] | None,
-    noise: float,
-    shake: float,
-    light_steps: int,
-    snr_db: float | None,
-    pfa: float | None,
-    weibull: tuple[float, float] | None,
-    glint: float | None,
-    force: bool,
-    quiet: bool,
-) -> None:
+def command(scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, **chosen: Any) -> None:
     """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a radar scenario
     as plots.csv and truth.csv.
 
@@ -102,27 +90,35 @@ def command(
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     """
     _refuse_options_of(RADAR_ONLY if scenario in VIDEO else VIDEO_ONLY, scenario)
-    if scenario in RADAR:
-        _simulate_radar(scenario, output, seed, snr_db, pfa, weibull, glint, force)
-        return
+    kind = {name: chosen[name] for name in (VIDEO_ONLY if scenario in VIDEO else RADAR_ONLY)}
+    if scenario in VIDEO:
+        _draw_video(scenario, output, seed, force, quiet, kind)
+    else:
+        _draw_plots(scenario, output, seed, force, **kind)
+
+
+def _draw_video(
+    scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, options: dict[str, Any]
+) -> None:
     from vidtrack.output.folder import open_run
     from vidtrack.simulate import simulate, write
 
-    clip = simulate(scenario, seed=seed, fps=fps, size=size, noise=noise, shake=shake, light_steps=light_steps)
+    clip = simulate(scenario, seed=seed, **options)
     folder = open_run(output, scenario, force)
     with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=quiet) as frames:
         write(clip, folder, frames)
 
 
-def _simulate_radar(
+def _draw_plots(
     scenario: str,
     output: Path | None,
     seed: int,
+    force: bool,
+    *,
     snr_db: float | None,
     pfa: float | None,
     weibull: tuple[float, float] | None,
     glint: float | None,
-    force: bool,
 ) -> None:
     from vidtrack.detection.amplitude import Weibull
     from vidtrack.output.folder import open_run

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vidtrack.cli.options import common, settings_options, start_log
+from vidtrack.cli.options import common, settings_options, smooth_option, start_log
 from vidtrack.cli.tracking import chosen_settings, tracking_options
 
 
@@ -23,6 +23,7 @@ Examples:
 @common("Folder for the results.  [default: runs/NAME]")
 @settings_options
 @tracking_options
+@smooth_option
 @click.option("--fps", type=float, metavar="N", help="True frames/s, where the input carries no times or wrong ones.")
 def command(
     source: str,

@@ -48,6 +48,7 @@ _SETTING = {
     "scale": "source.scale",
     "mask": "source.mask",
     "fps": "source.fps",
+    "smooth": "output.smooth",
 }
 
 

@@ -35,6 +35,9 @@ class Estimator(Protocol):
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         """x, P after dt seconds; changes nothing."""
 
+    def jacobian(self, dt: float, x: Floats) -> Floats:
+        """(1, n, n) or (T, n, n) derivative of what `ahead` makes of means x (T, n)."""
+
     def predict(self, dt: float) -> None:
         """Move all rows dt seconds on."""
 

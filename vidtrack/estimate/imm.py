@@ -54,6 +54,12 @@ class IMMBank:
         """x, P after dt seconds; changes nothing."""
         return self._moments(*self._moved(dt))
 
+    def jacobian(self, dt: float, x: Floats) -> Floats:
+        """(1, n, n) derivative that all modes have in common: positions go on with their velocities."""
+        J = np.eye(x.shape[1])
+        J[self.model.position, self.model.velocity] = dt
+        return J[None]
+
     def predict(self, dt: float) -> None:
         """Mix the modes and move all rows dt seconds on."""
         self.banks, self.mode = self._moved(dt)

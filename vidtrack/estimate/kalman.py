@@ -37,6 +37,10 @@ class KalmanBank:
         Q = self.model.process_noise(dt, self.x, self.P, self.hits, self.scale)
         return propagation(self.x.shape[1])(self.x, self.P, F, J, Q)
 
+    def jacobian(self, dt: float, x: Floats) -> Floats:
+        """(1, n, n) or (T, n, n) derivative of the motion at means x (T, n)."""
+        return self.model.jacobian(dt, x, self.model.transition(dt, x))
+
     def predict(self, dt: float) -> None:
         """Move all rows dt seconds on."""
         self.x, self.P = self.ahead(dt)

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from threading import Condition, Event, Thread
 from time import monotonic
 
-from vidtrack.errors import StoppedEarly
+from vidtrack.errors import Error, StoppedEarly
 from vidtrack.output.sink import Sink, Step
 
 log = logging.getLogger(__name__)
 
-_DEPTH = 100  # steps that may wait
+_DEPTH = 8  # steps that may wait with their pictures
 _TELL_S = 60.0  # a loss that lasts is told so often
 
 
@@ -24,18 +24,25 @@ class Beside:
     write    takes a batch; raises StoppedEarly if it cannot be written, and is given the next one all the same
     finish   is called after the last batch
     every_s  time between two batches; 0: as they come
+    depth    steps that may wait
 
     lost     steps that were not written: `write` failed, or was too slow
     """
 
     def __init__(
-        self, name: str, write: Callable[[list[Step]], None], finish: Callable[[], None], every_s: float = 0.0
+        self,
+        name: str,
+        write: Callable[[list[Step]], None],
+        finish: Callable[[], None],
+        every_s: float = 0.0,
+        depth: int = _DEPTH,
     ) -> None:
         self.name = name
         self.lost = 0
         self._write = write
         self._finish = finish
         self._every_s = every_s
+        self._depth = depth
         self._waiting: deque[Step] = deque()
         self._changed = Condition()
         self._ending = Event()
@@ -57,7 +64,7 @@ class Beside:
     def step(self, step: Step) -> None:
         """Queue a step, or count it as lost."""
         with self._changed:
-            if len(self._waiting) >= _DEPTH:
+            if len(self._waiting) >= self._depth:
                 self._lose(1, f"{self.name}: writing is too slow")
             else:
                 self._waiting.append(step)
@@ -85,10 +92,11 @@ class Beside:
                 self._changed.wait_for(lambda: self._waiting or self._ending.is_set())
             self._ending.wait(self._every_s)
             self._write_waiting()
+        self._write_waiting()  # what came during the last write
         try:
             self._finish()
-        except StoppedEarly as error:
-            log.warning("%s", error)
+        except (Error, OSError) as error:
+            log.warning("%s could not be finished: %s", self.name, error)
 
     def _write_waiting(self) -> None:
         with self._changed:
@@ -96,7 +104,7 @@ class Beside:
             self._waiting.clear()
         try:
             self._write(steps)
-        except StoppedEarly as error:
+        except (StoppedEarly, OSError) as error:
             self._failing = True
             self._lose(len(steps), str(error))
         else:

@@ -20,6 +20,7 @@ from vidtrack.traffic.lines import LineCounter
 from vidtrack.video.frame import Image
 
 _WRITE_S = 0.25  # between two writes: with LIVE_HOLD_S this is what a kill costs
+_ROWS_DEPTH = 1000  # steps without pictures that may wait for a slow disk
 _LEAST_S = 0.2  # that each output gets to end, however late it is
 
 
@@ -73,7 +74,7 @@ class Outputs:
         self._settings = settings
         self._decisions = extras.decisions
         parts = Parts(folder, self._part, roll_s, keep, subject.counter)
-        tables = Beside("results", parts.write, parts.finish, _WRITE_S)
+        tables = Beside("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
         self._confirmed = Confirmed(tables, hold_s=LIVE_HOLD_S)
         self._besides = [tables]
         self._sinks: list[Sink] = [self._confirmed]

@@ -50,7 +50,8 @@ class Parts:
         self._counter = counter
         self._look = Every(_LOOK_S)
         self._finishing: list[Thread] = []
-        unfinished = [part for part in parts_of(root) if not (part / "tracks.parquet").exists()]
+        begun = [part for part in parts_of(root) if (part / "tracks.csv").exists()]
+        unfinished = [part for part in begun if not (part / "tracks.parquet").exists()]
         self._number = 0
         self._part: Part | None = None
         self._begin()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import time
 from collections import deque
 from pathlib import Path
@@ -111,8 +112,7 @@ class Recorder:
         self.hang_up()
         try:
             self._write_log()
-            if self._list is not None:
-                self._list.close()
+            self._end_list()
         except StoppedEarly as error:
             log.warning("%s", error)
 
@@ -126,18 +126,26 @@ class Recorder:
 
     def _begin(self, connection: Connection) -> None:
         folder = new_part(self._root)
+        self._part += 1
+        self._folders[self._part] = folder
+        self._period = self._now()
         (folder / SETTINGS).write_text(self._settings)
         self._film = Film(folder / VIDEO, connection)
-        self._part += 1
-        self._period = self._now()
-        self._folders[self._part] = folder
         self._folders.pop(self._part - 3, None)  # its last frame was tracked long ago
 
     def _pause(self, why: str) -> None:
         self.lost += 1
         self._retry_s = monotonic() + _RETRY_S
         self.hang_up()
+        folder = self._folders.get(self._part)
+        if folder is not None and not (folder / FRAMES).exists():  # nothing of it can be repeated
+            shutil.rmtree(folder, ignore_errors=True)
         log.warning("recording pauses: %s; tracking goes on", why)
+
+    def _end_list(self) -> None:
+        ended, self._list = self._list, None
+        if ended is not None:
+            ended.close()
 
     def _write_log(self) -> None:
         """Bring states and lists of frames to their parts."""
@@ -147,9 +155,7 @@ class Recorder:
                 if self._list is not None:
                     self._list.add(entry)
                 continue
-            if self._list is not None:
-                self._list.close()
-            self._list = None
+            self._end_list()
             folder = self._folders[part]
             with writing(folder):
                 write_state(folder / STATE, entry)

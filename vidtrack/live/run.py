@@ -60,7 +60,10 @@ class LiveRun:
         self.name = self._address.name
         roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
         keep = Keep(live.keep_s, live.keep_bytes)
-        self._state_file = None if extras.state is None else StateFile(extras.state)
+        self._state_file: StateFile | None = None
+        if extras.state is not None:
+            usable(extras.state.parent)
+            self._state_file = StateFile(extras.state)
         self._recorder: Recorder | None = None
         self._outputs: Outputs | None = None
         with ExitStack() as stack:  # whatever fails below, what is open by then is closed

@@ -31,11 +31,10 @@ class LineFile:
         self.path = path
         self._due = Every(1.0)
         self._waiting: list[str] = []
+        replace_text(path, header)  # never without it, not even for a moment
         with writing(path):
             # Unbuffered: what a failed write left in a buffer would fail again on closing.
-            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
-        self._waiting.append(header)
-        self.flush()
+            self._file = open(path, "ab", buffering=0)  # noqa: SIM115
 
     def add(self, lines: str) -> None:
         """Take whole lines; call it for every scan, also with none, so that earlier ones reach the disk in time."""

@@ -68,7 +68,7 @@ class TrajectoryPlot:
         for track_id, path in zip(self._id.tolist(), paths, strict=True):
             self._pen.path(path * self._zoom, (*colour(track_id), 255), width=2)
             self._ends.pop(track_id, None)
-            self._ends[track_id] = path[-1]
+            self._ends[track_id] = path[-1].copy()  # or it would keep all points of the batch
         self._xy = np.array([path[-1] for path in paths]).reshape(-1, 2)
         alive = np.isin(self._id, self._waiting[-1].id)
         self._id, self._xy = self._id[alive], self._xy[alive]

@@ -30,7 +30,7 @@ def check_numbers(table: Table, measured: list[str]) -> None:
         table.refuse(~np.isfinite(columns[name]), name, "a finite number is needed")
     scan = columns["scan"]
     with np.errstate(invalid="ignore"):
-        table.refuse((scan != np.floor(scan)) | (scan < 0), "scan", "scans are numbered 0, 1, 2, ...")
+        table.refuse((scan != np.floor(scan)) | (scan < 0) | (scan > 2**53), "scan", "scans are numbered 0, 1, 2, ...")
         for name in measured:
             _check_measured(table, name)
         for name in sigmas:
@@ -64,7 +64,7 @@ def check_order(table: Table, measured: list[str]) -> None:
     again = np.zeros(len(rows), bool)
     again[1:] = np.all([np.diff(column[order]) == 0 for column in columns], axis=0)
     for k in np.flatnonzero(again):
-        table.note(rows[order[k]], f"the plot of line {table.line[rows[order[k - 1]]]} again")
+        table.note(rows[order[k]], f"the plot of {table.unit} {table.line[rows[order[k - 1]]]} again")
 
     rows = np.sort(rows[order[~again]])
     number, member = np.unique(scan[rows], return_inverse=True)

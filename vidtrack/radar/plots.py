@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import logging
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +48,10 @@ class Plots:
 
     def __len__(self) -> int:
         return len(self.scan)
+
+    def without_range_rate(self) -> Plots:
+        """The same plots, positions only."""
+        return replace(self, z=self.z[:, : self.dim], sigma=self.sigma[:, : self.dim], doppler=False)
 
 
 def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots:

@@ -6,15 +6,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from vidtrack.config import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
+from vidtrack.radar.sweep import Sweep
 from vidtrack.scan import Floats, Ints, Scan
 
 NONLINEAR = ("ekf", "ukf", "particle")
 """Estimators that take range and angles as they are; the others get positions, converted without bias."""
+
+SIMULTANEOUS_S = 1e-6
+"""Plots within this time are measured at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +29,8 @@ class Measurements:
     sensor     what z is
     dim        space dimensions
     scan       (N,) number of each plot's scan
-    time_s     (N,) when each was measured
+    time_s     (N,) when each was measured; where times within a scan differ, predictions are moved to them
+    speed      standard deviation of an unknown velocity [m/s]
     z, R       (N, m), (N, m, m)
     amplitude  (N,) or None
     """
@@ -33,6 +39,7 @@ class Measurements:
     dim: int
     scan: Ints
     time_s: Floats
+    speed: float
     z: Floats
     R: Floats
     amplitude: Floats | None
@@ -53,7 +60,14 @@ class Measurements:
                 yield empty, Scan(between, self.z[:0], self.R[:0], self.sensor, noise=noise)
             amplitude = None if self.amplitude is None else self.amplitude[start:end]
             z, R = self.z[start:end], self.R[start:end]
-            yield int(number[k]), Scan(float(time_s[k]), z, R, self.sensor, amplitude=amplitude, noise=noise)
+            sensor = self._at(self.time_s[start:end] - time_s[k], z, R)
+            yield int(number[k]), Scan(float(time_s[k]), z, R, sensor, amplitude=amplitude, noise=noise)
+
+    def _at(self, offset: Floats, z: Floats, R: Floats) -> Sensor:
+        """The sensor of a scan whose plots z (M, m) were measured at these times (M,) from the scan's."""
+        if np.ptp(offset) < SIMULTANEOUS_S:
+            return self.sensor
+        return Sweep(self.sensor, KDTree(self.sensor.locate(z, R)[0]), offset, self.speed)
 
 
 def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
@@ -62,33 +76,54 @@ def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
     Range and angles stay as they are for NONLINEAR estimators; the others get positions, converted without bias. A
     range rate stays a range rate and is linearised; alpha-beta, which knows positions only, does without it.
     """
-    doppler = plots.doppler and settings.estimator != "alpha-beta"
-    origin = settings.position[: plots.dim]
-    R = np.einsum("ni,ij->nij", plots.sigma**2, np.eye(plots.sigma.shape[1]))
-    z = plots.z
-    if plots.doppler and not doppler:
-        z, R = z[:, : plots.dim], R[:, : plots.dim, : plots.dim]
-    sensor: Sensor = PositionRangeRate(origin) if doppler else POSITION
+    if settings.estimator == "alpha-beta":
+        plots = plots.without_range_rate()
+    z, R = plots.z, np.einsum("ni,ij->nij", plots.sigma**2, np.eye(plots.sigma.shape[1]))
+    sensor: Sensor = PositionRangeRate(settings.position[: plots.dim]) if plots.doppler else POSITION
     if plots.polar:
-        polar = (
-            RangeAzimuth(settings.position[:2], doppler)
-            if plots.dim == 2
-            else RangeAzimuthElevation(settings.position, doppler)
-        )
+        polar = _polar(plots, settings)
         if settings.estimator in NONLINEAR:
             sensor = polar
         else:
             position, cov = polar.locate(z, R)
             z = np.column_stack([position, z[:, plots.dim :]])
             R[:, : plots.dim, : plots.dim] = cov
-    return Measurements(sensor, plots.dim, plots.scan, plots.time_s, z, R, plots.amplitude)
+    return Measurements(sensor, plots.dim, plots.scan, plots.time_s, settings.max_speed / 2, z, R, plots.amplitude)
+
+
+def _polar(plots: Plots, settings: RadarSettings) -> Sensor:
+    if plots.dim == 2:
+        return RangeAzimuth(settings.position[:2], plots.doppler)
+    return RangeAzimuthElevation(settings.position, plots.doppler)
 
 
 def clutter_density(found: Measurements) -> float:
-    """Plots per scan and unit of measurement space: the upper bound that counts targets as clutter.
+    """Plots per scan and unit of measurement space: the upper bound that counts targets as clutter."""
+    return len(found.z) / found.count / surveyed(found)
 
-    The space is the box around all plots, each side at least the width of their errors.
+
+def surveyed(found: Measurements) -> float:
+    """Volume of the measurement space: the box around all plots, and around that what targets cross within a scan.
+
+    Without such a margin a file with the plots of one target only would look as if it were full of clutter.
     """
-    width = np.sqrt(12 * np.diagonal(found.R, axis1=1, axis2=2).mean(axis=0))
-    sides = np.maximum(np.ptp(found.z, axis=0), width)
-    return float(len(found.z) / found.count / sides.prod())
+    sides = np.ptp(found.z, axis=0)
+    for angle in found.sensor.angles:
+        sides[angle] = _sector(found.z[:, angle])
+    return float((sides + _margin(found)).prod())
+
+
+def _margin(found: Measurements) -> Floats:
+    """(m,) how far the fastest target (twice the standard deviation) gets either way within a scan."""
+    step = 4 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)
+    margin = np.full(found.z.shape[1], step)
+    if found.sensor.angles:
+        margin[1 : found.dim] = np.minimum(step / np.median(found.z[:, 0]), np.pi)
+    margin[found.dim :] = 4 * found.speed
+    return margin + np.sqrt(12 * np.diagonal(found.R, axis1=1, axis2=2).mean(axis=0))
+
+
+def _sector(angle: Floats) -> float:
+    """The least sector that holds all angles (N,) in -pi..pi: the circle without the widest gap."""
+    turn = np.sort(angle)
+    return float(2 * np.pi - np.diff(turn, append=turn[0] + 2 * np.pi).max())

@@ -31,6 +31,7 @@ class Table:
     names   of all columns in the file; `columns` holds those that were wanted
     line    (N,) where each row stands: the header of a CSV is line 1, blank lines do not count;
             rows of a Parquet file count from 1
+    unit    what `line` counts: "line" or "row"
     faults  lines and cells that are no numbers
     """
 
@@ -38,6 +39,7 @@ class Table:
     names: list[str]
     columns: dict[str, Floats]
     line: Ints
+    unit: str
     faults: Faults
 
     def refuse(self, bad: NDArray[np.bool_], name: str, rule: str) -> None:
@@ -56,7 +58,7 @@ class Table:
 
     def complaint(self) -> str:
         """All faults in words, the first few in full."""
-        return _complaint(self.path, self.faults)
+        return _complaint(self.path, self.unit, self.faults)
 
 
 def read_table(path: Path, wanted: Iterable[str]) -> Table:
@@ -70,6 +72,7 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
     faults: Faults = {}
+    unit = "row" if parquet else "line"
     try:
         table = pyarrow.parquet.read_table(path) if parquet else _read_csv(path, faults)
     except (pa.ArrowException, UnicodeDecodeError) as error:
@@ -78,10 +81,10 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     table = table.rename_columns([name.strip() for name in table.column_names])
     _refuse_repeated_names(path, table.column_names)
     if not len(table):
-        raise PlotFormatError(_complaint(path, faults) if faults else f"{path} holds no plots")
+        raise PlotFormatError(_complaint(path, unit, faults) if faults else f"{path} holds no plots")
     line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
     columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
-    return Table(path, table.column_names, columns, line, faults)
+    return Table(path, table.column_names, columns, line, unit, faults)
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str:
@@ -91,9 +94,9 @@ def nearest(wanted: str, names: Iterable[str]) -> str:
     return f"the nearest {'is' if len(near) == 1 else 'are'} {', '.join(map(repr, near))}" if near else "it has none"
 
 
-def _complaint(path: Path, faults: Faults) -> str:
+def _complaint(path: Path, unit: str, faults: Faults) -> str:
     count = len(faults)
-    shown = [f"line {line}: {fault}" for line, fault in sorted(faults.items())[:SHOWN]]
+    shown = [f"{unit} {line}: {fault}" for line, fault in sorted(faults.items())[:SHOWN]]
     more = [f"and {count - SHOWN} more"] if count > SHOWN else []
     return f"{path}: {count} bad {'row' if count == 1 else 'rows'}: " + "; ".join(shown + more)
 

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
     from vidtrack.simulate.clip import Clip as Clip
     from vidtrack.simulate.clip import simulate as simulate
     from vidtrack.simulate.truth import Truth as Truth
-    from vidtrack.simulate.write import write as write
+    from vidtrack.simulate.video_write import write as write
 
-_HOME = {"SCENARIOS": "clip", "Clip": "clip", "Truth": "truth", "simulate": "clip", "write": "write"}
+_HOME = {"SCENARIOS": "clip", "Clip": "clip", "Truth": "truth", "simulate": "clip", "write": "video_write"}
 __all__ = sorted(_HOME)
 
 

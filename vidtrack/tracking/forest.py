@@ -26,13 +26,11 @@ class Forest(Protocol):
     @property
     def sure(self) -> Mask: ...
 
-    def grow(
-        self, problem: Problem, register: Register, starts: Mask, clutter: float, events: list[Event]
-    ) -> tuple[Decision, Mask]:
+    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> tuple[Decision, Mask]:
         """Decide on a scan: the successors of the rows, and the measurements (M,) that start trees.
 
         The new trees become the last rows, in the order of their measurements. starts (M,) measurements that may
-        start one; clutter density of false measurements. Takes the rows of the register over to the successors.
+        start one. Takes the rows of the register over to the successors.
         """
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:

@@ -11,13 +11,7 @@ from vidtrack.scan import Floats, Ints
 from vidtrack.tracking.hypotheses import Hypotheses, Mask, log_sum
 
 NEVER = -1e6
-"""ln of a factor that is zero in a limit: P_D of zero or one, no clutter. The fewest such factors then win."""
-
-
-def log(value: Floats | float) -> Floats:
-    """ln, at least NEVER."""
-    with np.errstate(divide="ignore"):
-        return np.maximum(np.log(value), NEVER)
+"""ln of the likelihood of what cannot be seen. The fewest such factors win."""
 
 
 def children(
@@ -34,10 +28,10 @@ def children(
     """The `most` likeliest children of all hypotheses of each cluster, and their probabilities.
 
     group (M,) cluster of each measurement; pairs (P,) of leaves and measurements with log_ratio = ln(P_D N(v; 0, S)
-    / clutter density); log_missed (T,) = ln(1 - P_D); log_new (M,) = ln(new density / clutter density). In each
-    child every measurement continues one leaf of its parent, starts a track or is false (Reid's formula over the
-    clutter density of all measurements, SPEC 001). Children less probable than the likeliest by over `slack` [ln]
-    are left out.
+    / clutter density); log_missed (T,) = ln(1 - P_D); log_new (M,) = ln(new density / clutter density), -inf for
+    what starts no track. In each child every measurement continues one leaf of its parent, starts a track or is
+    false (Reid's formula over the clutter density of all measurements, SPEC 001). Children less probable than the
+    likeliest by over `slack` [ln] are left out.
 
     The children's leaves are codes: pair p is p, leaf t missed is P + t, a track that measurement j starts is
     P + T + j.

@@ -35,12 +35,16 @@ class Groups:
            hides somebody whose edge it may be
     growth a blob whose area is more than this many times the predicted box, or less than the inverse,
            is not the vehicle alone or not all of it
+    known_s, part_s   a member seen alone for less than known_s that stays in a group for part_s was never a vehicle
+           but a part of one
     """
 
     cover: float = 0.5
     edge: float = 0.1
     gate: float = 2.0
     growth: float = 2.5
+    known_s: float = 0.4
+    part_s: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0 < self.cover <= 1:

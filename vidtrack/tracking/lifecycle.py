@@ -3,14 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from scipy.special import bdtrc
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import MERGED, TENTATIVE, Floats
 from vidtrack.tracking.register import Register
 
 Mask = np.ndarray
+
+
+class Life(Protocol):
+    """Rules for the rows of a register.
+
+    birth            log-odds that a measurement which belongs to no track is a target's
+    confirms, ends   what to say of a track that was confirmed, and of one that is hopeless
+    """
+
+    @property
+    def birth(self) -> float: ...
+
+    @property
+    def confirms(self) -> str: ...
+
+    @property
+    def ends(self) -> str: ...
+
+    def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
+        """(T,) tentative rows that now deserve belief. xy (T, d) positions, size (T,) of the objects."""
+
+    def hopeless(self, register: Register) -> Mask:
+        """(T,) rows that what was seen of them, and what was not, speaks against."""
+
+    def lost(self, register: Register, t: float) -> Mask:
+        """(T,) rows without evidence for too long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,17 +68,27 @@ class LifeCycle:
             raise ConfigError(
                 f"M-of-N is {self.confirm_hits} of {self.confirm_window}; it needs 1 <= hits <= window <= 63"
             )
-        if self.coast_s is None and self.coast_scans is None:
-            raise ConfigError("tracks would never be deleted: give coast_s or coast_scans")
-        if self.coast_scans is not None and not 1 <= self.coast_scans <= 62:
-            raise ConfigError(f"coast_scans is {self.coast_scans}; it must lie in 1..62")
+        refuse_immortal(self.coast_s, self.coast_scans)
+
+    @property
+    def confirms(self) -> str:
+        """M of N."""
+        return f"{self.confirm_hits} hits of {self.confirm_window}"
+
+    @property
+    def ends(self) -> str:
+        """Why hopeless rows are."""
+        return "too many misses before confirmation"
+
+    @property
+    def birth(self) -> float:
+        """As likely as not."""
+        return 0.0
 
     def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
-        """(T,) tentative rows that now deserve belief. xy (T, d) positions, size (T,) of the objects."""
+        """(T,) tentative rows with enough hits, age and travel. xy (T, d) positions, size (T,) of the objects."""
         enough = self._hits(register) >= self.confirm_hits
-        old = t - register.born_s >= self.confirm_s * (1 - 1e-9)
-        travelled = np.linalg.norm(xy - register.start, axis=1) >= self.confirm_travel * size
-        return (register.status == TENTATIVE) & enough & old & travelled
+        return enough & grown(register, t, xy, self.confirm_s, self.confirm_travel * size)
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
@@ -60,17 +98,54 @@ class LifeCycle:
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""
-        gone = np.zeros(len(register), bool)
-        if self.coast_scans is not None:
-            unseen = register.history & ((1 << self.coast_scans) - 1) == 0
-            gone |= (register.status != TENTATIVE) & unseen
-        if self.coast_s is not None:
-            patience = np.where(register.status == MERGED, self.hidden_s, self.coast_s)
-            gone |= t - register.updated_s > np.maximum(patience, self.coast_s)
-        return gone
+        known = register.status != TENTATIVE
+        return (known & missed(register, self.coast_scans)) | unseen(register, t, self.coast_s, self.hidden_s)
 
     def _hits(self, register: Register) -> np.ndarray:
         return np.bitwise_count(register.history & ((1 << self.confirm_window) - 1)).astype(np.int64)
+
+
+def grown(register: Register, t: float, xy: Floats, age_s: float, travel: Floats) -> Mask:
+    """(T,) tentative rows that are old enough and have moved far enough (T,) from where they began."""
+    old = t - register.born_s >= age_s * (1 - 1e-9)
+    return (register.status == TENTATIVE) & old & (np.linalg.norm(xy - register.start, axis=1) >= travel)
+
+
+def missed(register: Register, scans: int | None) -> Mask:
+    """(T,) rows that the last scans, so many, did not show; None: no limit."""
+    if scans is None:
+        return np.zeros(len(register), bool)
+    return register.history & ((1 << scans) - 1) == 0
+
+
+def unseen(register: Register, t: float, coast_s: float | None, hidden_s: float) -> Mask:
+    """(T,) rows without evidence for coast_s, on shared blobs for hidden_s if that is longer; None: no limit."""
+    if coast_s is None:
+        return np.zeros(len(register), bool)
+    patience = np.where(register.status == MERGED, hidden_s, coast_s)
+    return t - register.updated_s > np.maximum(patience, coast_s)
+
+
+def refuse_immortal(coast_s: float | None, coast_scans: int | None) -> None:
+    """Raise ConfigError where a track would never end for want of evidence."""
+    if coast_s is None and coast_scans is None:
+        raise ConfigError("tracks would never be deleted: give coast_s or coast_scans")
+    if coast_scans is not None and not 1 <= coast_scans <= 62:
+        raise ConfigError(f"coast_scans is {coast_scans}; it must lie in 1..62")
+
+
+def confirmation_probability(p: float, hits: int, window: int, *, initiated: bool = True) -> float:
+    """Probability that M of N scans show what each shows with probability p.
+
+    initiated  the first of the N scans is the hit that started the track, as LifeCycle counts; else any N scans
+    """
+    return float(bdtrc(hits - 2, window - 1, p)) if initiated else float(bdtrc(hits - 1, window, p))
+
+
+def scans_to_false_deletion(misses: int, detection: float) -> float:
+    """Mean number of scans until so many misses in a row end the track of a target seen with this probability."""
+    q = 1 - detection
+    return float((1 - q**misses) / (detection * q**misses))
 
 
 def _bit_length(history: np.ndarray) -> np.ndarray:

@@ -3,12 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from vidtrack.associate import methods
 from vidtrack.associate.hard import Associator
+from vidtrack.config import TrackerSettings
 from vidtrack.tracking.forest import Deferred
+from vidtrack.tracking.lifecycle import Life, LifeCycle
+from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.mht import MHT
 from vidtrack.tracking.splitting import Split
 
 METHODS: dict[str, Callable[[], Associator | Deferred]] = {**methods.METHODS, "split": Split, "mht": MHT}
 """Those that decide in one scan, and those that wait."""
+
+
+def rule(settings: TrackerSettings) -> Associator | Deferred:
+    """The association method of these settings."""
+    if settings.method == "mht":
+        return MHT(n_scan=settings.n_scan)
+    if settings.method == "split":
+        return Split(n_scan=settings.n_scan)
+    return methods.METHODS[settings.method]()
+
+
+def life(kind: str, settings: TrackerSettings, hits: int, window: int, **patience: Any) -> Life:
+    """The rules of confirmation and deletion by their name: m-of-n as given, or llr, the score.
+
+    patience  what both have in common: confirm_s, confirm_travel, coast_s, hidden_s, coast_scans
+    """
+    if kind == "llr":
+        return LogRatio(settings.false_track, settings.missed_track, **patience)
+    return LifeCycle(hits, window, **patience)

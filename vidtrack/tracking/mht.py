@@ -11,14 +11,12 @@ from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Decision, Event, Floats, Ints
 from vidtrack.tracking.forest import Window, one_each
-from vidtrack.tracking.generation import NEVER, agreeing, children, likeliest, log
+from vidtrack.tracking.generation import NEVER, agreeing, children, likeliest
 from vidtrack.tracking.hypotheses import Hypotheses, surviving
 from vidtrack.tracking.register import Register
 
 SURE = 0.9
 """A track is confirmed only when the hypotheses that have it are together at least so probable."""
-NEW_SHARE = 0.1
-"""Density of new targets per density of clutter, where none is given."""
 
 Mask = np.ndarray
 
@@ -32,11 +30,11 @@ class MHT:
     threshold    less probable ones are dropped
     mass         the likeliest that sum to this probability are enough
     branches     likeliest measurements a leaf may take
-    new_density  density of new targets' first measurements [per unit of measurement space]; None: a tenth of the
-                 clutter density
+    new_share    density of the measurements that new targets begin with, per density of false ones
 
-    A track is confirmed when its life cycle says so and no hypothesis doubts it any more. Blobs shared by several
-    vehicles (Groups) are not recognised by this rule.
+    A track is confirmed when its life cycle says so and hardly a hypothesis doubts it. What is shown is the likeliest
+    hypothesis of the moment, so a later scan may contradict a row already written. Blobs that several vehicles share
+    (Groups) are not recognised.
     """
 
     n_scan: int = 3
@@ -44,7 +42,7 @@ class MHT:
     threshold: float = 1e-4
     mass: float = 0.9999
     branches: int = 10
-    new_density: float | None = None
+    new_share: float = 0.1
 
     def __post_init__(self) -> None:
         if not 1 <= self.n_scan <= 20:
@@ -56,8 +54,13 @@ class MHT:
             raise ConfigError(f"threshold is {self.threshold}; it must be at least 0 and below 1")
         if not 0 < self.mass <= 1:
             raise ConfigError(f"mass is {self.mass}; it must be above 0, at most 1")
-        if self.new_density is not None and not 0 <= self.new_density < np.inf:
-            raise ConfigError(f"density of new targets is {self.new_density}; it must be a finite number from 0 on")
+        if not 0 < self.new_share < np.inf:
+            raise ConfigError(f"share of new targets is {self.new_share}; it must be a finite number above 0")
+
+    @property
+    def slack(self) -> float:
+        """How much less probable [ln] than the likeliest a hypothesis may be: at most 1 / threshold times."""
+        return float(-np.log(self.threshold)) if self.threshold > 0 else np.inf
 
     def forest(self) -> HypothesisForest:
         """A new tracker's trees."""
@@ -67,7 +70,9 @@ class MHT:
 class HypothesisForest:
     """Trees of which hypotheses choose leaves.
 
-    told  (T,) rows whose tree has been shown
+    hypotheses  which leaves are true together
+    window      what each leaf took in the undecided scans
+    told        (T,) rows whose tree has been shown
     """
 
     STATE = ("hypotheses", "window", "sure", "told", "shown")
@@ -80,42 +85,28 @@ class HypothesisForest:
         self.told = np.empty(0, bool)
         self.shown = np.empty(0, np.int64)
 
-    def grow(
-        self, problem: Problem, register: Register, starts: Mask, clutter: float, events: list[Event]
-    ) -> tuple[Decision, Mask]:
+    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> tuple[Decision, Mask]:
         """Cluster, generate, prune, decide the scan N back."""
-        rule, count = self.rule, problem.measurements
-        problem = problem.only(likeliest(problem.pairs.start, problem.pairs.log_l, rule.branches))
-        pairs, rows = problem.pairs, problem.rows
+        problem = problem.only(likeliest(problem.pairs.start, problem.pairs.log_l, self.rule.branches))
         tree = np.unique(register.id, return_inverse=True)[1]
-        parents, group = self._clustered(tree, pairs.row, pairs.measurement, count)
-        log_ratio = (log(problem.detection) - log(problem.clutter))[pairs.row] + pairs.log_l
-        most, slack = rule.hypotheses, float(-log(rule.threshold))
-        found = children(
-            parents, group, pairs.row, pairs.measurement, log_ratio, log(problem.missed),
-            np.where(starts, self._log_new(clutter), NEVER), most, slack,
-        )  # fmt: skip
-        found = found.only(surviving(found.first, found.log_p, rule.threshold, most, rule.mass))
+        found = self._children(problem, tree, starts)
 
-        source = np.concatenate([pairs.row, np.arange(rows)])  # leaf that a code comes from; births come after
-        none = np.full(count, -1)
-        whose = np.concatenate([tree[source], rows + np.arange(count)])
-        then = np.concatenate([self.window.past[source, -1], none])
-        young = np.concatenate([self.window.age[source] + 1, none]) == rule.n_scan
-        found = found.only(agreeing(found.first, found.start, found.leaf, whose, then, young))
-
+        rows, count = problem.rows, problem.measurements
+        source = np.concatenate([problem.pairs.row, np.arange(rows)])  # leaf that a code comes from; then births
+        taken = np.concatenate([problem.pairs.measurement, np.full(rows, -1)])
+        found = found.only(self._agreeing(found, source, tree, count))
         used = np.zeros(len(source) + count, bool)
         used[found.leaf] = True
-        self.hypotheses = found._replace(leaf=(np.cumsum(used) - 1)[found.leaf])
         grown, born = used[: len(source)], used[len(source) :]
-        parent = source[grown]
-        taken = np.concatenate([pairs.measurement, np.full(rows, -1)])[grown]
+        parent, taken = source[grown], taken[grown]
+
+        self.hypotheses = found._replace(leaf=(np.cumsum(used) - 1)[found.leaf])
         self.window.move(parent, taken, np.flatnonzero(born), count)
+        self.told = np.concatenate([self.told[parent], np.zeros(born.sum(), bool)])
+        self.shown = self.hypotheses.best
         gone = np.setdiff1d(register.id, register.id[parent])
         events.extend(Event(problem.scan.t, int(i), "delete", "no likely hypothesis holds it") for i in gone)
         register.keep(parent)
-        self.told = np.concatenate([self.told[parent], np.zeros(born.sum(), bool)])
-        self.shown = self.hypotheses.best
         return one_each(parent, taken), born
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
@@ -159,6 +150,26 @@ class HypothesisForest:
         self.told = np.concatenate([self.told, np.ones(count, bool)])
         self.sure = np.concatenate([self.sure, np.ones(count, bool)])
 
+    def _children(self, problem: Problem, tree: Ints, starts: Mask) -> Hypotheses:
+        """The hypotheses after this scan that survive pruning; their leaves are codes, as of `children`."""
+        rule, pairs = self.rule, problem.pairs
+        parents, group = self._clustered(tree, pairs.row, pairs.measurement, problem.measurements)
+        log_new = np.where(starts, np.log(rule.new_share), -np.inf)
+        log_ratio = np.maximum(problem.log_ratio, NEVER)
+        found = children(
+            parents, group, pairs.row, pairs.measurement, log_ratio, problem.log_missed, log_new,
+            rule.hypotheses, rule.slack,
+        )  # fmt: skip
+        return found.only(surviving(found.first, found.log_p, rule.threshold, rule.hypotheses, rule.mass))
+
+    def _agreeing(self, found: Hypotheses, source: Ints, tree: Ints, count: int) -> Mask:
+        """(H,) hypotheses that have the scan N back as the likeliest of their cluster has it."""
+        none = np.full(count, -1)
+        whose = np.concatenate([tree[source], len(tree) + np.arange(count)])
+        then = np.concatenate([self.window.past[source, -1], none])
+        young = np.concatenate([self.window.age[source] + 1, none]) == self.rule.n_scan
+        return agreeing(found.first, found.start, found.leaf, whose, then, young)
+
     def _clustered(self, tree: Ints, row: Ints, measurement: Ints, count: int) -> tuple[Hypotheses, Ints]:
         """The hypotheses in the clusters that this scan makes, and the cluster (M,) of each measurement.
 
@@ -174,8 +185,7 @@ class HypothesisForest:
         owner[measurement] = group[cluster[row]]
         alone = owner < 0
         owner[alone] = len(names) + np.arange(alone.sum())
-        slack = float(-log(self.rule.threshold))
-        return apart.merged(group, len(names) + int(alone.sum()), self.rule.hypotheses, slack), owner
+        return apart.merged(group, len(names) + int(alone.sum()), self.rule.hypotheses, self.rule.slack), owner
 
     def _linked(self, tree: Ints) -> Ints:
         """(T,) leaves that depend on each other have the same number."""
@@ -201,8 +211,3 @@ class HypothesisForest:
         p = np.repeat(np.exp(self.hypotheses.log_p), np.diff(self.hypotheses.start))
         held: Floats = np.bincount(tree[self.hypotheses.leaf], p, len(name)).astype(float)
         return held[tree]
-
-    def _log_new(self, clutter: float) -> float:
-        """ln of the density of new targets over that of clutter."""
-        new = self.rule.new_density
-        return float(np.log(NEW_SHARE) if new is None else log(new) - log(clutter))

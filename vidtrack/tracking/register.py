@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import expit
 
 from vidtrack.scan import TENTATIVE, Floats, Ints
 
@@ -12,13 +13,20 @@ class Register:
 
     id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest),
     start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
-    group and group_since_s (tracks on one blob), existence, run, label (class last seen, -1 unknown).
+    group and group_since_s (tracks on one blob), score (log-odds that it is a target), best (highest score since it
+    was confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time
+    seen on a blob of its own). Where a smoother needs them also
+    prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "group", "group_since_s",
-             "existence", "run", "label")  # fmt: skip
+             "score", "best", "run", "label", "alone_s")  # fmt: skip
 
-    def __init__(self, dim: int) -> None:
+    LINKS = ("prior_x", "prior_P", "gain")
+
+    def __init__(self, dim: int, smooth: bool = False) -> None:
+        """dim of the positions; whether a smoother needs more."""
+        self.columns = self.STATE[1:] + (self.LINKS if smooth else ())
         self.next_id = 1
         self.id = np.empty(0, np.int64)
         self.status = np.empty(0, np.int8)
@@ -29,15 +37,31 @@ class Register:
         self.box = np.empty((0, 4))
         self.group = np.empty(0, np.int64)
         self.group_since_s = np.empty(0)
-        self.existence = np.empty(0)
+        self.score = np.empty(0)
+        self.best = np.empty(0)
         self.run = np.empty(0, np.int64)
         self.label = np.empty(0, np.int64)
+        self.alone_s = np.empty(0)
+        self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
 
     def __len__(self) -> int:
         return len(self.id)
 
+    def link(self, prior_x: Floats, prior_P: Floats, gain: Floats) -> None:
+        """How the rows go on from the scan before, for a smoother."""
+        self.prior_x, self.prior_P, self.gain = prior_x, prior_P, gain
+
+    def links(self) -> dict[str, Floats]:
+        """What `link` was given, for the rows there are now."""
+        return {name: getattr(self, name) for name in self.LINKS}
+
+    @property
+    def existence(self) -> Floats:
+        """(T,) probability that each row is a target."""
+        return expit(self.score)
+
     def append(
-        self, t: float, position: Floats, box: Floats, existence: float, run: Ints, label: Ints | None = None
+        self, t: float, position: Floats, box: Floats, score: float, run: Ints, label: Ints | None = None
     ) -> Ints:
         """Register new tentative tracks; returns their ids."""
         count = len(position)
@@ -53,12 +77,16 @@ class Register:
             "box": box,
             "group": np.full(count, -1),
             "group_since_s": np.full(count, np.nan),
-            "existence": np.full(count, existence),
+            "score": np.full(count, score),
+            "best": np.full(count, score),
             "run": run,
             "label": np.full(count, -1) if label is None else label,
+            "alone_s": np.zeros(count),
         }
-        for name, values in new.items():
-            setattr(self, name, np.concatenate([getattr(self, name), values]))
+        for name in self.columns:
+            old = getattr(self, name)
+            values = new.get(name, np.full((count, *old.shape[1:]), np.nan))
+            setattr(self, name, np.concatenate([old, values]))
         return ids
 
     def rename(self, rows: np.ndarray) -> tuple[Ints, Ints]:
@@ -71,5 +99,5 @@ class Register:
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
-        for name in self.STATE[1:]:
+        for name in self.columns:
             setattr(self, name, getattr(self, name)[rows])

@@ -72,6 +72,14 @@ class Sharing:
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box
 
+    def passengers(self, register: Register, t: float) -> Mask:
+        """(T,) members that were hardly ever seen alone and do not leave their group: parts of another member."""
+        strange = (register.group >= 0) & (register.alone_s < self._groups.known_s)
+        for number in np.unique(register.group[strange]):
+            members = np.flatnonzero(register.group == number)
+            strange[members[register.alone_s[members].argmax()]] = False
+        return strange & (t - register.group_since_s > self._groups.part_s)
+
     def regroup(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """A group keeps its number and its start for as long as any of its members stay together."""
         blobs = np.flatnonzero(np.bincount(shared[shared >= 0]) > 1)

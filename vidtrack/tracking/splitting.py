@@ -11,7 +11,7 @@ from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Decision, Event, Floats, Ints
 from vidtrack.tracking.forest import Window, one_each
-from vidtrack.tracking.generation import likeliest, log
+from vidtrack.tracking.generation import NEVER, likeliest
 from vidtrack.tracking.register import Register
 
 Mask = np.ndarray
@@ -69,46 +69,40 @@ class BranchForest:
         """(T,) true: branches are no matter of doubt for others."""
         return np.ones(len(self.window), bool)
 
-    def grow(
-        self, problem: Problem, register: Register, starts: Mask, clutter: float, events: list[Event]
-    ) -> tuple[Decision, Mask]:
-        """Branch, drop what scores badly, merge what has become the same, let go what is a track of its own."""
-        gated = np.zeros(problem.measurements, bool)
-        gated[problem.pairs.measurement] = True
-        born = np.flatnonzero(starts & ~gated)
+    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> tuple[Decision, Mask]:
+        """Branch, drop what scores badly, merge what has become the same; what is in no gate starts a tree."""
+        in_gate = np.zeros(problem.measurements, bool)
+        in_gate[problem.pairs.measurement] = True
+        born = starts & ~in_gate
         problem = problem.only(likeliest(problem.pairs.start, problem.pairs.log_l, self.rule.branches))
-        pairs, every = problem.pairs, np.arange(problem.rows)
-        log_ratio = (log(problem.detection) - log(problem.clutter))[pairs.row] + pairs.log_l
-        parent = np.concatenate([pairs.row, every])
-        taken = np.concatenate([pairs.measurement, np.full(len(every), -1)])
-        newest = np.concatenate([pairs.nis, np.zeros(len(every))])
-        self.score = np.column_stack([newest, self.score[parent, :-1]])
-        self.log_l = self.log_l[parent] + np.concatenate([log_ratio, log(problem.missed)])
-        self.window.move(parent, taken, born, problem.measurements)
-
-        tree = register.id[parent]
-        alive = self._plausible(tree, problem.cov.shape[1])
-        alive = alive[self._different(tree[alive], self.window.past[alive], self.window.age[alive], self.log_l[alive])]
-        alive = np.sort(alive[_rank(tree[alive], self.log_l[alive]) < self.rule.leaves])
-        self.window.keep(np.concatenate([alive, len(parent) + np.arange(len(born))]))
-        self.score = np.concatenate([self.score[alive], np.zeros((len(born), self.rule.n_scan))])
-        self.log_l = np.concatenate([self.log_l[alive], np.zeros(len(born))])
-        t, before = problem.scan.t, register.id
-        register.keep(parent[alive])
-        for track in np.setdiff1d(before, register.id):
-            events.append(Event(t, int(track), "delete", "another track took the same measurements"))
-        self._show(np.concatenate([register.id, -1 - np.arange(len(born))]))
-        return one_each(parent[alive], taken[alive]), np.isin(np.arange(problem.measurements), born)
+        parent, taken = self._branched(problem, np.flatnonzero(born))
+        alive = self._thinned(register.id[parent], problem.cov.shape[1])
+        parent, taken = parent[alive], taken[alive]
+        new = int(born.sum())
+        self.window.keep(np.concatenate([alive, len(self.window) - new + np.arange(new)]))
+        self.score = np.concatenate([self.score[alive], np.zeros((new, self.rule.n_scan))])
+        self.log_l = np.concatenate([self.log_l[alive], np.zeros(new)])
+        gone = np.setdiff1d(register.id, register.id[parent])
+        reason = "another track took the same measurements"
+        events.extend(Event(problem.scan.t, int(track), "delete", reason) for track in gone)
+        register.keep(parent)
+        self._show(np.concatenate([register.id, -1 - np.arange(new)]))
+        return one_each(parent, taken), born
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
-        """The likeliest branch that has nothing in common with its tree's likeliest becomes a tree of its own."""
+        """A branch that has nothing in common with its tree's likeliest becomes a tree of its own.
+
+        Of each tree and each measurement one, the likeliest, and only with what no tree's likeliest took.
+        """
         self._show(register.id)
         past, log_l = self.window.past, self.log_l
         trees, tree = np.unique(register.id, return_inverse=True)
         best = np.empty(len(trees), np.int64)
         best[tree[self.shown]] = self.shown
-        apart = np.flatnonzero((past >= 0).all(axis=1) & (past != past[best[tree]]).all(axis=1))
-        leaving = apart[_rank(tree[apart], log_l[apart]) == 0]
+        unexplained = ~np.isin(past[:, 0], past[self.shown, 0])
+        leaving = np.flatnonzero((past >= 0).all(axis=1) & (past != past[best[tree]]).all(axis=1) & unexplained)
+        for group in (tree, past[:, 0]):
+            leaving = leaving[_rank(group[leaving], log_l[leaving]) == 0]
         for old, new in zip(*register.rename(leaving), strict=True):
             events.append(Event(t, int(new), "birth", f"a branch of track {old} went its own way"))
         self._show(register.id)
@@ -126,6 +120,23 @@ class BranchForest:
         self.window.add(count)
         self.score = np.concatenate([self.score, np.zeros((count, self.rule.n_scan))])
         self.log_l = np.concatenate([self.log_l, np.zeros(count)])
+
+    def _branched(self, problem: Problem, born: Ints) -> tuple[Ints, Ints]:
+        """Parents (K,) and measurements (K,), -1 for none, of all branches; their scores are brought up to date."""
+        pairs, every = problem.pairs, np.arange(problem.rows)
+        parent = np.concatenate([pairs.row, every])
+        taken = np.concatenate([pairs.measurement, np.full(len(every), -1)])
+        newest = np.concatenate([pairs.nis, np.zeros(len(every))])
+        self.score = np.column_stack([newest, self.score[parent, :-1]])
+        self.log_l = self.log_l[parent] + np.concatenate([np.maximum(problem.log_ratio, NEVER), problem.log_missed])
+        self.window.move(parent, taken, born, problem.measurements)
+        return parent, taken
+
+    def _thinned(self, tree: Ints, dim: int) -> Ints:
+        """Branches (rows, ascending) that are plausible, nobody's double, and among the likeliest of their tree."""
+        alive = self._plausible(tree, dim)
+        alive = alive[self._different(tree[alive], self.window.past[alive], self.window.age[alive], self.log_l[alive])]
+        return np.sort(alive[_rank(tree[alive], self.log_l[alive]) < self.rule.leaves])
 
     def _plausible(self, tree: Ints, dim: int) -> Ints:
         """Rows whose score passes, and the likeliest of each tree whatever its score."""

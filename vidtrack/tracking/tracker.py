@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
-from scipy.special import expit, logit
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
@@ -19,20 +20,19 @@ from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
+from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Scan, Tracks
-from vidtrack.tracking.births import distinct
+from vidtrack.tracking.association import Association, at_once, deferred
 from vidtrack.tracking.border import Border
 from vidtrack.tracking.boxes import absolute, area, best_cover, longer, widened
 from vidtrack.tracking.choices import choices, evidence, heaviest, innovations
 from vidtrack.tracking.forest import Deferred, Forest
 from vidtrack.tracking.groups import Groups
-from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.lifecycle import Life, LifeCycle
+from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import Register
 from vidtrack.tracking.sharing import Sharing
 
-BIRTH_EXISTENCE = 0.5
-CLAIMED = 0.1
-"""A measurement that tracks claim with more weight than this in sum starts no track."""
 BELIEF = 20.0
 """Largest log-odds of a track's existence."""
 EXIT_S = 0.2
@@ -50,26 +50,29 @@ class Tracker:
     model      motion model of every target
     associate  association rule: NN(), GNN(), ..., or one that decides scans later: MHT(), Split()
     gate       Gate, or the probability of one
-    life       confirmation and deletion
+    life       confirmation and deletion: LifeCycle(), M of N, or LogRatio(), by the score
     groups     how tracks share merged blobs (scans with boxes only); None: they do not
     shape      how the size of boxes counts in the association; None: it does not
     trust      which scores may start a track; None: scores do not count
     estimator  the filters' bank, made from the model
     bounds     (width, height) of the picture; a track that leaves it is deleted; None: no border
     births     whether measurements that belong to no track start one
-    detection_probability, clutter_density [per px^2 or m^2]   for the existence probability
+    detection_probability, clutter_density [per px^2 or m^2]   for weights and existence probability: numbers, arrays
+               (B,) with one for each Monte Carlo run, or None: estimated from the scans (`rates` has what they are)
+    surveyed   area [px^2 or m^2] that the estimate of clutter is about; None: the picture, else where measurements lie
     box_s      time constant [s] with which a track's box follows its blobs' boxes
     explain    keep each scan's choices (runner-up and distances) in the snapshot
+    smooth     keep in the snapshot what a smoother needs
     """
 
-    STATE = ("t", "bank", "register", "sharing", "forest")
+    STATE = ("t", "bank", "register", "sharing", "forest", "rates")
 
     def __init__(
         self,
         model: Motion | None = None,
         associate: Associator | Deferred | None = None,
         gate: Gate | float = 0.999,
-        life: LifeCycle | None = None,
+        life: Life | None = None,
         groups: Groups | None = None,
         shape: Shape | None = None,
         trust: Trust | None = None,
@@ -77,10 +80,12 @@ class Tracker:
         estimator: Callable[[Motion], Estimator] = KalmanBank,
         bounds: tuple[float, float] | None = None,
         births: bool = True,
-        detection_probability: float = 0.9,
-        clutter_density: float = 1e-5,
+        detection_probability: Rate = 0.9,
+        clutter_density: Rate = 1e-5,
+        surveyed: float | None = None,
         box_s: float = 0.3,
         explain: bool = False,
+        smooth: bool = False,
     ) -> None:
         self.model: Motion = model or ConstantVelocity()
         self.associate: Associator = GNN()
@@ -90,16 +95,18 @@ class Tracker:
         elif associate is not None:
             self.associate = associate
         self.gate = gate if isinstance(gate, Gate) else Gate(gate)
-        self.life = life or LifeCycle()
+        self.life: Life = life or LifeCycle()
         self.shape = shape
         self.trust = trust or EQUAL
         self.births = births
-        self.detection_probability = detection_probability
-        self.clutter_density = clutter_density
+        if surveyed is None and bounds:
+            surveyed = bounds[0] * bounds[1]
+        self.rates = Rates(detection_probability, clutter_density, surveyed)
         self.box_s = box_s
         self.explain = explain
+        self.smooth = smooth
         self.bank = estimator(self.model)
-        self.register = Register(self.model.dim)
+        self.register = Register(self.model.dim, smooth)
         self.border = Border(*bounds) if bounds else Border()
         self.sharing = Sharing(groups, self.border, box_s) if groups and not self.forest else None
         self.t: float | None = None
@@ -114,28 +121,23 @@ class Tracker:
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
         problem = self._problem(scan, sensor, blobs)
-        if self.forest:
-            decision, shared, hides, free = self._grown(self.forest, problem, events)
-            problem = problem.of(decision.parent)
-        else:
-            decision, shared, hides, free = self._associated(problem, blobs)
+        problem, decision, shared, hides, free = self._associated(problem, blobs, events)
         taken = heaviest(decision)
         self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
             self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
         nis = innovations(problem.pairs, taken)
         why = self._why(problem, decision, taken) if self.explain else None
-        self._believe(problem, decision, taken, shared)
+        self._believe(problem, decision, taken, shared, dt)
         kept = self._delete(scan.t, events)
         if self.sharing:
             self.sharing.regroup(shared[kept], self.register, scan.t, events)
         born = self._register(scan, sensor, blobs, free, events)
-        if self.forest:
-            self.forest.settle(self.register, scan.t, events)
         self._confirm(scan.t, events)
         taken = np.concatenate([np.where(shared >= 0, shared, taken)[kept], born])
         nis = np.concatenate([nis[kept], np.full(len(born), np.nan)])
-        return self._snapshot(scan.t, self.bank.x, self.bank.P, taken, nis, tuple(events), why)
+        links = self.register.links() if self.smooth else {}
+        return self._snapshot(scan.t, self.bank.x, self.bank.P, taken, nis, events=tuple(events), choices=why, **links)
 
     def predict(self, t: float) -> Tracks:
         """All tracks as expected at time t; changes nothing. Raises ScanError for a time before the last scan's."""
@@ -151,7 +153,7 @@ class Tracker:
             self.forest.add(count)
         boxes = np.full((count, 4), np.nan) if box is None else box
         runs = np.zeros(count, np.int64) if run is None else run
-        ids = self.register.append(t, x[:, position], boxes, BIRTH_EXISTENCE, runs)
+        ids = self.register.append(t, x[:, position], boxes, BELIEF, runs)
         self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
         return ids
@@ -162,8 +164,11 @@ class Tracker:
         if len(scan) and scan.sensor is None and scan.z.shape[1] != self.model.dim:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
         dt = self._since_last(t)
+        x, P = self.bank.x, self.bank.P
         self.bank.predict(dt)
         self.t = t
+        if self.smooth:
+            self._remember(dt, x, P)
         lost = self.life.lost(self.register, t)
         if lost.any():
             last = dict(zip(self.register.id[lost].tolist(), self.register.updated_s[lost].tolist(), strict=True))
@@ -171,6 +176,12 @@ class Tracker:
                 events.append(Event(t, int(track), "delete", f"no evidence since {last[int(track)]:.2f} s"))
             self._keep(~lost)
         return dt
+
+    def _remember(self, dt: float, x: Floats, P: Floats) -> None:
+        """For a smoother: what was predicted from x, P for the tracks that were shown, and what it says about them."""
+        gain = smoothing_gain(P, self.bank.jacobian(dt, x), self.bank.P)
+        prior_x = np.where(self._believed(len(x))[:, None], self.bank.x, np.nan)
+        self.register.link(prior_x, self.bank.P, gain)
 
     def _since_last(self, t: float) -> float:
         dt = 0.0 if self.t is None else t - self.t
@@ -181,46 +192,24 @@ class Tracker:
     def _problem(self, scan: Scan, sensor: Sensor, blobs: Floats | None) -> Problem:
         """Which measurements each track may take, and how likely each is."""
         zhat, cov = self.bank.predicted_measurement(sensor)
+        self.rates.look(scan)
         problem = Problem.gated(
-            self.gate, zhat, cov, scan, self.detection_probability, self.clutter_density,
+            self.gate, zhat, cov, scan, *self.rates.of(self.register.run),
             run=self.register.run, label=self.register.label, angles=sensor.angles,
         )  # fmt: skip
         if self.shape is None or blobs is None:
             return problem
         return replace(problem, pairs=self.shape.weigh(problem.pairs, self._boxes(), blobs))
 
-    def _associated(self, problem: Problem, blobs: Floats | None) -> tuple[Decision, Ints, Mask, Mask]:
-        """Confirmed tracks choose first, then those on shared blobs claim them, then tentative tracks choose.
-
-        Returns the decision, the blob (T,) that each row leans on by its edges (-1: none), the blobs (M,)
-        that hide more than their tracks account for, and the measurements (M,) that may start a track.
-        """
-        pairs, rows, count = problem.pairs, problem.rows, problem.measurements
+    def _associated(self, problem: Problem, blobs: Floats | None, events: list[Event]) -> Association:
+        """Who gets what, at once or with decisions that wait."""
         confirmed = self.register.status != TENTATIVE
-        first = self.trust.decide(self.associate, problem, confirmed)
-        shared, hides = np.full(rows, -1), np.ones(count, bool)
+        if self.forest:
+            return deferred(problem, self.forest, self.trust, confirmed, self.births, self.register, events)
+        claim = None
         if self.sharing and blobs is not None:
-            shared, hides = self.sharing.claim(self._boxes(), self.bank.hits, heaviest(first), confirmed, blobs)
-            first = first.without(shared >= 0)
-        free = hides & ~claimed(first, count) & self.trust.sure(problem.scan)
-        open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
-        decision = first
-        if open_to_all.any():
-            second = self.associate.decide(problem.only(open_to_all))
-            free &= ~claimed(second, count)
-            decision = first.joined(second)
-        if not self.associate.gated_births:
-            free[pairs.measurement] = False
-        return decision, shared, hides, distinct(problem.scan, free)
-
-    def _grown(self, forest: Forest, problem: Problem, events: list[Event]) -> tuple[Decision, Ints, Mask, Mask]:
-        """The same where decisions wait: rows become their successors; nothing leans on blobs."""
-        pairs, sure = problem.pairs, self.trust.sure(problem.scan)
-        confirmed = self.register.status != TENTATIVE
-        problem = problem.only(confirmed[pairs.row] | sure[pairs.measurement])
-        clutter = float(np.mean(self.clutter_density))
-        decision, born = forest.grow(problem, self.register, sure & self.births, clutter, events)
-        return decision, np.full(len(decision.parent), -1), sure, born
+            claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, confirmed=confirmed, blobs=blobs)
+        return at_once(problem, self.associate, self.trust, confirmed, claim)
 
     def _update(
         self, decision: Decision, taken: Ints, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float
@@ -230,6 +219,7 @@ class Tracker:
         self.bank.update(decision, scan, sensor)
         hit = decision.beta0 < 0.5
         rows = np.flatnonzero(hit)
+        register.alone_s[rows] += dt
         register.history = (register.history << 1 | hit) & ((1 << 63) - 1)
         register.updated_s[rows[self.trust.sure(scan)[taken[rows]]]] = scan.t
         if scan.label is not None:
@@ -247,17 +237,24 @@ class Tracker:
     def _why(self, problem: Problem, decision: Decision, taken: Ints) -> Choices:
         """What was decided for each track that is believed."""
         why = choices(self.register.id, problem.pairs, decision, taken)
-        if not self.forest:
-            return why
-        shown = self.forest.shown
-        return why.only(shown[shown < problem.rows])
+        return why.only(self._believed(problem.rows)) if self.forest else why
 
-    def _believe(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints) -> None:
-        """Existence probability: Bayes with the likelihood ratio of what each track got."""
-        log_ratio = evidence(problem, decision, taken)
+    def _believed(self, rows: int) -> Mask:
+        """(rows,) which of the first rows are shown at present; all, unless decisions wait."""
+        believed = np.full(rows, self.forest is None)
+        if self.forest:
+            believed[self.forest.shown[self.forest.shown < rows]] = True
+        return believed
+
+    def _believe(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints, dt: float) -> None:
+        """What the tracks got, as evidence for their existence (Bayes' rule in log-odds) and for the rates."""
+        register, log_ratio = self.register, evidence(problem, decision, taken)
         log_ratio[shared >= 0] = 0.0
-        log_odds = np.clip(logit(self.register.existence) + log_ratio, -BELIEF, BELIEF)
-        self.register.existence = expit(log_odds)
+        register.score = np.clip(register.score + log_ratio, -BELIEF, BELIEF)
+        higher = (register.status != TENTATIVE) & (register.score > register.best)
+        register.best = np.where(higher, register.score, register.best)
+        alone = self._believed(problem.rows) & (shared < 0)
+        self.rates.learn(decision, register, alone, problem.inside, problem.measurements, dt)
 
     def _delete(self, t: float, events: list[Event]) -> Mask:
         """Drop the rows that are not believed any more; returns the mask of those kept."""
@@ -267,10 +264,12 @@ class Tracker:
         going = self.border.leaving(self._boxes(), v) & (t - register.updated_s > EXIT_S)
         left = missed & (going | self.border.outside(self.bank.x[:, self.model.position]))
         hopeless = self.life.hopeless(register) & ~left
-        kept = ~(hopeless | left)
+        parts = self.sharing.passengers(register, t) & ~left if self.sharing else np.zeros(len(register), bool)
+        kept = ~(hopeless | left | parts)
         if not kept.all():
-            events.extend(_deaths(t, self._ends(~kept, hopeless), "too many misses before confirmation"))
+            events.extend(_deaths(t, self._ends(~kept, hopeless), self.life.ends))
             events.extend(_deaths(t, self._ends(~kept, left), "left the picture"))
+            events.extend(_deaths(t, self._ends(~kept, parts), "part of the vehicle that it never left"))
             self._keep(kept)
         return kept
 
@@ -287,7 +286,7 @@ class Tracker:
         self.bank.append(position, cov, scale)
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
         label = None if scan.label is None else scan.label[born]
-        ids = self.register.append(scan.t, position, box, BIRTH_EXISTENCE, run, label)
+        ids = self.register.append(scan.t, position, box, self.life.birth, run, label)
         for track, j in zip(ids, born, strict=True):
             events.append(Event(scan.t, int(track), "birth", f"measurement {j} belongs to no track"))
         return born
@@ -306,11 +305,11 @@ class Tracker:
         size = np.fmax(longer(register.box), 0.0)  # none where there is no box
         ready = self.life.confirmed(register, t, self.bank.x[:, self.model.position], size)
         if self.forest:
+            self.forest.settle(register, t, events)
             ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)
             register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
         register.status[ready] = CONFIRMED
-        reason = f"{self.life.confirm_hits} hits of {self.life.confirm_window}"
-        events.extend(Event(t, int(track), "confirmed", reason) for track in register.id[ready])
+        events.extend(Event(t, int(track), "confirmed", self.life.confirms) for track in register.id[ready])
         known = register.status != TENTATIVE
         seen = register.history & 1 == 1
         register.status[known] = np.where(seen[known], CONFIRMED, COASTING)
@@ -322,8 +321,9 @@ class Tracker:
 
     def _ends(self, going: Mask, why: Mask | None = None) -> Ints:
         """Ids of the tracks that lose their last row when `going` (T,) go, and one row of which goes by `why` (T,)."""
-        register = self.register
-        return np.setdiff1d(register.id[going if why is None else why], register.id[~going])
+        ids = self.register.id
+        ended = ids[going if why is None else why]
+        return np.setdiff1d(ended, ids[~going]) if self.forest else ended
 
     def _keep(self, kept: Mask) -> None:
         if self.forest:
@@ -339,8 +339,7 @@ class Tracker:
         P: Floats,
         taken: Ints,
         nis: Floats,
-        events: tuple[Event, ...] = (),
-        why: Choices | None = None,
+        **more: Any,
     ) -> Tracks:
         register = self.register
         tracks = Tracks(
@@ -354,24 +353,18 @@ class Tracker:
             group_since_s=register.group_since_s.copy(),
             age_s=t - register.born_s,
             travel=np.linalg.norm(x[:, self.model.position] - register.start, axis=1),
-            existence=register.existence.copy(),
+            existence=register.existence,
             measurement=taken,
             nis=nis,
             position=self.model.position,
             velocity=self.model.velocity,
             run=register.run.copy(),
-            events=events,
-            choices=why,
+            **more,
         )
         if not self.forest:
             return tracks
         shown = self.forest.shown
         return tracks.only(shown[np.argsort(register.id[shown])])
-
-
-def claimed(decision: Decision, measurements: int) -> Mask:
-    """(M,) measurements that tracks claim."""
-    return np.bincount(decision.measurement, decision.beta, measurements) > CLAIMED
 
 
 def _deaths(t: float, ids: Ints, reason: str) -> Iterable[Event]:

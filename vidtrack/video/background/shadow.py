@@ -11,7 +11,8 @@ from vidtrack.video.runs import find_runs
 SHADOW = 2  # value of a hit that is shadow
 _DARKEST, _LIGHTEST = np.float32(0.5), np.float32(0.97)  # share of the scene's light
 _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
-_TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light
+_TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light: soft edges
+_GREY_SHARE = np.float32(0.05)  # the same where no colour helps to tell shadow from dark paint
 _REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
 _NEUTRAL = np.float32(128)  # chroma of grey
 
@@ -24,6 +25,7 @@ def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
     """
     row, start, stop = find_runs(hit, False)
     coloured = len(picture.cb) > 0
+    share = _TEXTURE_SHARE if coloured else _GREY_SHARE
     for k in range(len(row)):
         y = row[k]
         for x in range(start[k], stop[k]):
@@ -31,7 +33,7 @@ def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
             r = (np.float32(picture.luma[y, x]) - black) / light
             if not _DARKEST <= r < _LIGHTEST or (coloured and not _same_colour(picture, scene, y // 2, x // 2, r)):
                 continue
-            if _texture_error(picture.luma, scene.luma, y, x, r) < _TEXTURE + _TEXTURE_SHARE * light:
+            if _texture_error(picture.luma, scene.luma, y, x, r) < _TEXTURE + share * light:
                 hit[y, x] = SHADOW
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-DRIFT = 0.01  # how fast the least delay may grow: far more than clocks drift, to forget a pause in minutes
+DRIFT = 0.002  # how fast the least delay may grow: more than clocks drift, so that a short pause is forgotten
 LATE_S = 2.0  # a delay that grows more than this was a pause of the camera, or its stamps were restarted
 EARLY_S = 2.0  # stamps that jump ahead of the arrivals by more than this were restarted
 STEP_S = 1e-4  # times of pictures that have none of their own stay apart by this

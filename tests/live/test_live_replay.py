@@ -1,0 +1,191 @@
+"""A recording is repeated bit by bit, and a saved state goes on: no identity is given twice."""
+
+import time
+
+import cv2
+import numpy as np
+import pytest
+from cameras import Picture, Script, crossing, script_of
+from test_live_run import run_for, settings
+
+from vidtrack.config import load
+from vidtrack.errors import FormatError, SourceError
+from vidtrack.live.keep import parts_of
+from vidtrack.live.memory import StateFile
+from vidtrack.live.outputs import Extras
+from vidtrack.live.run import LiveRun
+from vidtrack.output.repair import read_tracks
+from vidtrack.run import Run
+from vidtrack.state import read_state
+from vidtrack.video.recording import is_recording, recorded_settings
+
+PICTURES = crossing()
+
+
+def replay(tape, folder, chosen):
+    with Run(str(tape), chosen, folder) as run:
+        for _ in run:
+            pass
+    return (folder / "tracks.csv").read_text()
+
+
+@pytest.mark.parametrize("path", ["video.ts", "video.mjpg"])
+def test_a_recording_gives_the_same_tracks(camera, tmp_path, path):
+    chosen = settings("tracker.confirm_s=0.1")
+    extras = Extras(record=tmp_path / "tape")
+    with LiveRun(camera.url(path), chosen, tmp_path / "out", extras) as run:
+        began, size = time.monotonic(), 0
+        for _ in run:
+            now = time.monotonic() - began
+            if now > 1.5 and not size:
+                size = camera.pictures = [cv2.resize(picture, (480, 360)) for picture in PICTURES]
+                camera.connection += 1
+            if now > 3.5:
+                run.stop()
+    assert len(parts_of(tmp_path / "tape")) == 2  # one for each connection
+    assert is_recording(str(tmp_path / "tape"))
+    assert load(base=recorded_settings(str(tmp_path / "tape"))) == chosen
+    lived = (tmp_path / "out" / "tracks.csv").read_text()
+    assert lived.count("\n") > 20
+    assert replay(tmp_path / "tape", tmp_path / "again", chosen) == lived
+
+
+def test_parts_cut_from_one_connection_do_too(camera, tmp_path):
+    chosen = settings("live.roll_s=1")
+    with LiveRun(camera.url("video.ts"), chosen, tmp_path / "out", Extras(record=tmp_path / "tape")) as run:
+        run_for(run, 3.0)
+    tapes = parts_of(tmp_path / "tape")
+    assert len(tapes) >= 3
+    lived = [(part / "tracks.csv").read_text().splitlines() for part in parts_of(tmp_path / "out")]
+    rows = [row for part in lived for row in part[1:]]
+    assert replay(tmp_path / "tape", tmp_path / "again", chosen).splitlines()[1:] == rows
+
+    last = replay(tapes[-1], tmp_path / "last", chosen).splitlines()[1:]  # a part alone begins where it began
+    assert last
+    assert set(last) <= set(rows)
+
+
+def test_a_raw_camera_is_recorded_without_loss(compiled, tmp_path):
+    class Raw(Script):
+        is_raw = True
+
+    grey = [cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) for picture in PICTURES[:100]]
+    acts = [act for picture in grey for act in (0.015, Picture(picture))]
+    connect = script_of(Raw(*acts, 30.0))
+    device = "http://camera/"  # where the script pretends to be
+    with LiveRun(device, settings(), tmp_path / "out", Extras(record=tmp_path / "tape"), connect=connect) as run:
+        run_for(run, 3.0)
+    lived = (tmp_path / "out" / "tracks.csv").read_text()
+    assert lived.count("\n") > 5
+    assert replay(tmp_path / "tape", tmp_path / "again", settings()) == lived
+
+
+def test_a_recording_that_was_cut_is_repeated_up_to_there(camera, tmp_path):
+    with LiveRun(camera.url("video.ts"), settings(), tmp_path / "out", Extras(record=tmp_path / "tape")) as run:
+        run_for(run, 1.5)
+    (part,) = parts_of(tmp_path / "tape")
+    for name in ("video.mkv", "frames.csv"):
+        content = (part / name).read_bytes()
+        (part / name).write_bytes(content[: len(content) * 2 // 3])
+    with Run(str(tmp_path / "tape"), settings(), tmp_path / "again") as run:
+        assert 5 < sum(1 for _ in run) < 100
+
+
+def test_an_empty_recording_says_so(tmp_path):
+    part = tmp_path / "2026-01-01T00-00-00Z"
+    part.mkdir()
+    for name in ("video.mkv", "state.npz"):
+        (part / name).touch()
+    with pytest.raises(SourceError, match="no frame"):
+        Run(str(tmp_path), settings(), tmp_path / "out")
+
+
+def ids(folder):
+    return set(read_tracks(folder / "tracks.csv")["track_id"].to_pylist())
+
+
+def test_a_restart_goes_on_with_scene_tracks_and_numbers(camera, tmp_path):
+    extras = Extras(state=tmp_path / "state")
+    with LiveRun(camera.url(), settings(), tmp_path / "one", extras) as run:
+        first = run_for(run, 2.0)
+        before = run.board.now()
+    saved = read_state(extras.state)
+    assert saved["frame"] == first[-1]
+    with LiveRun(camera.url(), settings(), tmp_path / "two", extras) as run:
+        second = run_for(run, 2.0)
+        after = run.board.now()
+    assert second[0] == first[-1] + 1
+    assert after.time_s > before.time_s + 2.0
+    assert saved["tracker.register.next_id"] <= read_state(extras.state)["tracker.register.next_id"]
+    old, new = ids(tmp_path / "one"), ids(tmp_path / "two")
+    assert old
+    assert max(new - old, default=0) < saved["tracker.register.next_id"] + 1000  # nothing was lost in between
+    known = {row["track_id"] for row in before.tracks}
+    assert (new & old) <= known
+
+
+def test_a_killed_run_never_gives_a_number_twice(camera, tmp_path):
+    path = tmp_path / "state"
+    with LiveRun(camera.url(), settings(), tmp_path / "one", Extras(state=path)) as run:
+        run_for(run, 2.0)
+        killed = path.read_bytes()  # what is on the disk while it runs
+        given = run._memory.tracker.register.next_id
+    assert read_state(path)["tracker.register.next_id"] == given
+    path.write_bytes(killed)
+    with LiveRun(camera.url(), settings(), tmp_path / "two", Extras(state=path)) as run:
+        run_for(run, 2.0)
+    fresh = ids(tmp_path / "two") - ids(tmp_path / "one")
+    assert fresh
+    assert min(fresh) >= given
+
+
+def test_numbers_are_reserved_before_they_are_scarce(tmp_path):
+    class Register:
+        next_id = 1
+
+    class Memory:
+        tracker = type("Tracker", (), {"register": Register})
+
+        def gather(self):
+            return {"tracker.register.next_id": Register.next_id}
+
+    memory, file = Memory(), StateFile(tmp_path / "state")
+    for Register.next_id in range(1, 40_000, 100):
+        file.offer(memory)
+        if file._writing is not None:
+            file._writing.join()
+        assert read_state(file.path)["tracker.register.next_id"] > Register.next_id + 4000
+
+
+def test_a_foreign_state_is_refused(camera, tmp_path):
+    (tmp_path / "state").write_text("tracks")
+    with pytest.raises(FormatError, match="not a saved state"):
+        LiveRun(camera.url(), settings(), tmp_path / "out", Extras(state=tmp_path / "state"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_state_that_cannot_be_saved_is_counted(camera, tmp_path, monkeypatch, caplog):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("vidtrack.live.memory.write_state", full)
+    with LiveRun(camera.url(), settings(), tmp_path / "out", Extras(state=tmp_path / "state")) as run:
+        assert len(run_for(run, 1.0)) > 5
+        assert run.board.now().reading["lost"]["state"] > 0
+    assert "cannot save the state" in caplog.text
+
+
+def test_pictures_lie_in_a_line_of_time(camera, tmp_path):
+    extras = Extras(record=tmp_path / "tape")
+    with LiveRun(camera.url("video.ts"), settings(), tmp_path / "out", extras) as run:
+        lived = [(step.index, step.time_s) for step in _first(run, 40)]
+    with Run(str(tmp_path / "tape"), settings(), tmp_path / "again") as run:
+        assert [(step.index, step.time_s) for step in run] == lived
+    assert np.all(np.diff([time_s for _, time_s in lived]) > 0)
+
+
+def _first(run, count):
+    for k, step in enumerate(run, 1):
+        yield step
+        if k >= count:
+            run.stop()

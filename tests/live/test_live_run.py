@@ -1,0 +1,187 @@
+"""A live run writes what a run over a video writes, for as long as it goes, and outlives a full disk."""
+
+import errno
+import json
+import os
+import time
+from threading import Timer
+
+import cv2
+import numpy as np
+import pyarrow.parquet as pq
+
+import vidtrack.output.linefile as linefile
+from vidtrack.config import load
+from vidtrack.live.keep import parts_of
+from vidtrack.live.outputs import Extras
+from vidtrack.live.run import LiveRun
+from vidtrack.output.folder import append
+from vidtrack.output.repair import read_tracks
+from vidtrack.run import Run
+from vidtrack.state import read_state
+
+TABLES = {"tracks.csv", "tracks.parquet", "mot.txt", "summary.json", "tracks.png"}
+
+
+def settings(*assignments):
+    return load(assignments=["live.timeout_s=2", "live.backoff_s=0.05", *assignments])
+
+
+def run_for(run, seconds):
+    """Iterate for so long; returns the frames' numbers."""
+    timer = Timer(seconds, run.stop)
+    timer.start()
+    return [step.index for step in run]
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_the_results_are_those_of_a_run(camera, tmp_path):
+    chosen = settings(("output.lines", ["gate:160,0,160,240"]))
+    with LiveRun(camera.url(), chosen, tmp_path / "out", Extras(decisions=True)) as run:
+        indices = run_for(run, 2.5)
+    assert {path.name for path in run.folder.iterdir()} == TABLES | {"counts.csv", "decisions.csv"}
+    rows = read_tracks(run.folder / "tracks.csv")
+    assert pq.read_table(run.folder / "tracks.parquet").equals(rows)
+    assert rows.num_rows > 20
+    assert set(rows["frame"].to_pylist()) <= set(indices)
+    found = summary(run.folder)
+    assert found["interrupted"] is False
+    assert found["frames"] == found["frames_read"] == len(indices)
+    assert found["frames_received"] >= found["frames_read"]
+    assert found["lost"] == {"results": 0}
+    assert 0 < found["latency_ms"]["p50"] < 1000
+    assert found["began"].startswith("20")
+    assert "gate" in found["counts"]
+
+
+def test_the_board_shows_the_run(camera, tmp_path):
+    with LiveRun(camera.url(login="u:secret@"), settings(), tmp_path / "out") as run:
+        assert run.board.picture() is None
+        assert run.board.now().frame == -1
+        run_for(run, 1.5)
+        now = run.board.now()
+        assert run.board.newer(-1, 0.0).index == now.frame
+        assert run.board.newer(now.frame, 0.01) is None
+        picture = cv2.imdecode(np.frombuffer(run.board.picture(), np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (240, 320, 3)
+    assert now.frame > 20
+    assert now.fps_out > 5
+    assert now.reading["fps_in"] > 5
+    assert now.source == f"http://***@127.0.0.1:{camera.server_port}/video.mjpg"
+    json.dumps([now.tracks, now.counts, now.problems, dict(now.reading)])
+
+
+def test_parts_follow_the_clock_and_hold_everything(camera, tmp_path):
+    out = tmp_path / "out"
+    with LiveRun(camera.url(), settings("live.roll_s=1"), out) as run:
+        indices = run_for(run, 2.8)
+    parts = parts_of(out)
+    assert len(parts) >= 3
+    assert all({path.name for path in part.iterdir()} == TABLES for part in parts)
+    frames = np.concatenate([read_tracks(part / "tracks.csv")["frame"].to_numpy() for part in parts])
+    assert np.all(np.diff(frames) >= 0)
+    assert summary(out)["frames"] == len(indices)
+    assert sum(summary(part)["frames"] for part in parts) == len(indices)
+
+    with LiveRun(camera.url(), settings("live.roll_s=1"), out) as run:  # goes on in the same folder
+        run_for(run, 0.5)
+    assert len(parts_of(out)) > len(parts)
+
+
+def test_parts_that_a_kill_left_are_finished_by_the_next_run(camera, tmp_path):
+    out = tmp_path / "out"
+    with LiveRun(camera.url(), settings("live.roll_s=100000"), out) as run:
+        run_for(run, 2.0)
+    (part,) = parts_of(out)
+    (part / "tracks.parquet").unlink()
+    with open(part / "tracks.csv", "a") as file:
+        file.write("1,2,3")
+    with LiveRun(camera.url(), settings("live.roll_s=100000"), out) as run:
+        run_for(run, 0.5)
+    assert pq.read_table(part / "tracks.parquet").equals(read_tracks(part / "tracks.csv"))
+
+
+def test_the_disk_is_bounded(camera, tmp_path, monkeypatch):
+    monkeypatch.setattr("vidtrack.live.parts._LOOK_S", 0.2)
+    extras = Extras(record=tmp_path / "tape")
+    chosen = settings("live.roll_s=1", "live.keep_bytes=6_000_000")
+    with LiveRun(camera.url(), chosen, tmp_path / "out", extras) as run:
+        run_for(run, 4.0)
+    total = sum(path.stat().st_size for path in tmp_path.rglob("*") if path.is_file())
+    assert total < 7_000_000
+    assert len(parts_of(tmp_path / "tape")) >= 1
+
+
+class Disk:
+    """Makes writing fail while it is full."""
+
+    def __init__(self, monkeypatch):
+        self.full = False
+        monkeypatch.setattr(linefile, "append", self._append)
+        monkeypatch.setattr("vidtrack.output.disk.append", self._append)
+
+    def _append(self, file, block):
+        if self.full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), file.name)
+        append(file, block)
+
+
+def test_a_full_disk_is_outlived(camera, tmp_path, monkeypatch, caplog):
+    disk = Disk(monkeypatch)
+    out = tmp_path / "out"
+    monkeypatch.setattr("vidtrack.live.recorder._RETRY_S", 0.2)
+    with LiveRun(camera.url(), settings(), out, Extras(record=tmp_path / "tape")) as run:
+        began = time.monotonic()
+        times = []
+        for step in run:
+            now = time.monotonic() - began
+            disk.full = 1.0 < now < 2.0
+            times.append(step.time_s)
+            if now > 4.0:
+                run.stop()
+    assert np.diff(times).max() < 1.0  # tracking went on
+    rows = read_tracks(out / "tracks.csv")
+    assert pq.read_table(out / "tracks.parquet").equals(rows)
+    found = summary(out)
+    assert 10 < found["lost"]["results"] < 120
+    assert found["lost"]["recording"] > 0
+    assert np.diff(np.unique(rows["time_s"].to_numpy())).max() > 0.5
+    assert rows["time_s"].to_numpy().max() > 2.5
+    assert "No space left" in caplog.text
+    assert "tracking goes on" in caplog.text
+    assert "is written again" in caplog.text
+    assert len(parts_of(tmp_path / "tape")) >= 2
+    with Run(str(tmp_path / "tape"), settings(), tmp_path / "replayed") as replayed:
+        assert sum(1 for _ in replayed) > 20
+
+
+def test_a_snapshot_at_any_instant_is_readable_and_nearly_complete(camera, tmp_path):
+    """What a kill leaves is what the system has been given by then."""
+    out, random = tmp_path / "out", np.random.default_rng(5)
+    extras = Extras(state=tmp_path / "state", record=tmp_path / "tape")
+    losses = []
+    with LiveRun(camera.url(), settings("live.roll_s=2"), out, extras) as run:
+        began = time.monotonic()
+        looks = sorted(1.5 + 3.5 * random.random(50))
+        for step in run:
+            shown = {t for t, s in zip(step.tracks.id, step.tracks.status, strict=True) if s}
+            while looks and time.monotonic() - began > looks[0]:
+                looks.pop(0)
+                for part in (part for part in parts_of(out) if (part / "tracks.csv").exists()):
+                    text = (part / "tracks.csv").read_text()
+                    assert text.endswith("\n")
+                    assert len({line.count(",") for line in text.splitlines()}) == 1
+                    json.loads((part / "summary.json").read_text())
+                    assert all(line.count(",") == 9 for line in (part / "mot.txt").read_text().splitlines())
+                    if (part / "tracks.parquet").exists():
+                        pq.read_table(part / "tracks.parquet")
+                assert read_state(extras.state)["tracker.register.next_id"] > max(shown, default=0)
+                if shown and len(rows := text.splitlines()) > 1:
+                    losses.append(step.time_s - float(rows[-1].split(",")[1]))
+            if not looks:
+                run.stop()
+    assert len(losses) > 10
+    assert np.median(losses) < 1.2

@@ -1,0 +1,37 @@
+"""Runs of pixels: the same as a row-by-row search finds."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidtrack.video.runs import find_runs
+
+
+def runs_by_differences(chosen):
+    edges = np.diff(np.pad(chosen.astype(int), ((0, 0), (1, 1))), axis=1)
+    row, start = np.nonzero(edges == 1)
+    stop = np.nonzero(edges == -1)[1]
+    return np.column_stack([row, start, stop])
+
+
+@given(
+    shape=st.tuples(st.integers(1, 40), st.integers(1, 40)),
+    share=st.sampled_from([0.0, 0.02, 0.5, 0.98, 1.0]),
+    seed=st.integers(0, 2**32 - 1),
+    background=st.booleans(),
+)
+@settings(max_examples=300, deadline=None)
+def test_runs_are_maximal_in_raster_order_and_end_with_their_row(shape, share, seed, background):
+    random = np.random.default_rng(seed)
+    values = random.choice(np.array([1, 2, 127, 128, 255], np.uint8), shape)
+    mask = np.where(random.random(shape) < share, values, np.uint8(0))
+    chosen = mask == 0 if background else mask > 0
+    assert np.column_stack(find_runs(mask, background)).tolist() == runs_by_differences(chosen).tolist()
+
+
+@pytest.mark.parametrize("column", [0, 7, 8, 63, 64, 319])
+def test_a_lone_pixel_in_a_large_picture_is_found(column):
+    mask = np.zeros((240, 320), np.uint8)
+    mask[239, column] = 255
+    assert np.column_stack(find_runs(mask, False)).tolist() == [[239, column, column + 1]]

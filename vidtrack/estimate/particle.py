@@ -1,0 +1,226 @@
+"""The particle bank: states as clouds of weighted samples, for errors that no covariance describes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vidtrack.errors import ConfigError
+from vidtrack.estimate.model import Motion
+from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
+from vidtrack.estimate.parts import in_parts
+from vidtrack.estimate.resampling import Resampling
+from vidtrack.estimate.sensor import Sensor, wrapped
+from vidtrack.scan import Decision, Floats, Ints, Scan
+
+PART = 20_000
+"""Particles that are worth a thread of their own."""
+
+
+class Glint(NamedTuple):
+    """Errors of a measurement's components are `factor` times as large with a probability."""
+
+    probability: float
+    factor: float = 5.0
+
+
+NO_GLINT = Glint(0.0)
+
+
+class ParticleBank:
+    """Particle filters in rows, with the motion model as proposal (Gordon, Salmond and Smith 1993).
+
+    number      N, particles a row
+    resampling  how particles are chosen anew; see `Resampling`
+    threshold   they are, as soon as the effective number 1 / sum of w^2 is below this share of N
+    glint       the measurements' errors, where they are not normal
+    seed        everything random follows from it, however many threads there are
+
+    particles (T, N, n), log_weight (T, N), the weights of a row summing to one; hits (T,) updates so far; scale (T,)
+    size of each object where the model works per size, one elsewhere. What a miss tells (inflation) is not used: the
+    particles outside the gate stay as they are.
+    """
+
+    def __init__(
+        self,
+        model: Motion,
+        number: int = 2000,
+        *,
+        resampling: Resampling = Resampling.SYSTEMATIC,
+        threshold: float = 0.5,
+        glint: Glint = NO_GLINT,
+        seed: int = 0,
+    ) -> None:
+        if number < 2:
+            raise ConfigError(f"particle filter: {number} particles; it needs two at least")
+        if not 0 <= glint.probability < 1 or not glint.factor >= 1:
+            raise ConfigError(f"particle filter: {glint}; the probability is below one and the factor at least one")
+        self.model = model
+        self.number = number
+        self.resampling = resampling
+        self.threshold = threshold
+        self.glint = glint
+        self.rng = np.random.default_rng(seed)
+        self.particles = np.empty((0, number, model.states))
+        self.log_weight = np.empty((0, number))
+        self.hits = np.empty(0, np.int64)
+        self.scale = np.empty(0)
+        self._moments: tuple[Floats, Floats] | None = None
+
+    def __len__(self) -> int:
+        return len(self.particles)
+
+    @property
+    def x(self) -> Floats:
+        """(T, n) means."""
+        return self._known()[0]
+
+    @property
+    def P(self) -> Floats:  # noqa: N802
+        """(T, n, n) covariances."""
+        return self._known()[1]
+
+    def jacobian(self, dt: float, x: Floats) -> Floats:
+        """(1, n, n) or (T, n, n) derivative of what `ahead` makes of means x (T, n), but for the particles' spread."""
+        return self.model.jacobian(dt, x, self.model.transition(dt, x))
+
+    def ahead(self, dt: float) -> tuple[Floats, Floats]:
+        """x, P after dt seconds; changes nothing."""
+        moved = self.particles.copy()
+        self._move(moved, self._transition(dt), np.zeros_like(self.P))
+        x, P = self._mean_and_cov(moved)
+        return x, P + self._process_noise(dt)
+
+    def predict(self, dt: float) -> None:
+        """Move all particles dt seconds on, each with a process noise of its own."""
+        self._move(self.particles, self._transition(dt), self._process_noise(dt))
+        self._moments = None
+
+    def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
+        """zhat (T, m) and covariance (T, m, m) of h(particles); the innovation covariance is that plus R."""
+        seen, weight = self._seen(sensor), np.exp(self.log_weight)
+        centre = np.zeros((len(self), seen.shape[2]))
+        for a in sensor.angles:
+            sine, cosine = ((weight * part(seen[..., a])).sum(axis=1) for part in (np.sin, np.cos))
+            centre[:, a] = np.arctan2(sine, cosine)
+        off = wrapped((seen - centre[:, None]).reshape(-1, seen.shape[2]), sensor.angles)
+        mean, cov = self._mean_and_cov(off.reshape(seen.shape))
+        return wrapped(centre + mean, sensor.angles), cov
+
+    def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
+        """Successor rows from the weights of a decision; x, P are those before the particles are chosen anew."""
+        parent, rows = decision.parent, len(decision.parent)
+        seen = self._seen(sensor)
+        start = np.searchsorted(decision.row, np.arange(rows + 1))
+        weight, log_weight = np.empty((rows, self.number)), np.empty((rows, self.number))
+        x, P = _empty(rows, self.model.states)
+
+        def work(part: slice) -> None:
+            weigh(seen.shape[2], sensor.angles)(
+                self.log_weight, seen, scan.z, scan.R,
+                parent[part], start[part.start : part.stop + 1], decision.measurement, decision.beta,
+                decision.beta0[part], decision.spread, *self.glint, weight[part], log_weight[part],
+            )  # fmt: skip
+            moments(self.model.states)(weight[part], self.particles, parent[part], x[part], P[part])
+
+        in_parts(rows, self._part, work)
+        self.particles = self._chosen(decision, start, scan, sensor, seen, weight, log_weight)
+        self.log_weight = log_weight
+        self._moments = x, P
+        self.hits = self.hits[parent] + (decision.beta0 < 0.5)
+        self.scale = self.scale[parent]
+
+    def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
+        """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
+        self.insert(*self.model.birth(position, cov, scale), scale)
+
+    def insert(self, x: Floats, P: Floats, scale: Floats) -> None:
+        """New rows drawn from normal distributions of means x (B, n) and covariances P (B, n, n); scale (B,)."""
+        new = np.repeat(np.asarray(x, float)[:, None], self.number, axis=1)
+        self._move(new, np.eye(self.model.states)[None], P)
+        before = self.x, self.P
+        self.particles = np.concatenate([self.particles, new])
+        self.log_weight = np.concatenate([self.log_weight, np.full(new.shape[:2], -np.log(self.number))])
+        self._moments = np.concatenate([before[0], x]), np.concatenate([before[1], P])
+        self.hits = np.concatenate([self.hits, np.ones(len(x), np.int64)])
+        self.scale = np.concatenate([self.scale, scale])
+
+    def keep(self, rows: np.ndarray) -> None:
+        """Drop all rows but these indices."""
+        self._moments = self.x[rows], self.P[rows]
+        self.particles, self.log_weight = self.particles[rows], self.log_weight[rows]
+        self.hits, self.scale = self.hits[rows], self.scale[rows]
+
+    def _chosen(
+        self,
+        decision: Decision,
+        start: Ints,
+        scan: Scan,
+        sensor: Sensor,
+        seen: Floats,
+        weight: Floats,
+        log_weight: Floats,
+    ) -> Floats:
+        """Particles (K, N, n) of the successors, chosen anew where need be; log_weight (K, N) is changed along."""
+        chosen = np.empty((len(weight), *self.particles.shape[1:]))
+        if self.resampling == Resampling.NONE:
+            return self.particles[decision.parent]
+        stream = self._streams(len(weight))
+
+        def work(part: slice) -> None:
+            resample(
+                int(self.resampling), self.threshold, weight[part], self.particles, decision.parent[part],
+                stream[part], log_weight[part], chosen[part],
+            )  # fmt: skip
+
+        in_parts(len(weight), self._part, work)
+        return chosen
+
+    @property
+    def _part(self) -> int:
+        return max(1, PART // self.number)
+
+    def _streams(self, rows: int) -> np.ndarray:
+        return self.rng.integers(2**64, size=rows, dtype=np.uint64)
+
+    def _transition(self, dt: float) -> Floats:
+        """F (1, n, n) or (T N, n, n) of the particles."""
+        return self.model.transition(dt, self.particles.reshape(-1, self.model.states))
+
+    def _process_noise(self, dt: float) -> Floats:
+        return self.model.process_noise(dt, self.x, self.P, self.hits, self.scale)
+
+    def _move(self, particles: Floats, F: Floats, Q: Floats) -> None:
+        """Particles (T, N, n) by F (1, n, n) or (T N, n, n), with noise of Q (T, n, n), in place."""
+        rows, n = len(particles), self.model.states
+        each = np.broadcast_to(F.reshape(-1, 1 if len(F) == 1 else self.number, n, n), (rows, self.number, n, n))
+        stream = self._streams(rows)
+        in_parts(rows, self._part, lambda part: move(n)(particles[part], each[part], Q[part], stream[part]))
+
+    def _seen(self, sensor: Sensor) -> Floats:
+        """(T, N, m) what the sensor would see of each particle."""
+        seen = sensor.h(self.particles.reshape(-1, self.model.states), self.model.position)
+        return seen.reshape(len(self), self.number, seen.shape[1])
+
+    def _known(self) -> tuple[Floats, Floats]:
+        """x, P, computed when they are asked for the first time."""
+        if self._moments is None:
+            self._moments = self._mean_and_cov(self.particles)
+        return self._moments
+
+    def _mean_and_cov(self, particles: Floats) -> tuple[Floats, Floats]:
+        """Moments (T, c), (T, c, c) of what the particles are, (T, N, c), under their weights."""
+        rows, c = len(particles), particles.shape[2]
+        mean, cov = _empty(rows, c)
+        everyone = np.arange(rows)
+
+        def work(part: slice) -> None:
+            moments(c)(np.exp(self.log_weight[part]), particles, everyone[part], mean[part], cov[part])
+
+        in_parts(rows, self._part, work)
+        return mean, cov
+
+
+def _empty(rows: int, n: int) -> tuple[Floats, Floats]:
+    return np.empty((rows, n)), np.empty((rows, n, n))

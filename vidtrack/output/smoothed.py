@@ -1,0 +1,77 @@
+"""Smoothed results: rows wait for what comes after them."""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
+
+from vidtrack.config import OutputSettings
+from vidtrack.estimate.smoother import smoothed
+from vidtrack.output.sink import Sink, Step
+from vidtrack.scan import Tracks
+from vidtrack.tracking.boxes import absolute
+
+
+class Smoothed:
+    """Passes steps on to `sinks` with the states of all tracks smoothed, boxes moved along.
+
+    lag_s  s; steps wait until so much has come after them, at most twice as long; None: until no track goes on from
+           one step to the next, or the end
+    """
+
+    def __init__(self, *sinks: Sink, lag_s: float | None = None) -> None:
+        self._sinks = sinks
+        self._lag_s = lag_s
+        self._waiting: deque[Step] = deque()
+
+    def step(self, step: Step) -> None:
+        """Take a step with confirmed tracks; the tracker must have been told to `smooth`."""
+        assert step.tracks.prior_x is not None
+        if np.isnan(step.tracks.prior_x).all():  # nothing goes on, so nothing is known of earlier tracks from here on
+            self._release(len(self._waiting))
+        self._waiting.append(step)
+        if self._lag_s is not None and step.time_s - self._waiting[0].time_s >= 2 * self._lag_s:
+            self._release(sum(step.time_s - waiting.time_s >= self._lag_s for waiting in self._waiting))
+
+    def close(self) -> None:
+        """Pass on what waits."""
+        with ExitStack() as closing:
+            for sink in self._sinks:
+                closing.callback(sink.close)
+            self._release(len(self._waiting))
+
+    def _release(self, count: int) -> None:
+        """Pass on the oldest steps, smoothed by all that wait."""
+        later: Tracks | None = None
+        ready: deque[Tracks] = deque()
+        for step in reversed(self._waiting):
+            later = step.tracks if later is None else smoothed_by(step.tracks, later)
+            ready.appendleft(later)
+        for tracks in list(ready)[:count]:
+            step = replace(self._waiting.popleft(), tracks=tracks)
+            for sink in self._sinks:
+                sink.step(step)
+
+
+def smoothed_first(settings: OutputSettings, *sinks: Sink) -> tuple[Sink, ...]:
+    """The sinks, behind a smoother if the settings ask for one."""
+    return (Smoothed(*sinks, lag_s=settings.smooth_lag_s),) if settings.smooth else sinks
+
+
+def smoothed_by(tracks: Tracks, later: Tracks) -> Tracks:
+    """Tracks with what the smoothed snapshot after them says; boxes keep their place on their track."""
+    assert later.prior_x is not None
+    assert later.prior_P is not None
+    assert later.gain is not None
+    known = np.flatnonzero(~np.isnan(later.prior_x[:, 0]))
+    _, rows, found = np.intersect1d(tracks.id, later.id[known], assume_unique=True, return_indices=True)
+    ahead = known[found]
+    x, P = tracks.x.copy(), tracks.P.copy()
+    x[rows], P[rows] = smoothed(
+        x[rows], P[rows], later.gain[ahead], later.prior_x[ahead], later.prior_P[ahead], later.x[ahead], later.P[ahead]
+    )
+    shift = (x - tracks.x)[:, list(tracks.position)]
+    return replace(tracks, x=x, P=P, box=absolute(tracks.box, shift))

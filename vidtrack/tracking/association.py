@@ -1,0 +1,80 @@
+"""Who gets what: from the gated pairs of a scan to a decision, and to the measurements that may start a track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from vidtrack.associate.hard import Associator
+from vidtrack.associate.problem import Problem
+from vidtrack.associate.trust import Trust
+from vidtrack.scan import Decision, Event, Ints
+from vidtrack.tracking.births import distinct
+from vidtrack.tracking.choices import heaviest
+from vidtrack.tracking.forest import Forest
+from vidtrack.tracking.register import Register
+
+CLAIMED = 0.1
+"""A measurement that tracks claim with more weight than this in sum starts no track."""
+
+Mask = np.ndarray
+Claim = Callable[[Ints], tuple[Ints, Mask]]
+
+
+class Association(NamedTuple):
+    """What comes out of a scan.
+
+    problem   the scan's problem as the successors of the rows see it
+    decision  how K successors come from the rows
+    shared    (K,) blob that each leans on by its edges; -1: none
+    hides     (M,) blobs that hide more than their tracks account for
+    free      (M,) measurements that may start a track
+    """
+
+    problem: Problem
+    decision: Decision
+    shared: Ints
+    hides: Mask
+    free: Mask
+
+
+def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, claim: Claim | None) -> Association:
+    """Confirmed tracks (T,) choose first, then those on shared blobs claim them, then tentative tracks choose.
+
+    claim  given what each track took (T,), who leans on which blob (T,) and which blobs (M,) hide more; None where
+           blobs are not shared
+    """
+    pairs, rows, count = problem.pairs, problem.rows, problem.measurements
+    decision = trust.decide(rule, problem, confirmed)
+    shared, hides = np.full(rows, -1), np.ones(count, bool)
+    if claim is not None:
+        shared, hides = claim(heaviest(decision))
+        decision = decision.without(shared >= 0)
+    free = hides & ~_claimed(decision, count) & trust.sure(problem.scan)
+    open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
+    if open_to_all.any():
+        second = rule.decide(problem.only(open_to_all))
+        free &= ~_claimed(second, count)
+        decision = decision.joined(second)
+    if not rule.gated_births:
+        free[pairs.measurement] = False
+    return Association(problem, decision, shared, hides, distinct(problem.scan, free))
+
+
+def deferred(
+    problem: Problem, forest: Forest, trust: Trust, confirmed: Mask, births: bool, register: Register,
+    events: list[Event],
+) -> Association:  # fmt: skip
+    """Rows become their successors in a forest, and so do the register's; no blob is shared."""
+    pairs, sure = problem.pairs, trust.sure(problem.scan)
+    asked = problem.only(confirmed[pairs.row] | sure[pairs.measurement])
+    decision, born = forest.grow(asked, register, distinct(problem.scan, sure & births), events)
+    alone = np.full(len(decision.parent), -1)
+    return Association(problem.of(decision.parent), decision, alone, sure, born)
+
+
+def _claimed(decision: Decision, measurements: int) -> Mask:
+    """(M,) measurements that tracks claim."""
+    return np.bincount(decision.measurement, decision.beta, measurements) > CLAIMED

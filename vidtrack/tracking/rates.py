@@ -1,0 +1,102 @@
+"""How often targets are seen, and how dense false measurements are: given, or learnt from what tracks take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.scan import MERGED, TENTATIVE, Decision, Floats, Ints, Scan
+from vidtrack.tracking.register import Register
+
+MEMORY_S = 300.0
+"""Time constant of forgetting."""
+PRIOR, PRIOR_SCANS = 0.9, 10.0
+"""Detection probability before anything was seen, and the scans of one track that weigh as much."""
+HIGHEST = 0.999
+"""A target that was always seen may be missed yet."""
+
+Mask = np.ndarray
+Rate = float | Floats | None
+
+
+class Rates:
+    """Detection probability and clutter density, each given or, where it is None, estimated.
+
+    detection, clutter   one number for all, or (B,) one for each Monte Carlo run; density in px^-2, m^-2, ... per scan
+    space                what the sensor surveys, in px^2, m^2, ...; None: the extent of all measurements so far
+
+    P_D: scans in which tracks were seen, of all scans of confirmed tracks that share no blob. Misses count once the
+    track is seen again: those of a target that has gone say nothing of how well targets are seen. Clutter: what
+    confirmed tracks leave, one measurement before the first scan included. Old scans are forgotten exponentially.
+    """
+
+    STATE = ("hits", "trials", "false", "scans", "low", "high")
+
+    def __init__(self, detection: Rate = 0.9, clutter: Rate = 1e-5, space: float | None = None) -> None:
+        self._detection = detection
+        self._clutter = clutter
+        self._space = space
+        self.hits = 0.0
+        self.trials = 0.0
+        self.false = 0.0
+        self.scans = 0.0
+        self.low = np.empty(0)
+        self.high = np.empty(0)
+
+    @property
+    def detection_probability(self) -> float:
+        """P_D now, the mean over the runs."""
+        if self._detection is not None:
+            return float(np.mean(self._detection))
+        return min((self.hits + PRIOR * PRIOR_SCANS) / (self.trials + PRIOR_SCANS), HIGHEST)
+
+    @property
+    def clutter_density(self) -> float:
+        """False measurements per scan and unit of the measurement space now, the mean over the runs."""
+        if self._clutter is not None:
+            return float(np.mean(self._clutter))
+        space = float((self.high - self.low).prod()) if self._space is None else self._space
+        return (self.false + 1) / (self.scans + 1) / space
+
+    def as_dict(self) -> dict[str, float]:
+        """Both, by name."""
+        return {"detection_probability": self.detection_probability, "clutter_density": self.clutter_density}
+
+    def of(self, run: Ints) -> tuple[float | Floats, float | Floats]:
+        """P_D and clutter density for rows (T,) of these runs."""
+        return (
+            self._detection[run] if isinstance(self._detection, np.ndarray) else self.detection_probability,
+            self._clutter[run] if isinstance(self._clutter, np.ndarray) else self.clutter_density,
+        )
+
+    def look(self, scan: Scan) -> None:
+        """Take in where measurements lie, where that is asked for."""
+        if self._clutter is not None or self._space is not None or not len(scan):
+            return
+        reach = np.sqrt(3 * np.diagonal(scan.R, axis1=1, axis2=2))  # half the width of a uniform error
+        low, high = (scan.z - reach).min(axis=0), (scan.z + reach).max(axis=0)
+        first = not len(self.low)
+        self.low = low if first else np.minimum(self.low, low)
+        self.high = high if first else np.maximum(self.high, high)
+
+    def learn(self, decision: Decision, register: Register, alone: Mask, inside: Floats, count: int, dt: float) -> None:
+        """Learn from a decision about `count` measurements, dt seconds after the last.
+
+        alone  (K,) rows of the register that count: those believed, on no shared blob; inside (K,) their P_G
+        """
+        if self._detection is not None and self._clutter is not None:
+            return
+        forget = float(np.exp(-dt / MEMORY_S))
+        known = alone & (register.status != TENTATIVE)
+        runs = 1 + int(register.run.max(initial=0))
+        claimed = np.bincount(decision.measurement, decision.beta * known[decision.row], count)
+        self.false = forget * self.false + float(np.maximum(1 - claimed, 0).sum())
+        self.scans = forget * self.scans + runs
+        found = known & (register.status != MERGED) & (register.history & 1 == 1)
+        self.hits = forget * self.hits + int(found.sum())
+        self.trials = forget * self.trials + float((_gap(register.history[found]) * inside[found]).sum())
+
+
+def _gap(history: Ints) -> Ints:
+    """(N,) scans from the hit before the last to the last, which is the lowest bit."""
+    before = history >> 1
+    return np.frexp((before & -before).astype(float))[1].astype(np.int64)
