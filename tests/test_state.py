@@ -35,9 +35,13 @@ def halves(frames):
     return [f for f in frames if f.time_s < HALF_S], [f for f in frames if f.time_s >= HALF_S]
 
 
-@pytest.mark.parametrize("kind", ["disturbance", "paper"])
-def test_it_goes_on_bit_by_bit(tmp_path, frames, kind):
-    settings = load(assignments=[f"detector.kind={kind}"])
+@pytest.mark.parametrize(
+    "setting",
+    ["detector.kind=disturbance", "detector.kind=paper"]
+    + [f"tracker.method={method}" for method in ("nn", "generalized-nn", "psn", "pda", "jpda", "split", "mht")],
+)
+def test_it_goes_on_bit_by_bit(tmp_path, frames, setting):
+    settings = load(assignments=[setting])
     first, second = halves(frames)
     stopped, resumed = Pipeline(settings), Pipeline(settings)
     stopped.steps(first)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vidtrack.associate.gate import Gate
 from vidtrack.config import Settings
+from vidtrack.errors import ConfigError
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import Measurements, measurements, surveyed
@@ -28,8 +29,13 @@ def track_plots(path: str | Path, settings: Settings | None = None) -> Iterator[
 
 
 def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False) -> Tracker:
-    """The tracker that the settings describe, for these measurements in metres."""
+    """The tracker that the settings describe, for these measurements in metres.
+
+    Raises ConfigError for a filter that cannot be smoothed.
+    """
     radar, common = settings.radar, settings.tracker
+    if settings.output.smooth and radar.estimator == "alpha-beta":
+        raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
     return Tracker(
         model=motion(radar, found.dim),
         estimator=estimator(radar, found),

@@ -202,7 +202,7 @@ class Decision:
 
 def _chosen(theirs: NDArray[np.bool_], other: Any, own: Any) -> Any:
     """Row by row the other's values or one's own, where a method gives any."""
-    return None if own is None else np.where(theirs, other, own)
+    return None if own is None else np.where(theirs, 0 if other is None else other, own)
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,9 @@ def test_boxes_stay_at_their_place_on_the_track():
     made = list(steps(20))
     for before, after in zip(made, played(made)[0], strict=True):
         np.testing.assert_allclose(after.tracks.box[:, 2:], before.tracks.box[:, 2:])
-        np.testing.assert_allclose(after.tracks.box[:, :2] - after.tracks.xy, before.tracks.box[:, :2] - before.tracks.xy)
+        np.testing.assert_allclose(
+            after.tracks.box[:, :2] - after.tracks.xy, before.tracks.box[:, :2] - before.tracks.xy
+        )
 
 
 def test_a_gap_is_bridged_in_mot_txt(tmp_path):

@@ -208,3 +208,13 @@ assert "cv2" not in sys.modules and "av" not in sys.modules
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.rrd").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("interval_s", [0.1, 1.0, 4.0, 10.0])
+@pytest.mark.parametrize("method", ["gnn", "jpda", "mht"])
+def test_a_few_plots_of_one_target_are_enough_for_a_track(tmp_path, interval_s, method):
+    rows = [f"{k},{k * interval_s},{10_000 + 60 * k * interval_s},30,20,0.1" for k in range(6)]
+    write(tmp_path / "plots.csv", *rows)
+    table = formats.read(run(tmp_path, tmp_path / "out", f"tracker.method={method}"))
+    assert len(table) == 6
+    assert len(set(table.id.tolist())) == 1

@@ -65,10 +65,10 @@ def test_the_clutter_density_is_plots_per_scan_and_area(tmp_path):
 
 
 def test_the_plots_of_one_target_do_not_look_like_clutter(tmp_path):
-    """The space around them that a target could reach within a scan counts as surveyed too."""
+    """The space around them that a target could reach within four scans counts as surveyed too."""
     header = "scan,time_s,x_m,y_m,doppler_m_s"
     found = read(tmp_path, "0,0,0,5,1", "1,2,100,5,1", header=header, sigma_position_m=10.0, max_speed=50.0)
-    error, reach = np.sqrt(12) * np.array([10.0, 10.0, 2.0]), np.array([200.0, 200.0, 100.0])
+    error, reach = np.sqrt(12) * np.array([10.0, 10.0, 2.0]), np.array([800.0, 800.0, 100.0])
     assert surveyed(found) == pytest.approx((np.array([100.0, 0.0, 0.0]) + error + reach).prod())
 
 

@@ -309,3 +309,31 @@ def test_a_saved_tracker_goes_on_as_if_it_had_not_stopped(method):
         one, other = resumed.step(s), straight.step(s)
         np.testing.assert_array_equal(one.id, other.id)
         np.testing.assert_array_equal(one.x, other.x)
+
+
+@given(seed=st.integers(0, 2**32 - 1), method=st.sampled_from([vt.MHT(), vt.MHT(n_scan=1, hypotheses=5), vt.Split()]))
+@settings(max_examples=30, deadline=None)
+def test_every_life_is_told_once(seed, method):
+    """A birth before a track is shown, no more of it after its end, and states that stay sound."""
+    rng = np.random.default_rng(seed)
+    tracker = vt.Tracker(vt.ConstantVelocity(accel=20.0, speed=30.0), method, clutter_density=1e-4, explain=True)
+    born, dead, t = set(), set(), 0.0
+    place = rng.uniform(0, 100, (6, 2))
+    for _ in range(25):
+        t += rng.choice([0.0, 0.1, 0.5])
+        place = place + rng.normal(0, 2, place.shape)
+        z = np.vstack([place[rng.random(6) < 0.8], rng.uniform(0, 100, (rng.poisson(3), 2))])
+        tracks = tracker.step(vt.Scan(t, z, np.eye(2)))
+        for event in tracks.events:
+            if event.kind == "birth":
+                assert event.track_id not in born
+                born.add(event.track_id)
+            if event.kind == "delete":
+                assert event.track_id in born - dead
+                dead.add(event.track_id)
+        ids = tracks.id.tolist()
+        assert len(set(ids)) == len(ids)
+        assert set(ids) <= born - dead
+        assert set(tracker.register.id.tolist()) <= born - dead
+        assert (np.linalg.eigvalsh(tracks.P) > 0).all()
+        assert len(set(tracks.choices.track_id.tolist())) == len(tracks.choices.track_id)

@@ -107,6 +107,10 @@ def _refuse_unknown(name: str, value: str, known: tuple[str, ...]) -> None:
         raise ConfigError(f"the {name} of the global nearest neighbour is {value!r}; choose from {', '.join(known)}")
 
 
+HARD = (NN, GNN, GreedyGNN)
+"""Rules that give whole measurements by distance alone."""
+
+
 def one_hot(taken: Ints) -> Decision:
     """Decision of a hard rule: taken (T,) measurement of each track, -1 for none."""
     row = np.flatnonzero(taken >= 0)

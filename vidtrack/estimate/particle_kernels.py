@@ -170,7 +170,7 @@ def copy(x: Floats, chosen: Ints, new: Floats) -> None:
             new[i, a] = x[chosen[i], a]
 
 
-@njit(cache=CACHE, nogil=True, inline="always")
+@njit(cache=CACHE, nogil=True)
 def _log_density(v: float, glint: float, factor: float) -> float:
     """ln of the density of one whitened component, up to a constant: (1 - glint) N(0, 1) + glint N(0, factor^2)."""
     half = min(0.5 * v * v, FARTHEST)

@@ -36,7 +36,7 @@ EDGE = _edges()
 HEIGHT = np.exp(-(EDGE**2) / 2)
 
 
-@njit(cache=CACHE, nogil=True, inline="always")
+@njit(cache=CACHE, nogil=True)
 def bits(count: np.uint64) -> tuple[np.uint64, np.uint64]:
     """64 random bits, and the next count."""
     count += STEP

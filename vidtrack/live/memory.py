@@ -6,7 +6,9 @@ import logging
 import time
 from pathlib import Path
 from threading import Thread
+from time import monotonic
 
+from vidtrack.output.folder import usable
 from vidtrack.output.linefile import Every
 from vidtrack.state import State, gather, read_state, restore, write_state
 from vidtrack.tracking.tracker import Tracker
@@ -52,16 +54,30 @@ class Memory:
         restore(self, state)
 
 
-class StateFile:
+class NoStateFile:
+    """Nothing is saved."""
+
+    found: State | None = None
+    lost = 0
+
+    def offer(self, memory: Memory) -> None:
+        """It is not."""
+
+    def close(self, memory: Memory, until_s: float) -> None:
+        """Nothing is open."""
+
+
+class StateFile(NoStateFile):
     """A memory on the disk, saved regularly. Ids are reserved there before they are used: none is issued twice.
 
     found  what an earlier run left; None without one
     lost   times that it could not be saved
 
-    Raises FormatError for a file that is no saved state.
+    Raises FormatError for a file that is no saved state, OutputError for a place where it cannot be saved.
     """
 
     def __init__(self, path: Path) -> None:
+        usable(path.parent)
         self.path = path
         self.lost = 0
         self.found = read_state(path) if path.exists() else None
@@ -82,10 +98,10 @@ class StateFile:
         self._writing = Thread(target=self._write, args=(state,), name="save-state", daemon=True)
         self._writing.start()
 
-    def close(self, memory: Memory, timeout_s: float) -> None:
-        """Save the end: ids that were reserved and not used are free again."""
+    def close(self, memory: Memory, until_s: float) -> None:
+        """Save the end: ids that were reserved and not used are free again. Waits for the disk until a monotonic time."""
         if self._writing is not None:
-            self._writing.join(timeout_s)
+            self._writing.join(max(0.0, until_s - monotonic()))
         self._write(memory.gather())
 
     def _write(self, state: State) -> None:

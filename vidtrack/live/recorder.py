@@ -15,12 +15,12 @@ from vidtrack.config import Settings
 from vidtrack.errors import StoppedEarly
 from vidtrack.live.film import Film
 from vidtrack.live.keep import Keep, new_part
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import usable, writing
 from vidtrack.output.linefile import LineFile
 from vidtrack.state import State, write_state
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.connection import Connection
-from vidtrack.video.live.tape import Place
+from vidtrack.video.live.tape import NoTape, Place
 from vidtrack.video.recording import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VIDEO
 
 log = logging.getLogger(__name__)
@@ -29,7 +29,23 @@ _RETRY_S = 5.0  # after a failed write
 _NOWHERE: Place = (-1, 0)
 
 
-class Recorder:
+class NoRecorder(NoTape):
+    """Records nothing."""
+
+    lost = 0
+
+    def begins(self, place: Place) -> bool:
+        """Never."""
+        return False
+
+    def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
+        """It is forgotten."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Recorder(NoRecorder):
     """Tape in parts: the packets, the list of frames that were tracked, and the memory before the first of them.
 
     A part begins with a connection, at a key picture after `roll_s` of the clock, or when it is large. When the
@@ -38,11 +54,13 @@ class Recorder:
     lost  packets that could not be written
 
     `log_frame` is for the tracker's thread; everything is written in the reader's, which calls the rest.
+    Raises OutputError if nothing can be written into `root`.
     """
 
     def __init__(self, root: Path, settings: Settings, roll_s: float | None, keep: Keep) -> None:
         self.lost = 0
-        self._root = root
+        self._root = usable(root)
+        keep.roots.append(root)
         self._settings = settings.model_dump_json(indent=2)
         self._roll_s = roll_s
         self._keep = keep

@@ -13,9 +13,9 @@ from typing import Any
 
 from vidtrack.config import Settings
 from vidtrack.live.keep import Keep, parts_of
-from vidtrack.live.memory import Memory, StateFile
+from vidtrack.live.memory import Memory, NoStateFile, StateFile
 from vidtrack.live.outputs import Extras, Outputs, Subject
-from vidtrack.live.recorder import Recorder
+from vidtrack.live.recorder import NoRecorder, Recorder
 from vidtrack.output.folder import open_run, usable
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
@@ -60,35 +60,25 @@ class LiveRun:
         self.name = self._address.name
         roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
         keep = Keep(live.keep_s, live.keep_bytes)
-        self._state_file: StateFile | None = None
-        if extras.state is not None:
-            usable(extras.state.parent)
-            self._state_file = StateFile(extras.state)
-        self._recorder: Recorder | None = None
+        self._state_file = NoStateFile() if extras.state is None else StateFile(extras.state)
+        self._recorder = NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, keep)
         self._outputs: Outputs | None = None
         with ExitStack() as stack:  # whatever fails below, what is open by then is closed
-            if extras.record is not None:
-                keep.roots.append(usable(extras.record))
-                self._recorder = Recorder(extras.record, settings, roll_s, keep)
-                stack.callback(self._recorder.close)
+            stack.callback(self._recorder.close)
             self._source = source = stack.enter_context(self._open_source(connect))
             keep_freed_memory()
             if settings.detector.kind not in ("mog2", "knn"):  # they are OpenCV's, and long enough for its threads
                 stack.enter_context(opencv_single_threaded())
+            self._memory = self._remembered(explain=extras.decisions or extras.rerun is not None)
+            if extras.state or extras.record:
+                self._memory.gather()  # what cannot be saved is refused now
             lines = parse_lines(settings.output.lines, source.width, source.height)
             counter = LineCounter(lines) if lines else None
-            explain = extras.decisions or extras.rerun is not None
-            tracker = build_tracker(settings.tracker, (source.width, source.height), explain=explain)
-            self._memory = Memory(build_detector(settings), tracker, source.like)
-            if self._state_file is not None and self._state_file.found is not None:
-                self._memory.restore(self._state_file.found)
-            continued = output is not None and roll_s is not None and bool(parts_of(output))
-            self.folder = usable(output) if output and continued else open_run(output, self.name, force)
+            shown, scene = self._address.shown, self._memory.detector.scene
+            self.folder = _folder(output, self.name, force, in_parts=roll_s is not None)
             keep.roots.append(self.folder)
-            self.board = StatusBoard(self._address.shown, self._account, source.latency_s, settings.output, counter)
-            subject = Subject(
-                self._address.shown, source.like.shape, source.fps, self._memory.detector.scene, self._reading, counter
-            )
+            self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
+            subject = Subject(shown, source.like.shape, source.fps, scene, self._reading, counter)
             self._outputs = Outputs(self.folder, subject, settings, extras, roll_s, keep)
             self._open = stack.pop_all()
 
@@ -115,25 +105,32 @@ class LiveRun:
         self._open.close()
         self.board.close()
         self._outputs.close(until_s)
-        if self._state_file is not None:
-            self._state_file.close(self._memory, until_s)
+        self._state_file.close(self._memory, until_s)
 
     def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
         """The camera; numbers and times go on from a saved state."""
-        found = None if self._state_file is None else self._state_file.found
+        live, found = self._settings.live, self._state_file.found
         if found is None:
-            return LiveSource(self._address, self._settings.live, self._recorder, connect=connect)
+            return LiveSource(self._address, live, self._recorder, connect=connect)
         since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
-        like = Frame.blank((found["height"], found["width"]), found["coloured"])
         return LiveSource(
             self._address,
-            self._settings.live,
+            live,
             self._recorder,
             first=found["frame"] + 1,
             origin_s=monotonic() - since_s,
-            like=like,
+            like=Frame.blank((found["height"], found["width"]), found["coloured"]),
             connect=connect,
         )
+
+    def _remembered(self, explain: bool) -> Memory:
+        """Detector and tracker, as an earlier run left them if there was one."""
+        source, settings = self._source, self._settings
+        tracker = build_tracker(settings.tracker, (source.width, source.height), explain=explain)
+        memory = Memory(build_detector(settings), tracker, source.like)
+        if self._state_file.found is not None:
+            memory.restore(self._state_file.found)
+        return memory
 
     def _frames(self) -> Iterator[Frame]:
         """The frames to track; before each one, what is to be kept of the memory that it meets."""
@@ -143,11 +140,9 @@ class LiveRun:
                 continue
             if span.over(frame.time_s):
                 break
-            if recorder is not None:
-                place = self._source.place
-                recorder.log_frame(frame, place, memory.gather() if recorder.begins(place) else None)
-            if self._state_file is not None:
-                self._state_file.offer(memory)
+            place = self._source.place
+            recorder.log_frame(frame, place, memory.gather() if recorder.begins(place) else None)
+            self._state_file.offer(memory)
             yield frame
             memory.note(frame)
 
@@ -174,13 +169,16 @@ class LiveRun:
 
     def _lost(self) -> dict[str, int]:
         """Frames, packets and states that could not be written."""
-        lost = {} if self._outputs is None else self._outputs.lost
-        if self._recorder is not None:
-            lost["recording"] = self._recorder.lost
-        if self._state_file is not None:
-            lost["state"] = self._state_file.lost
-        return lost
+        outputs = {} if self._outputs is None else self._outputs.lost
+        return outputs | {"recording": self._recorder.lost, "state": self._state_file.lost}
 
     def _account(self) -> Account:
         stats = self._source.stats
         return Account(stats.state, self._reading(), list(stats.problems))
+
+
+def _folder(output: Path | None, name: str, force: bool, in_parts: bool) -> Path:
+    """A new folder, or that of an earlier run in parts, which is continued."""
+    if output is not None and in_parts and parts_of(output):
+        return usable(output)
+    return open_run(output, name, force)

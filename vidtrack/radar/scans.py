@@ -21,6 +21,9 @@ NONLINEAR = ("ekf", "ukf", "particle")
 SIMULTANEOUS_S = 1e-6
 """Plots within this time are measured at once."""
 
+REACH_SCANS = 4
+"""A radar that saw a target surveys at least what the target can reach in so many scans."""
+
 
 @dataclass(frozen=True, slots=True)
 class Measurements:
@@ -103,7 +106,7 @@ def clutter_density(found: Measurements) -> float:
 
 
 def surveyed(found: Measurements) -> float:
-    """Volume of the measurement space: the box around all plots, and around that what targets cross within a scan.
+    """Volume of the measurement space: the box around all plots, and around that what targets cross in a few scans.
 
     Without such a margin a file with the plots of one target only would look as if it were full of clutter.
     """
@@ -114,8 +117,8 @@ def surveyed(found: Measurements) -> float:
 
 
 def _margin(found: Measurements) -> Floats:
-    """(m,) how far the fastest target (twice the standard deviation) gets either way within a scan."""
-    step = 4 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)
+    """(m,) how far the fastest target, of twice the standard deviation, gets either way within REACH_SCANS."""
+    step = 2 * REACH_SCANS * 2 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)
     margin = np.full(found.z.shape[1], step)
     if found.sensor.angles:
         margin[1 : found.dim] = np.minimum(step / np.median(found.z[:, 0]), np.pi)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vidtrack.associate.hard import Associator
+from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.trust import Trust
 from vidtrack.scan import Decision, Event, Ints
@@ -41,7 +41,8 @@ class Association(NamedTuple):
 
 
 def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, claim: Claim | None) -> Association:
-    """Confirmed tracks (T,) choose first, then those on shared blobs claim them, then tentative tracks choose.
+    """Confirmed tracks (T,) choose first, then those on shared blobs claim them, then tentative tracks choose,
+    which share nothing whatever the rule.
 
     claim  given what each track took (T,), who leans on which blob (T,) and which blobs (M,) hide more; None where
            blobs are not shared
@@ -55,7 +56,7 @@ def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, c
     free = hides & ~_claimed(decision, count) & trust.sure(problem.scan)
     open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
     if open_to_all.any():
-        second = rule.decide(problem.only(open_to_all))
+        second = _starter(rule).decide(problem.only(open_to_all))
         free &= ~_claimed(second, count)
         decision = decision.joined(second)
     if not rule.gated_births:
@@ -73,6 +74,11 @@ def deferred(
     decision, born = forest.grow(asked, register, distinct(problem.scan, sure & births), events)
     alone = np.full(len(decision.parent), -1)
     return Association(problem.of(decision.parent), decision, alone, sure, born)
+
+
+def _starter(rule: Associator) -> Associator:
+    """The rule of tentative tracks: whole measurements, or clutter would never let go of them."""
+    return rule if isinstance(rule, HARD) else GNN()
 
 
 def _claimed(decision: Decision, measurements: int) -> Mask:
