@@ -8,7 +8,7 @@ from vidtrack.simulate import simulate
 from vidtrack.simulate.video_write import write_truth, write_video
 
 SAMPLES = Path(__file__).parent.parent / "samples"
-SEEDS = {"junction": 16, "crossing": 7}
+SEEDS = {"junction": 6, "crossing": 7}
 
 
 def main() -> None:

@@ -231,8 +231,8 @@ class RadarSettings(_Group):
     """m/s; the same of a range rate"""
     skip_bad_rows: bool = False
     """rows that cannot be right are left out and counted; false: they end the run"""
-    estimator: Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta"] = "kalman"
-    """kalman, converted: plots become unbiased positions; ekf, ukf: range and angles as measured; imm: two models"""
+    estimator: Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"] = "kalman"
+    """kalman, converted: plots become unbiased positions; ekf, ukf, particle: range and angles stay; imm: two models"""
     model: Literal["cv", "ca", "singer", "ct"] = "cv"
     """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
     detection_probability: float | None = Field(0.9, gt=0, lt=1)
@@ -251,10 +251,14 @@ class RadarSettings(_Group):
     """s; mean time that imm's quiet mode lasts"""
     manoeuvre_s: float = Field(15.0, gt=0)
     """s; mean time that imm's other mode lasts"""
+    particles: int = Field(2000, ge=2)
+    """samples of each track in the particle filter"""
+    glint: float = Field(0.0, ge=0, lt=1)
+    """share of a plot's errors that are five times as large, for the particle filter"""
     euclidean_radius_m: float = Field(2000.0, gt=0)
     """m; gate of the euclidean distance"""
     life: Literal["m-of-n", "llr"] = "llr"
-    """what confirms a track, as tracker.life: clutter asks for the score, which also ends tracks that it does not fit"""
+    """what confirms a track, as tracker.life; in clutter the score is better, which also ends what does not fit it"""
     coast_scans: int = Field(5, ge=1, le=62)
     """a track is given up after this many scans without a plot"""
     trail_s: float = Field(60.0, ge=0)

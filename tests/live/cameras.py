@@ -65,7 +65,7 @@ class RtspCamera:
 
 
 class _Site(BaseHTTPRequestHandler):
-    """/video.mjpg, /video.ts, /page, /silent, /private, and 404 for the rest."""
+    """/video.mjpg, /video.ts, /film.avi, /page, /silent, /private, and 404 for the rest."""
 
     def do_GET(self):
         server = self.server
@@ -86,6 +86,9 @@ class _Site(BaseHTTPRequestHandler):
         elif self.path == "/page":
             self._start("text/html")
             self.wfile.write(b"<html><body>no camera</body></html>" * 200)
+        elif self.path == "/film.avi":
+            self._start("video/x-msvideo")
+            self.wfile.write((SAMPLES / "crossing.avi").read_bytes())
         elif self.path == "/silent":
             self._start("multipart/x-mixed-replace; boundary=part")
             server.closing.wait(10)

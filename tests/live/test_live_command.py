@@ -73,7 +73,7 @@ def test_kill_9_leaves_readable_files_and_numbers_that_are_not_given_again(camer
             assert sum(1 for _ in run) > 10
         again = (tmp_path / "again" / "tracks.csv").read_text().splitlines()
         lived = (part / "tracks.csv").read_text().splitlines()
-        both = min(len(lived), len(again) - 20)
+        both = max(0, min(len(lived), len(again)) - 20)  # the ends differ: what was tentative there, and lost
         assert lived[:both] == again[:both]
     for part in parts_of(out):
         assert repair(part) > 3

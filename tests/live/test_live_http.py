@@ -41,6 +41,7 @@ def test_pictures_with_times_of_their_arrival(camera, path):
     ("path", "login", "message"),
     [
         ("page", "", "not a video stream"),
+        ("film.avi", "", "is a recording, not live"),
         ("private", "", "refuses the user"),
         ("nothing", "", "no such path"),
         ("silent", "u:secret@", "no answer in 1 s"),

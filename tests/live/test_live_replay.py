@@ -47,6 +47,8 @@ def test_a_recording_gives_the_same_tracks(camera, tmp_path, path):
     assert load(base=recorded_settings(str(tmp_path / "tape"))) == chosen
     lived = (tmp_path / "out" / "tracks.csv").read_text()
     assert lived.count("\n") > 20
+    rows = read_tracks(tmp_path / "out" / "tracks.csv")
+    assert max(rows["x_px"].to_pylist()) < 330  # pixels of the first picture, before and after
     assert replay(tmp_path / "tape", tmp_path / "again", chosen) == lived
 
 

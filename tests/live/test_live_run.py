@@ -6,9 +6,11 @@ import os
 import time
 from threading import Timer
 
+import av
 import cv2
 import numpy as np
 import pyarrow.parquet as pq
+import pytest
 
 import vidtrack.output.linefile as linefile
 from vidtrack.config import load
@@ -55,6 +57,18 @@ def test_the_results_are_those_of_a_run(camera, tmp_path):
     assert 0 < found["latency_ms"]["p50"] < 1000
     assert found["began"].startswith("20")
     assert "gate" in found["counts"]
+
+
+def test_the_annotated_video_runs_at_the_true_speed(camera, tmp_path):
+    with LiveRun(camera.url(), settings(), tmp_path / "out", Extras(video=tmp_path / "film.mp4")) as run:
+        for step in run:
+            time.sleep(0.05)  # many frames are dropped
+            if step.time_s > 2.0:
+                run.stop()
+        assert run.board.now().reading["frames_dropped"] > 20
+    with av.open(str(tmp_path / "film.mp4")) as film:
+        times = [float(frame.time) for frame in film.decode(video=0)]
+    assert times[-1] - times[0] == pytest.approx(step.time_s, abs=0.3)
 
 
 def test_the_board_shows_the_run(camera, tmp_path):

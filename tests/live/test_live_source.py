@@ -80,6 +80,17 @@ def test_every_frame_waits_instead_and_drops_none():
     assert source.stats.frames_dropped == 0
 
 
+def test_every_frame_tells_when_it_falls_behind(caplog, monkeypatch):
+    monkeypatch.setattr("vidtrack.video.live.source._LATE_S", 0.1)
+    acts = [act for k in range(30) for act in (LIVE, Picture(grey(k), stamp_s=k * LIVE))]
+    with open_script(Script(*acts, 5.0), settings=EVERY) as source:
+        for frame in source:
+            if frame is None:
+                break
+            time.sleep(0.03)
+    assert caplog.text.count("behind; use a smaller --scale") == 1
+
+
 def test_what_was_gathered_while_connecting_is_not_live():
     gathered = [Picture(grey(level)) for level in (1, 2, 3)]
     with open_script(Script(*gathered, *pictures([10, 20]), 5.0)) as source:

@@ -14,7 +14,7 @@ from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
 from vidtrack.scan import Decision, Floats, Ints, Scan
 
-PART = 20_000
+PART = 50_000
 """Particles that are worth a thread of their own."""
 
 

@@ -19,8 +19,8 @@ from vidtrack.scan import Floats, Ints
 Kernel = Callable[..., None]
 
 TURN = 2 * np.pi
-FARTHEST = 1e300
-"""Squared distance in standard deviations beyond which all is equally unlikely; keeps the logarithms finite."""
+FARTHEST = 1e12
+"""Half the squared distance, in standard deviations, beyond which all is equally unlikely: logarithms stay exact enough."""
 
 NOTHING = -300.0
 """Logarithm of a weight that adds nothing to the largest; still smaller ones are slow to compute with."""
@@ -60,9 +60,9 @@ def weigh(m: int, angles: tuple[int, ...] = ()) -> Kernel:
     """Weights of successors' particles: Bayes with each measurement alone, mixed by the decision's weights.
 
     w_i = beta0 w_i + sum over j of beta_j w_i N(z_j; h(x_i), R_j) / sum over i of the same; without `spread` the
-    measurements act as one, w_i ~ w_i prod over j of N(z_j; h(x_i), R_j)^beta_j. Sums are taken relative to their largest
-    term. A measurement with glint has errors `factor` times as large with probability `glint`, in each component of
-    the whitened innovation by itself.
+    measurements act as one, w_i ~ w_i prod over j of N(z_j; h(x_i), R_j)^beta_j. Sums are relative to their largest
+    term. With glint a measurement's errors are `factor` times as large with probability `glint`, in each component
+    of the whitened innovation by itself.
 
     log_weight (T, N), seen (T, N, m) = h(x), z (M, m), R (M, m, m), and of the decision parent (K,), start (K + 1,),
     measurement (B,), beta (B,), beta0 (K,), spread -> weight (K, N), summing to one, and log_new (K, N).
@@ -106,9 +106,8 @@ def weigh(m: int, angles: tuple[int, ...] = ()) -> Kernel:
                     for i in range(number):
                         weight[k, i] += beta[b] * posterior[i]
             if as_one:
-                log_total = normalise(joint, weight[k])
-                for i in range(number):
-                    log_new[k, i] = joint[i] - log_total
+                normalise(joint, weight[k])
+                log_new[k] = joint
             else:
                 log_new[k] = np.log(weight[k])
 
@@ -181,19 +180,20 @@ def _log_density(v: float, glint: float, factor: float) -> float:
 
 
 @njit(cache=CACHE, nogil=True)
-def normalise(log_weight: Floats, weight: Floats) -> float:
-    """Fill weight with exp(log_weight) over their sum; ln of that sum."""
+def normalise(log_weight: Floats, weight: Floats) -> None:
+    """Scale weights (N,), given by their logarithms, so that they sum to one; fill weight with them."""
     largest = -np.inf
     for i in range(len(log_weight)):
         largest = max(largest, log_weight[i])
     total = 0.0
     for i in range(len(log_weight)):
-        below = log_weight[i] - largest
-        weight[i] = np.exp(below) if below > NOTHING else 0.0
+        log_weight[i] -= largest
+        weight[i] = np.exp(log_weight[i]) if log_weight[i] > NOTHING else 0.0
         total += weight[i]
+    log_total = np.log(total)
     for i in range(len(weight)):
         weight[i] /= total
-    return largest + np.log(total)
+        log_weight[i] -= log_total
 
 
 @njit(cache=CACHE, nogil=True)

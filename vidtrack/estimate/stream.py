@@ -65,7 +65,7 @@ def normal(count: np.uint64) -> tuple[float, np.uint64]:
     while True:
         drawn, count = bits(count)
         layer = np.int64(drawn & LAYER)
-        x = np.float64(np.int64(drawn) >> 11) * 2.0**-52 * EDGE[layer]  # 53 bits and their sign; the last 8 are the layer
+        x = np.float64(np.int64(drawn) >> 11) * 2.0**-52 * EDGE[layer]  # the first 53 bits; the layer took the last 8
         if abs(x) < EDGE[layer + 1]:
             return x, count
         if layer == 0:

@@ -99,7 +99,7 @@ class StateFile(NoStateFile):
         self._writing.start()
 
     def close(self, memory: Memory, until_s: float) -> None:
-        """Save the end: ids that were reserved and not used are free again. Waits for the disk until a monotonic time."""
+        """Save the end, waiting for the disk until a monotonic time; ids that were reserved in vain are free again."""
         if self._writing is not None:
             self._writing.join(max(0.0, until_s - monotonic()))
         self._write(memory.gather())

@@ -61,9 +61,9 @@ class Part:
         """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
         shown = [step for step in steps if len(step.tracks)]
         if shown:
-            self._tracks.add(csv_text(track_rows(shown)))
-        if self._counts is not None:
-            self._counts.add(crossings)
+            _write(self._tracks, csv_text(track_rows(shown)))
+        if self._counts is not None and crossings:
+            _write(self._counts, crossings)
         for step in steps:
             self._mot.step(step)
             self._plot.step(step)
@@ -72,10 +72,6 @@ class Part:
             with suppress(StoppedEarly):  # it only repeats what the tables hold
                 self._summary.step(step)
         self._mot.flush()
-        for file in (self._tracks, self._counts):
-            if file is not None:
-                file.flush()
-                file.sync()
 
     def finish(self) -> None:
         """Close the tables, sort them, and add tracks.parquet and tracks.png."""
@@ -90,3 +86,10 @@ class Part:
 
     def _add_parquet(self) -> None:
         write_parquet(self.folder / "tracks.parquet", schema(VIDEO), [read_tracks(self._tracks.path)])
+
+
+def _write(file: LineFile, lines: str) -> None:
+    """Bring lines to the disk, safe from a power cut."""
+    file.add(lines)
+    file.flush()
+    file.sync()

@@ -14,6 +14,7 @@ from vidtrack.estimate.imm import IMMBank
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.particle import Glint, ParticleBank
 from vidtrack.estimate.turn import CoordinatedTurn
 from vidtrack.estimate.unscented import UnscentedBank
 from vidtrack.radar.scans import Measurements
@@ -31,10 +32,12 @@ def motion(settings: RadarSettings, dim: int) -> Motion:
     return ConstantVelocity(dim, accel=accel, hold_s=hold_s, speed=speed)
 
 
-def estimator(settings: RadarSettings, found: Measurements) -> Callable[[Motion], Estimator]:
-    """What makes the settings' bank of filters from a motion model."""
+def estimator(settings: RadarSettings, found: Measurements, seed: int = 0) -> Callable[[Motion], Estimator]:
+    """What makes the settings' bank of filters from a motion model; the seed is for what is random."""
     if settings.estimator == "ukf":
         return UnscentedBank
+    if settings.estimator == "particle":
+        return lambda model: ParticleBank(model, settings.particles, glint=Glint(settings.glint), seed=seed)
     if settings.estimator == "imm":
         quiet = ConstantVelocity(
             found.dim, accel=settings.quiet_accel, hold_s=settings.hold_s, speed=settings.max_speed / 2

@@ -24,6 +24,7 @@ IDLE_S = 0.25
 
 _NEWEST, _EVERY = 2, 16  # frames that may wait for the tracker
 _STUCK = 4  # time-outs without a sign of life after which a reading thread is given up
+_LATE_S = 5.0  # with every frame tracked, a delay that has to be told
 _END_S = 0.3  # that a thread gets to end by itself
 
 
@@ -65,7 +66,7 @@ class LiveSource:
         self._shots: Mailbox[Shot] = Mailbox(_EVERY if settings.every_frame else _NEWEST, waits=settings.every_frame)
         self._clock = CaptureClock(patient=settings.every_frame)
         self._index = first
-        self._told_size = self._stopped = False
+        self._told_size = self._told_late = self._stopped = False
         self.stats = LiveStats()
         self.place: Place = (0, 0)
         self._reader = self._read_on()
@@ -90,6 +91,9 @@ class LiveSource:
         frame = replace(shot.frame, index=self._index, time_s=shot.frame.time_s - self.origin_s)
         self._index += 1
         self.stats.frames_read += 1
+        if self._settings.every_frame and not self._told_late and self.latency_s(frame.time_s) > _LATE_S:
+            self._told_late = True
+            self.stats.warn(f"the tracker is {_LATE_S:g} s behind; use a smaller --scale, or let frames be dropped")
         if frame.shape != self.like.shape and not self._told_size:
             self._told_size = True
             size = f"{frame.shape[1]}x{frame.shape[0]}"
