@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
+    from vidtrack.tracking.formation import Formation as Formation
+    from vidtrack.tracking.formation import GroupTracker as GroupTracker
     from vidtrack.tracking.groups import Groups as Groups
     from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
     from vidtrack.tracking.log_ratio import LogRatio as LogRatio
@@ -41,10 +43,12 @@ _HOME = {
     "ConstantVelocity": "estimate.motion",
     "Error": "errors",
     "FormatError": "errors",
+    "Formation": "tracking.formation",
     "GNN": "associate.hard",
     "Gate": "associate.gate",
     "GeneralizedNN": "associate.generalized_nn",
     "GreedyGNN": "associate.hard",
+    "GroupTracker": "tracking.formation",
     "Groups": "tracking.groups",
     "JPDA": "associate.jpda",
     "LifeCycle": "tracking.lifecycle",

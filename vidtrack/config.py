@@ -253,6 +253,8 @@ class RadarSettings(_Group):
     """s; mean time that imm's other mode lasts"""
     particles: int = Field(2000, ge=2)
     """samples of each track in the particle filter"""
+    resampling: Literal["none", "multinomial", "residual", "stratified", "systematic", "error-signal"] = "systematic"
+    """how the particle filter chooses its samples anew; none: never; error-signal: near the plot (paper 003)"""
     glint: float = Field(0.0, ge=0, lt=1)
     """share of a plot's errors that are five times as large, for the particle filter"""
     euclidean_radius_m: float = Field(2000.0, gt=0)

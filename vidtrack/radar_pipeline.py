@@ -17,19 +17,19 @@ from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.tracker import Tracker
 
 
-def track_plots(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[int, Tracks]]:
+def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 0) -> Iterator[tuple[int, Tracks]]:
     """Number of each scan of a plot table (CSV, Parquet) and the tracks after it, lazily.
 
     Raises SourceError and PlotFormatError for a table that cannot be used.
     """
     settings = settings or Settings()
     found = measurements(read_plots(path, settings.radar), settings.radar)
-    for step in scan_steps(found, build_radar_tracker(settings, found)):
+    for step in scan_steps(found, build_radar_tracker(settings, found, seed=seed)):
         yield step.index, step.tracks
 
 
-def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False) -> Tracker:
-    """The tracker that the settings describe, for these measurements in metres.
+def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False, seed: int = 0) -> Tracker:
+    """The tracker that the settings describe, for these measurements in metres; the seed is for particles.
 
     Raises ConfigError for a filter that cannot be smoothed.
     """
@@ -38,7 +38,7 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
         raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
     return Tracker(
         model=motion(radar, found.dim),
-        estimator=estimator(radar, found),
+        estimator=estimator(radar, found, seed),
         associate=rule(common),
         gate=Gate(common.gate_probability, common.distance, radar.euclidean_radius_m),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),

@@ -46,10 +46,11 @@ class RadarRun:
         force: bool = False,
         rerun: str | None = None,
         decisions: bool = False,
+        seed: int = 0,
     ) -> None:
         plots = read_plots(path, settings.radar)
         found = measurements(plots, settings.radar)
-        tracker = build_radar_tracker(settings, found, explain=decisions or rerun is not None)
+        tracker = build_radar_tracker(settings, found, explain=decisions or rerun is not None, seed=seed)
         self.name, self.scans = Path(path).stem, found.count
         self.folder = open_run(output, self.name, force)
         account = {"plots": len(plots), "bad_rows": plots.bad_rows, "truncated": False}

@@ -25,7 +25,11 @@ SERVER = Path(__file__).with_name("rtsp_server.py")
 
 
 def gstreamer_is_installed():
-    code = "import gi; gi.require_version('GstRtspServer', '1.0'); from gi.repository import GstRtspServer"
+    code = (
+        "import gi; gi.require_version('GstRtspServer', '1.0'); from gi.repository import Gst, GstRtspServer;"
+        "Gst.init(None); parts = 'videotestsrc', 'x264enc', 'rtph264pay', 'valve';"
+        "assert all(map(Gst.ElementFactory.find, parts))"
+    )
     try:
         return subprocess.run([SYSTEM_PYTHON, "-c", code], capture_output=True, check=False).returncode == 0
     except FileNotFoundError:
@@ -33,7 +37,8 @@ def gstreamer_is_installed():
 
 
 needs_rtsp = pytest.mark.skipif(
-    not gstreamer_is_installed(), reason="needs gir1.2-gst-rtsp-server-1.0, python3-gi and GStreamer's plugins"
+    not gstreamer_is_installed(),
+    reason="needs gir1.2-gst-rtsp-server-1.0, python3-gi and GStreamer's base, good and ugly plugins",
 )
 
 

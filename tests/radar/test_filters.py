@@ -30,7 +30,7 @@ def speed(tmp_path_factory):
     return folder / "plots.csv", seen.states[0]
 
 
-FILTERS = [(estimator, "cv") for estimator in ("kalman", "converted", "ekf", "ukf", "imm", "alpha-beta")]
+FILTERS = [(estimator, "cv") for estimator in ("kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle")]
 FILTERS += [("kalman", model) for model in ("ca", "singer", "ct")] + [("imm", "ct")]
 
 
@@ -44,3 +44,13 @@ def test_every_filter_follows_the_manoeuvre_and_improves_on_the_plots(speed, est
     assert len({int(tracks.id[0]) for _, tracks in snapshots}) == 1
     measured = np.linalg.norm(truth[20:, :3], axis=1).mean() * np.radians(0.04) * np.sqrt(2)
     assert np.sqrt(np.mean(error**2)) < 0.75 * measured
+
+
+def test_particles_are_the_same_for_the_same_seed(speed):
+    settings = load(assignments=["radar.estimator=particle", "radar.particles=200"])
+    first, again, other = (
+        np.concatenate([tracks.xy for scan, tracks in track_plots(speed[0], settings, seed) if scan < 30])
+        for seed in (1, 1, 2)
+    )
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)

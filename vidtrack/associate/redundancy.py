@@ -28,13 +28,7 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
     Raises ConfigError for a probability outside 0..1.
     """
     angles = scan.sensor.angles if scan.sensor else ()
-    gate, root = Gate(probability), np.arange(len(scan))
-    for first in range(0, len(scan), BLOCK):
-        some = slice(first, first + BLOCK)
-        run = None if scan.run is None else scan.run[some]
-        pairs = gate.pairs(scan.z[some], scan.R[some], scan, run, angles)
-        _join(root, pairs.row + first, pairs.measurement)
-    leader, part = np.unique(_roots(root), return_inverse=True)
+    leader, part = np.unique(linked(scan, Gate(probability)), return_inverse=True)
     order = np.argsort(part, kind="stable")
     begin = np.searchsorted(part[order], np.arange(len(leader)))
 
@@ -57,6 +51,18 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
         label=None if scan.label is None else scan.label[leader],
         run=None if scan.run is None else scan.run[leader],
     ), part
+
+
+def linked(scan: Scan, gate: Gate) -> Ints:
+    """(M,) the first of the measurements that each is linked to, by pairs inside a gate or chains of such (single
+    linkage); those of different runs never are."""
+    angles, root = scan.sensor.angles if scan.sensor else (), np.arange(len(scan))
+    for first in range(0, len(scan), BLOCK):
+        some = slice(first, first + BLOCK)
+        run = None if scan.run is None else scan.run[some]
+        pairs = gate.pairs(scan.z[some], scan.R[some], scan, run, angles)
+        _join(root, pairs.row + first, pairs.measurement)
+    return _roots(root)
 
 
 def _around(box: Floats, place: Floats, z: Floats, order: Ints, begin: Ints) -> Floats:

@@ -26,7 +26,7 @@ Examples:
 @smooth_option
 @click.option(
     "--estimator",
-    type=click.Choice(["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta"]),
+    type=click.Choice(["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"]),
     help="Filter of each track.  [default: kalman]",
 )
 @click.option("--model", type=click.Choice(["cv", "ca", "singer", "ct"]), help="How targets move.  [default: cv]")
@@ -64,7 +64,7 @@ def command(
     settings = load(config_file, [*assignments, *given])
     if first_run() and not quiet:
         click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
-    with RadarRun(plots, settings, output, force=force, rerun=rerun, decisions=decisions) as run:
+    with RadarRun(plots, settings, output, force=force, rerun=rerun, decisions=decisions, seed=seed) as run:
         try:
             for _ in stoppable(progress(run, run.scans, run.name, quiet, unit="scan")):
                 pass  # the sinks have seen it

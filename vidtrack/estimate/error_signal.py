@@ -86,9 +86,12 @@ def keep_near(
                 near[i] |= _within(z[measurement[b]], seen[t, i], limit[measurement[b]], wraps)
         survivors[k] = cycle(near, chosen)
         if survivors[k] == 0:
-            chosen[:] = np.arange(number)
+            new[k] = x[t]
+            continue
         copy(x[t], chosen, new[k])
-        log_weight[k] = log_weight[k][chosen]
+        for i in range(number):
+            weight[i] = log_weight[k, chosen[i]]
+        log_weight[k] = weight
         normalise(log_weight[k], weight)
     return survivors
 

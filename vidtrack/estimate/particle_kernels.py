@@ -20,7 +20,7 @@ Kernel = Callable[..., None]
 
 TURN = 2 * np.pi
 FARTHEST = 1e12
-"""Half the squared distance, in standard deviations, beyond which all is equally unlikely: logarithms stay exact enough."""
+"""Half the squared distance, in standard deviations, beyond which all is equally unlikely; logarithms stay exact."""
 
 NOTHING = -300.0
 """Logarithm of a weight that adds nothing to the largest; still smaller ones are slow to compute with."""

@@ -73,13 +73,11 @@ class Outputs:
         self._subject = subject
         self._settings = settings
         self._decisions = extras.decisions
-        parts = Parts(folder, self._part, roll_s, keep, subject.counter)
+        parts = Parts(folder, self._part, roll_s, keep, subject.counter, self._summary)
         tables = Beside("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
         self._confirmed = Confirmed(tables, hold_s=LIVE_HOLD_S)
         self._besides = [tables]
         self._sinks: list[Sink] = [self._confirmed]
-        if roll_s is not None:
-            self._add("summary", self._summary(folder / "summary.json"))
         if extras.masks is not None:
             self._add("masks", MaskFolder(extras.masks))
         lines = subject.counter.lines if subject.counter else ()

@@ -69,9 +69,8 @@ class Part:
             self._plot.step(step)
             if self._decisions is not None:
                 self._decisions.step(step)
-            with suppress(StoppedEarly):  # it only repeats what the tables hold
-                self._summary.step(step)
         self._mot.flush()
+        count(self._summary, steps)
 
     def finish(self) -> None:
         """Close the tables, sort them, and add tracks.parquet and tracks.png."""
@@ -86,6 +85,13 @@ class Part:
 
     def _add_parquet(self) -> None:
         write_parquet(self.folder / "tracks.parquet", schema(VIDEO), [read_tracks(self._tracks.path)])
+
+
+def count(summary: Summary, steps: Sequence[Step]) -> None:
+    """Bring a summary up to date; if the disk refuses it now, the next one says the same and more."""
+    for step in steps:
+        with suppress(StoppedEarly):
+            summary.step(step)
 
 
 def _write(file: LineFile, lines: str) -> None:

@@ -6,17 +6,19 @@ import logging
 import shutil
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Thread
 
 from vidtrack.errors import Error, StoppedEarly
 from vidtrack.live.keep import Keep, new_part, parts_of, size_of
-from vidtrack.live.part import Part
+from vidtrack.live.part import Part, count
 from vidtrack.output.counts import crossing_lines
 from vidtrack.output.folder import writing
 from vidtrack.output.linefile import Every
 from vidtrack.output.repair import repair
 from vidtrack.output.sink import Step
+from vidtrack.output.summary import Summary
 from vidtrack.traffic.lines import LineCounter
 
 log = logging.getLogger(__name__)
@@ -31,6 +33,7 @@ class Parts:
     open_part  makes a part in a folder
     roll_s     length of a part by the clock: 3600 goes from one full hour to the next; None: root is the only part
     counter    its crossings go into each part's counts.csv; None without lines
+    summary    makes the summary of the whole at a path, where the root is not the only part
 
     Parts that an earlier run could not finish are repaired meanwhile.
     """
@@ -42,6 +45,7 @@ class Parts:
         roll_s: float | None,
         keep: Keep,
         counter: LineCounter | None,
+        summary: Callable[[Path], Summary],
     ) -> None:
         self._root = root
         self._open_part = open_part
@@ -52,6 +56,7 @@ class Parts:
         self._finishing: list[Thread] = []
         begun = [part for part in parts_of(root) if (part / "tracks.csv").exists()]
         unfinished = [part for part in begun if not (part / "tracks.parquet").exists()]
+        self._whole = None if roll_s is None else summary(root / "summary.json")
         self._number = 0
         self._part: Part | None = None
         self._begin()
@@ -63,13 +68,19 @@ class Parts:
         crossings = ""
         if self._counter is not None:
             crossings = "".join(crossing_lines(self._counter.step(step.index, step.tracks)) for step in steps)
+        if self._whole is not None:
+            count(self._whole, steps)
         self._roll()
         (self._part or self._begin()).write(steps, crossings)
 
     def finish(self) -> None:
         """End the last part, and wait for those that are being finished."""
-        if self._part is not None:
-            self._part.finish()
+        with ExitStack() as stack:
+            if self._whole is not None:
+                self._whole.interrupted = False
+                stack.callback(self._whole.close)
+            if self._part is not None:
+                stack.callback(self._part.finish)
         for thread in self._finishing:
             thread.join()
 
@@ -101,12 +112,12 @@ class Parts:
         return 0 if self._roll_s is None else int(time.time() // self._roll_s)
 
     def _later(self, finish: Callable[..., object], *of: object) -> None:
-        """Finish a part in another thread: sorting an hour takes seconds."""
+        """Finish a part in another thread, so that the next one is written meanwhile."""
 
         def run() -> None:
             try:
                 finish(*of)
-            except Error as error:
+            except (Error, OSError) as error:
                 log.warning("a part could not be finished: %s", error)
 
         self._finishing = [thread for thread in self._finishing if thread.is_alive()]

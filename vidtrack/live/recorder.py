@@ -72,6 +72,7 @@ class Recorder(NoRecorder):
         self._logged = _NOWHERE[0]
         self._to_write: deque[tuple[int, State | str]] = deque()
         self._list: LineFile | None = None
+        self._listed = _NOWHERE[0]
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
         """Begin a new part with this packet if there is none, or it is time and the packet a key picture's."""
@@ -120,6 +121,8 @@ class Recorder(NoRecorder):
     def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
         """The frame that is tracked next; with the memory before it if it `begins` a part."""
         part, packet = place
+        if part == _NOWHERE[0]:
+            return
         if state is not None:
             self._logged = part
             self._to_write.append((part, state))
@@ -169,12 +172,15 @@ class Recorder(NoRecorder):
         """Bring states and lists of frames to their parts."""
         while self._to_write:
             part, entry = self._to_write.popleft()
-            if isinstance(entry, str):
-                if self._list is not None:
-                    self._list.add(entry)
-                continue
-            self._end_list()
-            folder = self._folders[part]
-            with writing(folder):
-                write_state(folder / STATE, entry)
-            self._list = LineFile(folder / FRAMES, FRAMES_HEADER)
+            if not isinstance(entry, str):
+                self._begin_list(part, entry)
+            elif self._list is not None and part == self._listed:
+                self._list.add(entry)
+
+    def _begin_list(self, part: int, state: State) -> None:
+        self._end_list()
+        folder = self._folders[part]
+        with writing(folder):
+            write_state(folder / STATE, state)
+        self._list = LineFile(folder / FRAMES, FRAMES_HEADER)
+        self._listed = part

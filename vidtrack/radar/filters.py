@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from vidtrack.config import RadarSettings
 from vidtrack.estimate.acceleration import ConstantAcceleration, Singer
 from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.error_signal import ErrorSignalBank
 from vidtrack.estimate.fixed_gain import FixedGainBank
 from vidtrack.estimate.imm import IMMBank
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.particle import Glint, ParticleBank
+from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.turn import CoordinatedTurn
 from vidtrack.estimate.unscented import UnscentedBank
 from vidtrack.radar.scans import Measurements
@@ -37,7 +40,7 @@ def estimator(settings: RadarSettings, found: Measurements, seed: int = 0) -> Ca
     if settings.estimator == "ukf":
         return UnscentedBank
     if settings.estimator == "particle":
-        return lambda model: ParticleBank(model, settings.particles, glint=Glint(settings.glint), seed=seed)
+        return partial(_particles, settings=settings, seed=seed)
     if settings.estimator == "imm":
         quiet = ConstantVelocity(
             found.dim, accel=settings.quiet_accel, hold_s=settings.hold_s, speed=settings.max_speed / 2
@@ -47,3 +50,11 @@ def estimator(settings: RadarSettings, found: Measurements, seed: int = 0) -> Ca
         variance = np.diagonal(found.R, axis1=1, axis2=2).mean()
         return lambda model: FixedGainBank(model, float(np.sqrt(variance)))
     return KalmanBank
+
+
+def _particles(model: Motion, settings: RadarSettings, seed: int) -> ParticleBank:
+    glint = Glint(settings.glint)
+    if settings.resampling == "error-signal":
+        return ErrorSignalBank(model, settings.particles, glint=glint, seed=seed)
+    scheme = Resampling[settings.resampling.upper()]
+    return ParticleBank(model, settings.particles, resampling=scheme, glint=glint, seed=seed)

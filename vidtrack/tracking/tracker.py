@@ -144,8 +144,20 @@ class Tracker:
         x, P = self.bank.ahead(self._since_last(t))
         return self._snapshot(t, x, P, np.full(len(x), -1), np.full(len(x), np.nan))
 
-    def add(self, t: float, x: Floats, P: Floats, run: Ints | None = None, box: Floats | None = None) -> Ints:
-        """Put in confirmed tracks with known states x (B, n), P (B, n, n); returns their ids."""
+    def remove(self, ids: Ints) -> None:
+        """Take out the tracks of these ids."""
+        self._keep(~np.isin(self.register.id, ids))
+
+    def add(
+        self,
+        t: float,
+        x: Floats,
+        P: Floats,
+        run: Ints | None = None,
+        box: Floats | None = None,
+        ids: Ints | None = None,
+    ) -> Ints:
+        """Put in confirmed tracks with known states x (B, n), P (B, n, n); returns their ids: new ones, or as given."""
         first, count = len(self.bank), len(x)
         position = list(self.model.position)
         self.bank.insert(x, P, np.ones(count))
@@ -153,10 +165,11 @@ class Tracker:
             self.forest.add(count)
         boxes = np.full((count, 4), np.nan) if box is None else box
         runs = np.zeros(count, np.int64) if run is None else run
-        ids = self.register.append(t, x[:, position], boxes, BELIEF, runs)
+        new = self.register.append(t, x[:, position], boxes, BELIEF, runs)
+        self.register.id[first:] = new if ids is None else ids
         self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
-        return ids
+        return self.register.id[first:].copy()
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
         """Move all rows to the scan's time; those unseen for too long end here, before they gate anything."""

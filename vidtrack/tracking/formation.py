@@ -1,0 +1,160 @@
+"""Formations: targets too close together to be followed one by one are followed as groups (paper 001)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from vidtrack.associate.gate import Gate
+from vidtrack.associate.redundancy import linked
+from vidtrack.errors import ConfigError
+from vidtrack.scan import TENTATIVE, Event, Ints, Scan, Tracks
+from vidtrack.tracking.members import Members, rows_of
+from vidtrack.tracking.tracker import Tracker
+
+
+@dataclass(frozen=True, slots=True)
+class Formation:
+    """What a group is.
+
+    link   px or m; measurements no farther apart, or linked by others that are not, are of one group
+    merge  px or m; confirmed groups whose centroids are closer become one
+    scans  a member counts once it was seen in so many scans in a row, and a gap wider than `link` that lasts so many
+           scans splits the group
+    by     what updates a group: the mean of its measurements, or that of its members, each where its measurement is
+           or, without one, where the group's velocity took it
+    """
+
+    link: float
+    merge: float
+    scans: int = 3
+    by: Literal["measurements", "members"] = "members"
+
+    def __post_init__(self) -> None:
+        for name in ("link", "merge"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise ConfigError(f"{name} is {getattr(self, name)}; it must be a finite distance above zero")
+        if self.scans < 1:
+            raise ConfigError(f"scans is {self.scans}; it must be at least 1")
+        if self.by not in ("measurements", "members"):
+            raise ConfigError(f"groups are updated by {self.by!r}; choose measurements or members")
+
+
+class GroupTracks(NamedTuple):
+    """Groups after a scan.
+
+    tracks  one row a group: its centroid
+    size    (T,) members, those that this scan did not resolve included
+    seen    (T,) members that this scan showed
+    """
+
+    tracks: Tracks
+    size: Ints
+    seen: Ints
+
+
+class GroupTracker:
+    """Tracks groups: a Tracker of their centroids, and the members of each.
+
+    rule     Formation
+    options  of the Tracker: model, gate, life, ...
+    """
+
+    def __init__(self, rule: Formation, **options: Any) -> None:
+        self.rule = rule
+        self.tracker = Tracker(**options)
+        self._near = Gate(distance="euclidean", radius=rule.link)
+        self._close = Gate(distance="euclidean", radius=rule.merge)
+        self.members = Members.new(np.empty(0, np.int64), np.empty((0, self.tracker.model.dim)))
+
+    def step(self, scan: Scan) -> GroupTracks:
+        """Take one scan of positions and return all groups at its time. Raises ScanError as Tracker does."""
+        ahead, before = self.tracker.predict(scan.t), self.tracker.t
+        dt = 0.0 if before is None else scan.t - before
+        members = self.members.moved(ahead.id, dt * ahead.v)
+        taken = members.taken(scan, self._near)
+        group = members.whose(taken, scan, self._near)
+        self.members = members.seen(taken, group, scan, self.rule.scans)
+        names, measured = np.unique(group, return_inverse=True)
+        tracks = self.tracker.step(self._centroids(scan, names, measured))
+        self._follow(tracks, names)
+        events = [*tracks.events, *self._merge(tracks), *self._split(scan.t)]
+        now = replace(self.tracker.predict(scan.t), events=tuple(events))
+        row = rows_of(self.members.group, now.id)
+        size, seen = (np.bincount(row, of, len(now)) for of in (self.members.sure, self.members.streak > 0))
+        return GroupTracks(now, np.maximum(size, 1).astype(np.int64), seen.astype(np.int64))
+
+    def _centroids(self, scan: Scan, names: Ints, measured: Ints) -> Scan:
+        """One measurement for each group of these names (G,); measured (M,) is which of them each measurement is of.
+
+        R is the mean one over the number of measurements, plus, by the measurements' mean, the members' scatter over
+        it where not all were seen: which of them were is chance.
+        """
+        members = self.members.only(np.isin(self.members.group, names))
+        row = np.searchsorted(names, members.group)
+        size, count = np.bincount(row, minlength=len(names)), np.bincount(measured, minlength=len(names))
+        centre = _sums(row, members.z) / size[:, None]
+        R = _sums(measured, scan.R) / (count**2)[:, None, None]
+        if self.rule.by == "members":
+            return Scan(scan.t, centre, R, noise=scan.noise)
+        off = members.z - centre[row]
+        scatter = _sums(row, off[:, :, None] * off[:, None, :]) / size[:, None, None]
+        R += np.where(count < size, 1 / count, 0.0)[:, None, None] * scatter
+        return Scan(scan.t, _sums(measured, scan.z) / count[:, None], R, noise=scan.noise)
+
+    def _follow(self, tracks: Tracks, names: Ints) -> None:
+        """Members go with the track that took their group's measurement; those of groups without a track end."""
+        took = tracks.measurement >= 0
+        owner = names.copy()
+        owner[tracks.measurement[took]] = tracks.id[took]
+        members = self.members
+        place = np.minimum(np.searchsorted(names, members.group), max(len(names) - 1, 0))
+        if len(names):
+            shown = names[place] == members.group
+            members = members._replace(group=np.where(shown, owner[place], members.group))
+        self.members = members.only(np.isin(members.group, tracks.id))
+
+    def _merge(self, tracks: Tracks) -> Iterator[Event]:
+        """Confirmed groups that are close together become one, under the id of the oldest."""
+        tracks = tracks.only((tracks.status != TENTATIVE) & np.isin(tracks.id, self.members.group))
+        part = linked(Scan(tracks.t, tracks.xy, np.eye(tracks.xy.shape[1])), self._close)
+        for first in np.flatnonzero(np.bincount(part, minlength=len(part)) > 1):
+            ids = np.sort(tracks.id[part == first])
+            inside = np.isin(self.members.group, ids)
+            were = tracks.only(rows_of(self.members.group[inside], tracks.id))
+            self.members = self.members._replace(group=np.where(inside, ids[0], self.members.group))
+            self._restate(ids, ids[0], were, self.members.only(inside))
+            reason = f"groups {', '.join(map(str, ids))} are one"
+            yield from (Event(tracks.t, int(i), "merge", reason) for i in ids)
+
+    def _split(self, t: float) -> Iterator[Event]:
+        """Parts that a gap has kept apart for long enough become groups of their own."""
+        self.members, part = self.members.parted(self._near, self.rule.scans)
+        now = self.tracker.predict(t)
+        for first in np.unique(part[part >= 0]):
+            leaving, old = part == first, self.members.group[first]
+            was = now.only(now.id == old)
+            new = self._restate(np.empty(0, np.int64), None, was, self.members.only(leaving))
+            self.members = self.members._replace(group=np.where(leaving, new, self.members.group))
+            self.members.apart[leaving] = 0
+            self._restate(np.array([old]), old, was, self.members.only(self.members.group == old))
+            yield Event(t, int(old), "split", f"{leaving.sum()} members went apart as group {new}")
+
+    def _restate(self, ids: Ints, name: int | None, were: Tracks, members: Members) -> int:
+        """One group in place of those of these ids, under a name, or under a new one: where its members are on the
+        average, moving as the groups did that each of them came from."""
+        x, P = were.x.mean(axis=0), were.P.mean(axis=0)
+        x[list(were.position)] = members.z.mean(axis=0)
+        self.tracker.remove(ids)
+        given = None if name is None else np.array([name])
+        return int(self.tracker.add(were.t, x[None], P[None], ids=given)[0])
+
+
+def _sums(row: Ints, values: np.ndarray) -> np.ndarray:
+    """Sums of values (N, ...) over the rows (N,) that they belong to."""
+    total = np.zeros((row.max(initial=-1) + 1, *values.shape[1:]))
+    np.add.at(total, row, values)
+    return total

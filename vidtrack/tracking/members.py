@@ -1,0 +1,106 @@
+"""Members of groups: who is where in each group, whether this scan showed it or not."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vidtrack.associate.gate import Gate
+from vidtrack.associate.hard import GNN
+from vidtrack.associate.problem import Problem
+from vidtrack.associate.redundancy import linked
+from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.tracking.choices import heaviest
+
+Mask = np.ndarray
+
+
+class Members(NamedTuple):
+    """Members of all groups, one row each.
+
+    group   (K,) id of its group
+    z       (K, d) where it is
+    streak  (K,) scans in a row that showed it, up to now
+    sure    (K,) whether it counts
+    apart   (K,) scans for which a gap has parted it from the largest part of its group
+    """
+
+    group: Ints
+    z: Floats
+    streak: Ints
+    sure: Mask
+    apart: Ints
+
+    @classmethod
+    def new(cls, group: Ints, z: Floats, sure: bool = False) -> Members:
+        """Members (B,) of groups, seen at z (B, d) for the first time."""
+        count = len(group)
+        return cls(group, z, np.ones(count, np.int64), np.full(count, sure), np.zeros(count, np.int64))
+
+    def only(self, rows: Any) -> Members:
+        """Those of a mask or of indices."""
+        return Members(*(column[rows] for column in self))
+
+    def joined(self, other: Members) -> Members:
+        """Both."""
+        return Members(*(np.concatenate(columns) for columns in zip(self, other, strict=True)))
+
+    def moved(self, ids: Ints, shift: Floats) -> Members:
+        """Each moved with its group: shift (T, d) of the groups ids (T,)."""
+        return self._replace(z=self.z + shift[rows_of(self.group, ids)])
+
+    def taken(self, scan: Scan, near: Gate) -> Ints:
+        """(K,) measurement that each takes, no two the same; -1 for none."""
+        problem = Problem.gated(near, self.z, np.zeros((*self.z.shape, self.z.shape[1])), scan)
+        return heaviest(GNN().decide(problem))
+
+    def whose(self, taken: Ints, scan: Scan, near: Gate) -> Ints:
+        """(M,) group of each measurement: that of the member which took it, else of one linked to it, else a new one.
+
+        New groups have numbers below zero.
+        """
+        part = linked(scan, near)
+        group, known = np.full(len(scan), -1), np.zeros(len(scan), bool)
+        hit = taken >= 0
+        group[taken[hit]], known[taken[hit]] = self.group[hit], True
+        joined = np.full(len(scan), -1)
+        np.maximum.at(joined, part[known], group[known])
+        group[~known] = joined[part[~known]]
+        return np.where(group < 0, part - len(scan), group)
+
+    def seen(self, taken: Ints, group: Ints, scan: Scan, scans: int) -> Members:
+        """After a scan whose measurements (M,) are of these groups: each where it was seen, else where it went.
+
+        Who was seen in so many `scans` in a row counts from then on; who was not, and is missed, is nobody, unless
+        nobody in the group counts yet.
+        """
+        hit = taken >= 0
+        z = np.where(hit[:, None], scan.z[taken] if len(scan) else self.z, self.z)
+        streak = np.where(hit, self.streak + 1, 0)
+        new_group = ~np.isin(self.group, self.group[self.sure])
+        old = self._replace(z=z, streak=streak, sure=self.sure | (streak >= scans)).only(hit | self.sure | new_group)
+        others = np.setdiff1d(np.arange(len(scan)), taken[hit])
+        return old.joined(Members.new(group[others], scan.z[others], scans == 1))
+
+    def parted(self, near: Gate, scans: int) -> tuple[Members, Ints]:
+        """With the gaps inside groups counted, and the part (K,) of each: those that are apart for so many `scans`
+        have one, numbered by a row; the others -1."""
+        groups, run = np.unique(self.group, return_inverse=True)
+        part = linked(Scan(0.0, self.z, np.eye(self.z.shape[1]), run=run), near)
+        size = np.bincount(part, self.sure + 1e-6, len(part))
+        largest = np.full(len(groups), -1)
+        order = np.argsort(size[part], kind="stable")
+        largest[run[order]] = part[order]
+        off = part != largest[run]
+        members = self._replace(apart=np.where(off, self.apart + (self.streak > 0), 0))
+        longest = np.zeros(len(part), np.int64)
+        np.maximum.at(longest, part, np.where(self.sure, members.apart, 0))
+        return members, np.where(off & (longest[part] >= scans), part, -1)
+
+
+def rows_of(ids: Ints, among: Ints) -> Ints:
+    """(K,) places of ids (K,) among others (T,), all of which are there."""
+    order = np.argsort(among)
+    rows: Ints = order[np.searchsorted(among, ids, sorter=order)]
+    return rows

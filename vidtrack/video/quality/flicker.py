@@ -1,0 +1,57 @@
+"""Lamps on alternating current: the light of the whole picture, or of its rows, swings at one frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.scan import Floats
+from vidtrack.video.quality.samples import Samples
+
+_DARK, _BRIGHT = 24, 235  # grey levels between which a ratio means something
+_FEWEST, _CYCLES = 32, 4  # pictures, and swings within them, that show a frequency
+
+
+@dataclass(frozen=True, slots=True)
+class Flicker:
+    """Amplitudes are of a sine, as a share of the light.
+
+    whole         of the whole picture
+    whole_hz      its frequency as the camera sees it, which is not the lamps'
+    bands         of rows against the whole picture, from a shutter that opens row by row
+    bands_hz      the same for them
+    """
+
+    whole: float = 0.0
+    whole_hz: float = 0.0
+    bands: float = 0.0
+    bands_hz: float = 0.0
+
+
+def flicker(samples: Samples, rate: float) -> Flicker:
+    """Of pictures at a rate [1/s]; zero if they are too few to tell."""
+    luma = samples.luma.astype(np.float32)
+    if len(luma) < _FEWEST:
+        return Flicker()
+    scene = np.median(luma, axis=0)
+    usable = (scene > _DARK) & (scene < _BRIGHT)
+    rows = usable.mean(axis=1) > 0.5  # the others tell more of traffic than of light
+    if not rows.any():
+        return Flicker()
+    ratio = np.where(usable[rows], luma[:, rows] - samples.black, np.nan) / (scene[rows] - samples.black)
+    gain = np.nanmedian(ratio, axis=2)  # (K, h): traffic covers less than half of most rows
+    whole = np.median(gain, axis=1)
+    return Flicker(*_strongest(whole[:, None], rate), *_strongest(gain / whole[:, None], rate))
+
+
+def _strongest(gain: Floats, rate: float) -> tuple[float, float]:
+    """Amplitude and frequency [Hz] of the strongest sine that stands out in series (K, N): median over the N."""
+    series = gain - gain.mean(axis=0)
+    window = np.hanning(len(series))[:, None]
+    amplitude = np.median(np.abs(np.fft.rfft(series * window, axis=0)), axis=1) * 2 / window.sum()
+    first = _CYCLES  # slower changes are the sun's, and the exposure's
+    strongest = first + int(amplitude[first:].argmax())
+    beside = np.delete(amplitude, slice(max(0, strongest - 1), strongest + 2))[max(0, first - 1) :]
+    stands_out = amplitude[strongest] > 4 * np.median(beside)
+    return (float(amplitude[strongest]), strongest * rate / len(series)) if stands_out else (0.0, 0.0)

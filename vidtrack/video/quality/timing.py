@@ -1,0 +1,60 @@
+"""How regular the pictures come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vidtrack.scan import Floats
+from vidtrack.video.clock import stamp_rate
+
+_GAP = 1.5  # usual intervals; a longer one lacks a picture
+_STILL_S = 0.3  # pictures that are all alike for longer show a scene in which nothing moves
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Of the pictures' times.
+
+    pictures       so many were timed
+    rate           pictures per second, gaps left out
+    jitter         standard deviation of the intervals without gaps, in usual intervals
+    missing_share  pictures that the gaps would have held, of all
+    longest_gap_s  longest interval
+    repeated_share pictures that only repeat the one before
+    """
+
+    pictures: int
+    rate: float
+    jitter: float
+    missing_share: float
+    longest_gap_s: float
+    repeated_share: float
+
+
+def timing(times: Floats, repeats: NDArray[np.bool_]) -> Timing:
+    """Of pictures at times (K,) [s], K of at least 2; repeats (J,) of some of them, in order."""
+    intervals = np.diff(times)
+    rate = stamp_rate(times) or 0.0
+    whole = np.maximum(1, np.rint(intervals * rate))
+    usual = intervals[intervals * rate < _GAP]
+    missing = float((whole - 1)[intervals * rate >= _GAP].sum())
+    return Timing(
+        pictures=len(times),
+        rate=rate,
+        jitter=float(usual.std() * rate) if usual.size else 0.0,
+        missing_share=missing / (len(times) + missing),
+        longest_gap_s=float(intervals.max()),
+        repeated_share=_repeated_share(repeats, rate),
+    )
+
+
+def _repeated_share(repeats: NDArray[np.bool_], rate: float) -> float:
+    """Share of the repeats (J,) among pictures in motion: a scene in which nothing moves repeats itself for long."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], repeats, [False]]).astype(int)))
+    length = edges[1::2] - edges[::2]
+    still = length > max(1.0, _STILL_S * rate)
+    moving = len(repeats) - length[still].sum()
+    return float(length[~still].sum() / moving) if moving else 0.0
