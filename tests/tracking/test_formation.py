@@ -34,10 +34,10 @@ def test_groups_that_come_close_are_one_weighted_by_their_members():
     three = np.array([[0.0, 0.5], [0.0, -0.5], [0.0, 0.0]])
     two = np.array([[0.0, 0.3], [0.0, -0.3]])
     for k in range(5):
-        found = tracker.step(scan(k, np.vstack([three, two + (2, 0)]), 0.1))
+        found = tracker.step(scan(k, np.vstack([three, two + 2.0 * np.eye(2)[0]]), 0.1))
     assert found.size.tolist() == [3, 2]
     tracker._close = Gate(distance="euclidean", radius=3.0)
-    found = tracker.step(scan(5, np.vstack([three, two + (2, 0)]), 0.1))
+    found = tracker.step(scan(5, np.vstack([three, two + 2.0 * np.eye(2)[0]]), 0.1))
     np.testing.assert_allclose(found.tracks.xy, [[0.8, 0.0]], atol=1e-9)
     assert found.tracks.id.tolist() == [1]
     assert [event.kind for event in found.tracks.events] == ["merge", "merge"]

@@ -68,54 +68,53 @@ class GroupTracker:
         self.tracker = Tracker(**options)
         self._near = Gate(distance="euclidean", radius=rule.link)
         self._close = Gate(distance="euclidean", radius=rule.merge)
-        self.members = Members.new(np.empty(0, np.int64), np.empty((0, self.tracker.model.dim)))
+        none = np.empty(0, np.int64)
+        self.members = Members.new(none, np.empty((0, self.tracker.model.dim)), none, False)
 
     def step(self, scan: Scan) -> GroupTracks:
         """Take one scan of positions and return all groups at its time. Raises ScanError as Tracker does."""
         ahead, before = self.tracker.predict(scan.t), self.tracker.t
-        dt = 0.0 if before is None else scan.t - before
-        members = self.members.moved(ahead.id, dt * ahead.v)
+        members = self.members.moved(ahead.id, (scan.t - (scan.t if before is None else before)) * ahead.v)
         taken = members.taken(scan, self._near)
         group = members.whose(taken, scan, self._near)
         self.members = members.seen(taken, group, scan, self.rule.scans)
-        names, measured = np.unique(group, return_inverse=True)
-        tracks = self.tracker.step(self._centroids(scan, names, measured))
+        names, centroids = self._centroids(scan)
+        tracks = self.tracker.step(centroids)
         self._follow(tracks, names)
         events = [*tracks.events, *self._merge(tracks), *self._split(scan.t)]
         now = replace(self.tracker.predict(scan.t), events=tuple(events))
         row = rows_of(self.members.group, now.id)
-        size, seen = (np.bincount(row, of, len(now)) for of in (self.members.sure, self.members.streak > 0))
+        size, seen = (np.bincount(row, of, len(now)) for of in (self.members.sure, self.members.measurement >= 0))
         return GroupTracks(now, np.maximum(size, 1).astype(np.int64), seen.astype(np.int64))
 
-    def _centroids(self, scan: Scan, names: Ints, measured: Ints) -> Scan:
-        """One measurement for each group of these names (G,); measured (M,) is which of them each measurement is of.
+    def _centroids(self, scan: Scan) -> tuple[Ints, Scan]:
+        """The groups (G,) that the scan shows, and a measurement of each.
 
-        R is the mean one over the number of measurements, plus, by the measurements' mean, the members' scatter over
-        it where not all were seen: which of them were is chance.
+        R is the mean of the measurements' own over their number n, and more where members are missing: by the
+        measurements' mean the members' scatter over n, since it is chance which of them were seen; by the members, also
+        when they are back, the square of their surprise over n, since one plot may have stood for several.
         """
-        members = self.members.only(np.isin(self.members.group, names))
-        row = np.searchsorted(names, members.group)
-        size, count = np.bincount(row, minlength=len(names)), np.bincount(measured, minlength=len(names))
-        centre = _sums(row, members.z) / size[:, None]
-        R = _sums(measured, scan.R) / (count**2)[:, None, None]
-        if self.rule.by == "members":
-            return Scan(scan.t, centre, R, noise=scan.noise)
-        off = members.z - centre[row]
-        scatter = _sums(row, off[:, :, None] * off[:, None, :]) / size[:, None, None]
-        R += np.where(count < size, 1 / count, 0.0)[:, None, None] * scatter
-        return Scan(scan.t, _sums(measured, scan.z) / count[:, None], R, noise=scan.noise)
+        members = self.members.only(~self.members.doubtful)
+        members = members.only(np.isin(members.group, members.group[members.measurement >= 0]))
+        names, row = np.unique(members.group, return_inverse=True)
+        seen = members.measurement >= 0
+        n, size = np.bincount(row[seen], minlength=len(names)), np.bincount(row, minlength=len(names))
+        centre = _means(row, members.z, size)
+        own, off = scan.R[members.measurement[seen]], members.z - centre[row]
+        lacking, doubt = (members.streak < 2, members.surprise) if self.rule.by == "members" else (~seen, off)
+        partial, doubt = np.isin(row, row[lacking])[seen, None, None], doubt[seen]
+        R = _means(row[seen], own + partial * doubt[:, :, None] * doubt[:, None, :], n) / n[:, None, None]
+        if self.rule.by == "measurements":
+            centre = _means(row[seen], members.z[seen], n)
+        return names, Scan(scan.t, centre, R, noise=scan.noise)
 
     def _follow(self, tracks: Tracks, names: Ints) -> None:
         """Members go with the track that took their group's measurement; those of groups without a track end."""
         took = tracks.measurement >= 0
-        owner = names.copy()
-        owner[tracks.measurement[took]] = tracks.id[took]
-        members = self.members
-        place = np.minimum(np.searchsorted(names, members.group), max(len(names) - 1, 0))
-        if len(names):
-            shown = names[place] == members.group
-            members = members._replace(group=np.where(shown, owner[place], members.group))
-        self.members = members.only(np.isin(members.group, tracks.id))
+        group = self.members.group.copy()
+        for name, track in zip(names[tracks.measurement[took]], tracks.id[took], strict=True):
+            group[self.members.group == name] = track
+        self.members = self.members._replace(group=group).only(np.isin(group, tracks.id))
 
     def _merge(self, tracks: Tracks) -> Iterator[Event]:
         """Confirmed groups that are close together become one, under the id of the oldest."""
@@ -153,8 +152,8 @@ class GroupTracker:
         return int(self.tracker.add(were.t, x[None], P[None], ids=given)[0])
 
 
-def _sums(row: Ints, values: np.ndarray) -> np.ndarray:
-    """Sums of values (N, ...) over the rows (N,) that they belong to."""
-    total = np.zeros((row.max(initial=-1) + 1, *values.shape[1:]))
+def _means(row: Ints, values: np.ndarray, count: Ints) -> np.ndarray:
+    """Means of values (N, ...) over the rows (N,) that they belong to, `count` of them in each."""
+    total = np.zeros((len(count), *values.shape[1:]))
     np.add.at(total, row, values)
-    return total
+    return total / count.reshape(-1, *(1,) * (values.ndim - 1))

@@ -19,24 +19,29 @@ Mask = np.ndarray
 class Members(NamedTuple):
     """Members of all groups, one row each.
 
-    group   (K,) id of its group
-    z       (K, d) where it is
-    streak  (K,) scans in a row that showed it, up to now
-    sure    (K,) whether it counts
-    apart   (K,) scans for which a gap has parted it from the largest part of its group
+    group        (K,) id of its group
+    z            (K, d) where it is
+    surprise     (K, d) how far from where it was expected
+    measurement  (K,) that it took of the last scan; -1 for none
+    streak       (K,) scans in a row that showed it, up to now
+    sure         (K,) whether it counts
+    apart        (K,) scans for which a gap has parted it from the largest part of its group
     """
 
     group: Ints
     z: Floats
+    surprise: Floats
+    measurement: Ints
     streak: Ints
     sure: Mask
     apart: Ints
 
     @classmethod
-    def new(cls, group: Ints, z: Floats, sure: bool = False) -> Members:
-        """Members (B,) of groups, seen at z (B, d) for the first time."""
+    def new(cls, group: Ints, z: Floats, measurement: Ints, sure: bool) -> Members:
+        """Members (B,) of groups, seen at z (B, d) by these measurements for the first time."""
         count = len(group)
-        return cls(group, z, np.ones(count, np.int64), np.full(count, sure), np.zeros(count, np.int64))
+        once, never = np.ones(count, np.int64), np.zeros(count, np.int64)
+        return cls(group, z, np.zeros_like(z), measurement, once, np.full(count, sure), never)
 
     def only(self, rows: Any) -> Members:
         """Those of a mask or of indices."""
@@ -76,12 +81,19 @@ class Members(NamedTuple):
         nobody in the group counts yet.
         """
         hit = taken >= 0
-        z = np.where(hit[:, None], scan.z[taken] if len(scan) else self.z, self.z)
+        z = self.z.copy()
+        z[hit] = scan.z[taken[hit]]
         streak = np.where(hit, self.streak + 1, 0)
-        new_group = ~np.isin(self.group, self.group[self.sure])
-        old = self._replace(z=z, streak=streak, sure=self.sure | (streak >= scans)).only(hit | self.sure | new_group)
+        stay = hit | ~self.doubtful
+        sure = self.sure | (streak >= scans)
+        old = self._replace(z=z, surprise=z - self.z, measurement=taken, streak=streak, sure=sure).only(stay)
         others = np.setdiff1d(np.arange(len(scan)), taken[hit])
-        return old.joined(Members.new(group[others], scan.z[others], scans == 1))
+        return old.joined(Members.new(group[others], scan.z[others], others, scans == 1))
+
+    @property
+    def doubtful(self) -> Mask:
+        """(K,) those that do not count while others of their group do."""
+        return ~self.sure & np.isin(self.group, self.group[self.sure])
 
     def parted(self, near: Gate, scans: int) -> tuple[Members, Ints]:
         """With the gaps inside groups counted, and the part (K,) of each: those that are apart for so many `scans`
@@ -93,7 +105,7 @@ class Members(NamedTuple):
         order = np.argsort(size[part], kind="stable")
         largest[run[order]] = part[order]
         off = part != largest[run]
-        members = self._replace(apart=np.where(off, self.apart + (self.streak > 0), 0))
+        members = self._replace(apart=np.where(off, self.apart + (self.measurement >= 0), 0))
         longest = np.zeros(len(part), np.int64)
         np.maximum.at(longest, part, np.where(self.sure, members.apart, 0))
         return members, np.where(off & (longest[part] >= scans), part, -1)

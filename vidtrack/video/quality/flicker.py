@@ -11,6 +11,7 @@ from vidtrack.video.quality.samples import Samples
 
 _DARK, _BRIGHT = 24, 235  # grey levels between which a ratio means something
 _FEWEST, _CYCLES = 32, 4  # pictures, and swings within them, that show a frequency
+_OUTSTANDING = 5  # times the median amplitude; noise reaches 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +51,8 @@ def _strongest(gain: Floats, rate: float) -> tuple[float, float]:
     series = gain - gain.mean(axis=0)
     window = np.hanning(len(series))[:, None]
     amplitude = np.median(np.abs(np.fft.rfft(series * window, axis=0)), axis=1) * 2 / window.sum()
-    first = _CYCLES  # slower changes are the sun's, and the exposure's
-    strongest = first + int(amplitude[first:].argmax())
-    beside = np.delete(amplitude, slice(max(0, strongest - 1), strongest + 2))[max(0, first - 1) :]
-    stands_out = amplitude[strongest] > 4 * np.median(beside)
-    return (float(amplitude[strongest]), strongest * rate / len(series)) if stands_out else (0.0, 0.0)
+    amplitude[:_CYCLES] = 0  # slower changes are the sun's, and the exposure's
+    strongest = int(amplitude.argmax())
+    if amplitude[strongest] < _OUTSTANDING * np.median(amplitude[_CYCLES:]):
+        return 0.0, 0.0
+    return float(amplitude[strongest]), strongest * rate / len(series)

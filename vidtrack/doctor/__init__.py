@@ -1,0 +1,1 @@
+"""Looks at a source before it is tracked, and says which setting will hurt."""

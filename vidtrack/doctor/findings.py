@@ -1,0 +1,87 @@
+"""What the doctor found out about a source, as plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vidtrack.video.quality.flicker import Flicker
+from vidtrack.video.quality.light import Light
+from vidtrack.video.quality.shake import Shake
+from vidtrack.video.quality.timing import Timing
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """What this machine can do.
+
+    decode_s  seconds to read and decode a picture; None where the camera sets the pace
+    track_s   seconds to find and track what moves in it
+    dropped   pictures that a live source had to leave out while it was only read
+    """
+
+    decode_s: float | None
+    track_s: float
+    dropped: int
+
+    @property
+    def rate(self) -> float:
+        """Pictures per second that can be tracked."""
+        return 1 / ((self.decode_s or 0.0) + self.track_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Objects:
+    """What moves. Sizes are the longer side of a box, in source pixels.
+
+    tracks         seen with the settings as they are
+    fine_tracks    seen in a finer picture by a finer detector
+    median_px, smallest_px   size of the latter; the smallest one in ten; None without any
+    least_px       size that the settings can see
+    step           source pixels per pixel of the processed picture
+    motion_share   of the picture, in motion in an average frame
+    change_share   of the frames that changed as a whole, where nothing can be reported
+    restless_share of the picture, that moves often where nothing drives
+    restless_box   left, top, width, height of the largest such place [source px]; None without one
+    """
+
+    tracks: int
+    fine_tracks: int
+    median_px: float | None
+    smallest_px: float | None
+    least_px: float
+    step: int
+    motion_share: float
+    change_share: float
+    restless_share: float
+    restless_box: tuple[int, int, int, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """A source at a glance.
+
+    source, kind   as it may be shown; "video", "live" or "detections"
+    width, height  px
+    fps            rate that a run would take for nominal [1/s]
+    header_fps     what the file states; None if nothing
+    fps_assumed    nothing states a rate
+    timing         None with fewer than two pictures
+    blockiness     1 without blocks of compression
+
+    What follows `timing` is None for stored detections, which have no pictures.
+    """
+
+    source: str
+    kind: str
+    width: int
+    height: int
+    fps: float
+    header_fps: float | None
+    fps_assumed: bool
+    timing: Timing | None
+    light: Light | None = None
+    flicker: Flicker | None = None
+    shake: Shake | None = None
+    blockiness: float | None = None
+    objects: Objects | None = None
+    speed: Speed | None = None

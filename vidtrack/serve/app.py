@@ -1,0 +1,107 @@
+"""What the page answers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from vidtrack.serve.camera import Camera, Shared, Status
+from vidtrack.serve.metrics import CONTENT_TYPE, metrics
+
+log = logging.getLogger(__name__)
+
+_STATIC = Path(__file__).with_name("static")
+_STATUS_S = 0.02  # least time between two looks at a camera
+_PICTURE_S = 0.2  # and between two pictures of it
+
+
+class Answers:
+    """The page over `cameras` by name, and the same for other programs.
+
+    Status and pictures are made when somebody asks, once for all who do.
+    """
+
+    def __init__(self, cameras: Mapping[str, Camera]) -> None:
+        self._cameras = dict(cameras)
+        self._statuses = {name: Shared(camera.status, _STATUS_S) for name, camera in cameras.items()}
+        self._pictures = [Shared(camera.picture, _PICTURE_S) for camera in cameras.values()]
+
+    def app(self) -> Starlette:
+        """The ASGI application."""
+        return Starlette(
+            routes=[
+                Route("/", self.page),
+                Route("/status", self.status),
+                Route("/picture/{number:int}.jpg", self.picture),
+                Route("/tracks", self.tracks),
+                Route("/metrics", self.metrics),
+                Route("/healthz", self.healthz),
+                Mount("/static", StaticFiles(directory=_STATIC)),
+            ],
+            exception_handlers={Exception: _failed},
+        )
+
+    async def page(self, request: Request) -> Response:
+        """The page itself; its script asks for the rest."""
+        return FileResponse(_STATIC / "page.html")
+
+    async def status(self, request: Request) -> Response:
+        """All cameras: name, whether it delivers, status."""
+        return JSONResponse([{"name": name, "up": up, **status} for name, status, up in await self._looks()])
+
+    async def picture(self, request: Request) -> Response:
+        """The newest annotated picture of a camera, by its number on the page."""
+        number = request.path_params["number"]
+        if number >= len(self._pictures):
+            raise HTTPException(404, "no such camera\n")
+        jpeg = await self._pictures[number].get()
+        if jpeg is None:
+            raise HTTPException(503, "no picture yet\n")
+        return Response(jpeg, media_type="image/jpeg")
+
+    async def tracks(self, request: Request) -> Response:
+        """The tracks in each camera's frames, one JSON object a line, until the client leaves."""
+        return StreamingResponse(self._lines(), media_type="application/x-ndjson")
+
+    async def metrics(self, request: Request) -> Response:
+        """For Prometheus."""
+        return Response(metrics(await self._looks()), media_type=CONTENT_TYPE)
+
+    async def healthz(self, request: Request) -> Response:
+        """200 if all cameras deliver, else 503 and which one does not."""
+        down = [f"{name}: {status['state']}" for name, status, up in await self._looks() if not up]
+        return PlainTextResponse("\n".join(down or ["ok"]) + "\n", 503 if down else 200)
+
+    async def _looks(self) -> list[tuple[str, Status, bool]]:
+        statuses = await asyncio.gather(*(shared.get() for shared in self._statuses.values()))
+        return [
+            (name, status, camera.delivers(status))
+            for (name, camera), status in zip(self._cameras.items(), statuses, strict=True)
+        ]
+
+    async def _lines(self) -> AsyncIterator[str]:
+        """The newest frame each time: a slow reader misses some, and nothing piles up for it."""
+        sent = dict.fromkeys(self._cameras, -1)
+        while True:
+            for name, status, _ in await self._looks():
+                frame = status.get("frame", -1)
+                if frame > sent[name]:
+                    sent[name] = frame
+                    line = {"camera": name, **{key: status[key] for key in ("frame", "time_s", "tracks")}}
+                    yield json.dumps(line, allow_nan=False) + "\n"
+            await asyncio.sleep(_STATUS_S)
+
+
+async def _failed(request: Request, error: Exception) -> Response:
+    log.error("the page failed at %s", request.url.path, exc_info=error)
+    return PlainTextResponse("this is a bug of vidtrack; its log says more\n", 500)

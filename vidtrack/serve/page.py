@@ -1,0 +1,84 @@
+"""Serves the live page in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from threading import Thread
+from types import TracebackType
+
+import uvicorn
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from vidtrack.serve.app import Answers
+from vidtrack.serve.camera import Camera
+from vidtrack.serve.door import open_door, url_of
+from vidtrack.serve.guard import guarded
+
+_MOST = 100  # connections at a time; a camera that is opened again needs file handles too
+_END_S = 0.5
+
+
+class Page:
+    """A page at "[HOST:]PORT"; use it with `with`.
+
+    place  on this machine only if no host is given; port 0 is any free one
+    token  that a client must bring; without one no other machine may see the page
+
+    url    where it is
+
+    The tracker is never asked to wait: the page looks at the cameras when a client asks, and a client that is slow
+    or gone only keeps its own connection waiting. Raises ConfigError when the port cannot be used.
+    """
+
+    def __init__(self, place: str, token: str | None = None) -> None:
+        self._door = open_door(place, token)
+        self._token = token
+        self._server: uvicorn.Server | None = None
+        self.url = url_of(self._door)
+
+    def show(self, cameras: Mapping[str, Camera]) -> None:
+        """Begin to answer; until then clients wait."""
+        self._server = uvicorn.Server(
+            uvicorn.Config(
+                guarded(Answers(cameras).app(), self._token),
+                loop="asyncio",
+                http=_Connection,
+                ws="none",
+                lifespan="off",
+                log_config=None,
+                log_level="critical",  # clients' mistakes are no news, and ours are told by the application
+                access_log=False,
+                server_header=False,
+                proxy_headers=False,
+                timeout_graceful_shutdown=0,
+            )
+        )
+        self._thread = Thread(target=self._server.run, args=([self._door],), name="page", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Hang up on everybody."""
+        if self._server is not None:
+            self._server.force_exit = self._server.should_exit = True
+            self._thread.join(_END_S)
+        self._door.close()
+
+    def __enter__(self) -> Page:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class _Connection(H11Protocol):
+    """One of not too many connections; who connects has to ask soon."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        if len(self.connections) > _MOST:
+            transport.abort()
+            return
+        self.timeout_keep_alive_task = self.loop.call_later(self.timeout_keep_alive, self.timeout_keep_alive_handler)
