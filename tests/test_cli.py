@@ -330,3 +330,28 @@ def test_a_folder_named_like_a_video_is_a_folder(vidtrack, tmp_path):
     code, _, err = vidtrack("track", "street.avi")
     assert code == 3
     assert "street.avi" in err
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_the_common_options(vidtrack, name):
+    _, shown, _ = vidtrack(name, "--help")
+    assert [option for option in ("-o,", "--seed", "--force", "--quiet", "-v,") if option not in shown] == []
+
+
+def test_reports_and_copies_go_into_a_folder_on_request(vidtrack, tmp_path):
+    """eval, threshold, config, repair and view write files with -o, and what they would change stays as it was."""
+    run = tmp_path / "run"
+    vidtrack("simulate", "radar-tws", "-o", tmp_path / "sky")
+    vidtrack("radar", tmp_path / "sky" / "plots.csv", "-o", run)
+    before = (run / "summary.json").read_bytes()
+    for arguments, file in (
+        (("eval", run, tmp_path / "sky" / "truth.csv"), "scores.json"),
+        (("threshold", "--snr-db", "10", "--cells", "100"), "threshold.json"),
+        (("config",), "settings.toml"),
+        (("repair", run), "tracks.csv"),
+        (("view", run), "view.rrd"),
+    ):
+        code, out, err = vidtrack(*arguments, "-o", tmp_path / arguments[0], "--quiet")
+        assert (code, out) == (0, ""), err
+        assert (tmp_path / arguments[0] / file).stat().st_size > 0
+    assert (run / "summary.json").read_bytes() == before

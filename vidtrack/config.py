@@ -173,6 +173,8 @@ class TrackerSettings(_Group):
     """probability that a frame shows a vehicle; None: from the tracks so far. Radar has its own"""
     clutter_density: float | None = Field(1e-5, ge=0)
     """false measurements per frame and px^2; None: from what the tracks leave. Radar has its own"""
+    redundant: float | None = Field(None, gt=0, lt=1)
+    """share of a target's own several plots or detections in a scan that are combined before association; None: none"""
     confirm_s: float = Field(0.2, ge=0)
     """s; no track of a video is confirmed before this age"""
     confirm_travel: float = Field(0.3, ge=0)

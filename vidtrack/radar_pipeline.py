@@ -24,7 +24,7 @@ def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 
     """
     settings = settings or Settings()
     found = measurements(read_plots(path, settings.radar), settings.radar)
-    for step in scan_steps(found, build_radar_tracker(settings, found, seed=seed)):
+    for step in scan_steps(found, build_radar_tracker(settings, found, seed=seed), settings.tracker.redundant):
         yield step.index, step.tracks
 
 

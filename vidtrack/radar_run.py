@@ -69,7 +69,7 @@ class RadarRun:
                 from vidtrack.output.rerun_radar import RadarRerun
 
                 results.add(Threaded(RadarRerun(rerun, settings)))
-            self._steps = results.record(scan_steps(found, tracker))
+            self._steps = results.record(scan_steps(found, tracker, settings.tracker.redundant))
             self._open = stack.pop_all()
 
     def __iter__(self) -> Iterator[Step]:

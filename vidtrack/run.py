@@ -76,7 +76,8 @@ class Run:
                     opened.remember = Memory(detector, tracker, opened.like).restore
                 self._steps = video_steps(opened, detector, tracker, settings)
             else:
-                self._steps = scan_steps(((index, scan) for index, _, scan in opened), tracker)
+                scans = ((index, scan) for index, _, scan in opened)
+                self._steps = scan_steps(scans, tracker, settings.tracker.redundant)
             lines = parse_lines(settings.output.lines, opened.width, opened.height)
             self.name, self.frames = opened.name, opened.frames
             self.folder = open_run(output, opened.name, force)

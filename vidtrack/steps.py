@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from time import perf_counter
 
+from vidtrack.associate.redundancy import combined
 from vidtrack.output.sink import Step
 from vidtrack.scan import Scan
 from vidtrack.tracking.tracker import Tracker
 
 
-def scan_steps(scans: Iterable[tuple[int, Scan]], tracker: Tracker) -> Iterator[Step]:
-    """Each numbered scan with the tracks after it."""
+def scan_steps(scans: Iterable[tuple[int, Scan]], tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:
+    """Each numbered scan with the tracks after it.
+
+    redundant  measurements of one target are combined first; share of them that are recognised; None: they are not
+    """
     ended = perf_counter()
     for index, scan in scans:
         began = perf_counter()
+        if redundant is not None:
+            scan, _ = combined(scan, redundant)
         tracks = tracker.step(scan)
         stages = {"read": began - ended, "track": perf_counter() - began}
         yield Step(index, scan.t, scan, tracks, None, None, stages)

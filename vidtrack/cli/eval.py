@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from vidtrack.cli.options import common, start_log
+
 SECTIONS = {
     "counts": {
         "frames": "frames with an object",
@@ -73,6 +75,7 @@ Examples:
 )
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("truth", type=click.Path(path_type=Path))
+@common("Folder for scores.json.  [default: only printed]")
 @click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
 @click.option("--iou", default=0.5, show_default=True, help="Boxes match from this intersection over union.")
 @click.option("--points", is_flag=True, help="Match positions instead of boxes.")
@@ -82,6 +85,11 @@ Examples:
 def command(
     result: Path,
     truth: Path,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    quiet: bool,
+    verbose: int,
     json_to: str | None,
     iou: float,
     points: bool,
@@ -93,11 +101,14 @@ def command(
 
     Scores are fractions, not percent. Truth rows with conf 0 are ignored. Boxes are matched by
     intersection over union, positions (radar) by distance. Of a run folder mot.txt is scored, and
-    the tracks table gives the consistency of the covariances (NIS, NEES).
+    the tracks table gives the consistency of the covariances (NIS, NEES). --seed is accepted for uniformity.
     """
     from vidtrack import formats, score
     from vidtrack.cli.json_file import write_json
+    from vidtrack.output.folder import open_run
 
+    start_log(verbose, quiet)
+    folder = None if output is None else open_run(output, "eval", force)
     found = formats.read(result)
     states = formats.read_states(result) if result.is_dir() else None
     scores = score.evaluate(
@@ -110,9 +121,11 @@ def command(
         order=order,
         states=states,
     )
+    if folder is not None:
+        write_json(scores, str(folder / "scores.json"))
     if json_to is not None:
         write_json(scores, json_to)
-    if json_to != "-":
+    if json_to != "-" and not quiet:
         _print_table(scores, f"{result.name} against {truth.name}")
 
 

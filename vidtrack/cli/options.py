@@ -20,7 +20,13 @@ def common(output_help: str) -> Callable[[Function], Function]:
             click.option("-v", "--verbose", count=True, help="Say more; twice: everything."),
             click.option("--quiet", is_flag=True, help="Only errors: no progress, no warnings."),
             click.option("--force", is_flag=True, help="Replace the results in a folder that is not empty."),
-            click.option("--seed", default=0, show_default=True, help="The same seed gives the same random numbers."),
+            click.option(
+                "--seed",
+                type=click.IntRange(min=0),
+                default=0,
+                show_default=True,
+                help="The same seed gives the same random numbers.",
+            ),
             click.option("-o", "--output", type=click.Path(path_type=Path), metavar="DIR", help=output_help),
         ):
             function = option(function)

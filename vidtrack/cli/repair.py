@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from vidtrack.cli.options import common, start_log
+
 
 @click.command(
     name="repair",
@@ -17,16 +19,32 @@ Examples:
   for run in runs/*; do vidtrack repair "$run"; done""",
 )
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--quiet", is_flag=True, help="No report.")
-def command(folder: Path, quiet: bool) -> None:
+@common("Repair a copy in this folder and leave DIR as it is.  [default: DIR itself]")
+def command(
+    folder: Path,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    quiet: bool,
+    verbose: int,
+) -> None:
     """Rebuild tracks.parquet in DIR from tracks.csv, cut half-written lines, sort mot.txt and counts.csv.
 
     A killed run stays marked as interrupted in summary.json. A finished run is left as it is. Of a live run in
-    parts, every part is repaired.
+    parts, every part is repaired. --seed is accepted for uniformity.
     """
+    from shutil import copytree
+
     from vidtrack.live.keep import parts_of
+    from vidtrack.output.folder import open_run, writing
     from vidtrack.output.repair import repair
 
+    start_log(verbose, quiet)
+    if output is not None and folder.is_dir():
+        copy = open_run(output, "repair", force)
+        with writing(copy):
+            copytree(folder, copy, dirs_exist_ok=True)
+        folder = copy
     for part in parts_of(folder) or [folder]:
         rows = repair(part)
         if not quiet:

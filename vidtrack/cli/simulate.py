@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from vidtrack.cli.options import common, start_log
+
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
 RADAR = ("radar-tws", "radar-incoming", "radar-altitude", "radar-speed", "radar-crossing", "radar-unresolved")
 VIDEO_ONLY = ("fps", "size", "noise", "shake", "light_steps")
@@ -54,10 +56,7 @@ Examples:
   vidtrack simulate radar-tws -o tws --seed 3 --snr-db 16""",
 )
 @click.argument("scenario", type=click.Choice(VIDEO + RADAR), metavar="SCENARIO")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Folder to write.  [default: runs/SCENARIO]")
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="The same seed gives the same files."
-)
+@common("Folder to write.  [default: runs/SCENARIO]")
 @click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15]")
 @click.option("--size", type=_Size(), help="The same scene at this size.  [default: 320x240, junction 240x180]")
 @click.option("--noise", default=2.0, show_default=True, help="Sensor noise, standard deviation in grey levels.")
@@ -69,9 +68,9 @@ Examples:
 )
 @click.option("--weibull", type=_Pair(), help="Radar: clutter amplitudes, P(a > t) = exp(-C t^B); 2,0.5 is Rayleigh.")
 @click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
-@click.option("--force", is_flag=True, help="Write into a folder that is not empty.")
-@click.option("--quiet", is_flag=True, help="No progress bar.")
-def command(scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, **chosen: Any) -> None:
+def command(
+    scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, verbose: int, **chosen: Any
+) -> None:
     """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a radar scenario
     as plots.csv and truth.csv.
 
@@ -89,6 +88,7 @@ def command(scenario: str, output: Path | None, seed: int, force: bool, quiet: b
     radar-crossing    two aircraft cross at a small angle in clutter
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     """
+    start_log(verbose, quiet)
     _refuse_options_of(RADAR_ONLY if scenario in VIDEO else VIDEO_ONLY, scenario)
     kind = {name: chosen[name] for name in (VIDEO_ONLY if scenario in VIDEO else RADAR_ONLY)}
     if scenario in VIDEO:

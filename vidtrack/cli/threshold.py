@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
+from vidtrack.cli.options import common, start_log
 from vidtrack.cli.radar_problem import problem_options
 
 Numbers = dict[str, float | bool | None]
@@ -32,6 +35,7 @@ Examples:
 )
 @click.option("--filter", "kind", type=click.Choice(["pda", "psn"]), default="pda", show_default=True)
 @problem_options
+@common("Folder for threshold.json.  [default: only printed]")
 @click.option("--cells", type=float, metavar="N", help="Resolution cells in the gate (pda).")
 @click.option("--pfa-max", default=1.0, show_default=True, help="Largest P_FA allowed.")
 @click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
@@ -44,6 +48,11 @@ def command(
     weibull: str | None,
     cells: float | None,
     pfa_max: float,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    quiet: bool,
+    verbose: int,
     json_to: str | None,
 ) -> None:
     """The P_FA that lets a filter learn most of a Swerling I target.
@@ -52,14 +61,17 @@ def command(
     form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter and a gate of 4; --q, --cell and --weibull play no
     part. Where the closed form does not hold (SNR of 1.96 dB or less) or gives --pfa-max or more, p_fa is
     --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
-    strongest neighbour filter.
+    strongest neighbour filter. --seed is accepted for uniformity.
     """
     from vidtrack.cli.json_file import write_json
     from vidtrack.cli.radar_problem import clutter, db_to_linear
     from vidtrack.errors import ConfigError
+    from vidtrack.output.folder import open_run
     from vidtrack.radar.prediction import normalised
     from vidtrack.radar.psn_threshold import best_psn_threshold
 
+    start_log(verbose, quiet)
+    folder = None if output is None else open_run(output, "threshold", force)
     snr = db_to_linear(snr_db)
     if not 0 < pfa_max <= 1:
         raise ConfigError(f"--pfa-max is {pfa_max}; it must lie above 0 and up to 1")
@@ -75,9 +87,11 @@ def command(
             "error": best.error,
             "clamped": True,
         }
+    if folder is not None:
+        write_json(numbers, str(folder / "threshold.json"))
     if json_to is not None:
         write_json(numbers, json_to)
-    if json_to != "-":
+    if json_to != "-" and not quiet:
         _print_table(numbers, f"{kind} filter at {snr_db:g} dB")
 
 

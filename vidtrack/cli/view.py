@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from vidtrack.cli.options import common, start_log
+
 
 @click.command(
     name="view",
@@ -17,25 +19,39 @@ Examples:
   vidtrack view runs/motorway --no-video""",
 )
 @click.argument("run", type=click.Path(path_type=Path))
+@common("Folder for a recording view.rrd, instead of starting the viewer.")
 @click.option("--save", metavar="FILE.rrd", help="Write a recording instead of starting the viewer.")
 @click.option("--video/--no-video", default=True, help="Show the pictures of the source, if it is still there.")
-def command(run: Path, save: str | None, video: bool) -> None:
+def command(
+    run: Path,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    quiet: bool,
+    verbose: int,
+    save: str | None,
+    video: bool,
+) -> None:
     """Show the tracks of the folder RUN over its video, over the background in tracks.png without one, or, of a radar's
     run, in metres.
 
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
-    while tracking, with --rerun.
+    while tracking, with --rerun. --seed is accepted for uniformity.
     """
     from contextlib import ExitStack, closing
 
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
+    from vidtrack.output.folder import open_run
     from vidtrack.output.rerun import RerunSink
     from vidtrack.output.rerun_radar import RadarRerun
     from vidtrack.traffic.lines import parse_lines
     from vidtrack.video.source import open_source
 
+    start_log(verbose, quiet)
     finished = replay.read_run(run)
+    if output is not None and save is None:
+        save = str(open_run(output, "view", force) / "view.rrd")
     if finished.shape is None:
         with closing(RadarRerun(save or "spawn", finished.settings)) as radar:
             for step in replay.steps(finished):

@@ -11,17 +11,36 @@ from vidtrack.video.quality.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
+class Reception:
+    """What went wrong while the source was read.
+
+    header_fps     rate that it states; None if it states none
+    fps_assumed    nothing tells the rate
+    truncated      a file without its end
+    decode_errors  damaged pictures
+    dropped        pictures that came too fast to be decoded
+    reconnects, stalls   of a live source
+    """
+
+    header_fps: float | None
+    fps_assumed: bool
+    truncated: bool = False
+    decode_errors: int = 0
+    dropped: int = 0
+    reconnects: int = 0
+    stalls: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class Speed:
     """What this machine can do.
 
     decode_s  seconds to read and decode a picture; None where the camera sets the pace
     track_s   seconds to find and track what moves in it
-    dropped   pictures that a live source had to leave out while it was only read
     """
 
     decode_s: float | None
     track_s: float
-    dropped: int
 
     @property
     def rate(self) -> float:
@@ -38,9 +57,8 @@ class Objects:
     median_px, smallest_px   size of the latter; the smallest one in ten; None without any
     least_px       size that the settings can see
     step           source pixels per pixel of the processed picture
-    motion_share   of the picture, in motion in an average frame
-    change_share   of the frames that changed as a whole, where nothing can be reported
-    restless_share of the picture, that moves often where nothing drives
+    motion_share   of the picture, in motion in the average frame
+    restless_share of the picture: it moves often, and no track explains it
     restless_box   left, top, width, height of the largest such place [source px]; None without one
     """
 
@@ -51,7 +69,6 @@ class Objects:
     least_px: float
     step: int
     motion_share: float
-    change_share: float
     restless_share: float
     restless_box: tuple[int, int, int, int] | None
 
@@ -63,8 +80,6 @@ class Findings:
     source, kind   as it may be shown; "video", "live" or "detections"
     width, height  px
     fps            rate that a run would take for nominal [1/s]
-    header_fps     what the file states; None if nothing
-    fps_assumed    nothing states a rate
     timing         None with fewer than two pictures
     blockiness     1 without blocks of compression
 
@@ -76,8 +91,7 @@ class Findings:
     width: int
     height: int
     fps: float
-    header_fps: float | None
-    fps_assumed: bool
+    reception: Reception
     timing: Timing | None
     light: Light | None = None
     flicker: Flicker | None = None

@@ -3,20 +3,125 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.config import Settings
+from vidtrack.config import BlobSettings, Settings
 from vidtrack.doctor.findings import Objects
 from vidtrack.output.sink import Step
-from vidtrack.pipeline import has_driven
-from vidtrack.scan import TENTATIVE
+from vidtrack.scan import TENTATIVE, Floats
 from vidtrack.tracking.boxes import longer
+from vidtrack.video.background.picture import reduction
+from vidtrack.video.blobs import find_blobs
 from vidtrack.video.foreground import Foreground
-from vidtrack.video.runs import find_runs  # noqa: F401
 
 _SETTLE_S = 2.0  # in which what stood in the first picture comes out of the scene
 _OFTEN = 0.2  # share of the frames
 _SMALL = 10  # percentile
-FINE_MAJORITY_PX, FINE_AREA_PX = 3, 6
+_FINE_MAJORITY_PX, _FINE_AREA_PX = 3, 6  # of the finer detector
+_MARGIN = 0.25  # of a box's size, around it: what moves there is the vehicle's shadow or glare
+
+
+def least_px(settings: Settings, shape: tuple[int, int]) -> float:
+    """Longer side [source px] of the smallest square that survives the majority and the least area of a blob."""
+    step = reduction(shape[0], settings.source.scale)
+    area = settings.blobs.min_area_share * shape[0] * shape[1] / step**2
+    if settings.detector.kind == "disturbance":
+        area = max(area, settings.detector.disturbance.majority_px**2 / 2)
+    return math.sqrt(area) * step
+
+
+def finer(settings: Settings, shape: tuple[int, int]) -> Settings:
+    """Settings that see smaller objects, in a picture twice as fine where it is reduced now."""
+    step = max(1, reduction(shape[0], settings.source.scale) // 2)
+    disturbance = settings.detector.disturbance.model_copy(update={"majority_px": _FINE_MAJORITY_PX})
+    detector = settings.detector.model_copy(update={"kind": "disturbance", "disturbance": disturbance})
+    share = _FINE_AREA_PX * step**2 / (shape[0] * shape[1])
+    return settings.model_copy(
+        update={
+            "source": settings.source.model_copy(update={"scale": 1 / step}),
+            "detector": detector,
+            "blobs": settings.blobs.model_copy(update={"min_area_share": share}),
+        }
+    )
+
+
+class ObjectMeter:
+    """Watches the steps of a run, and of one with finer settings over the same frames."""
+
+    def __init__(self, settings: Settings, shape: tuple[int, int]) -> None:
+        self._least_px = least_px(settings, shape)
+        self._step = reduction(shape[0], settings.source.scale)
+        self._sizes: dict[int, list[float]] = defaultdict(list)  # by track
+        self._fine_sizes: dict[int, list[float]] = defaultdict(list)
+        self._begun_s: float | None = None
+        self._frames = 0
+        self._motion = 0.0
+        self._restless: NDArray[np.int32] | None = None
+
+    def take(self, step: Step) -> None:
+        """Add a frame as the settings see it."""
+        assert step.foreground is not None
+        self._collect(step, self._sizes)
+        if self._begun_s is None:
+            self._begun_s = step.time_s
+            self._restless = np.zeros(step.foreground.mask.shape, np.int32)
+        if step.time_s - self._begun_s < _SETTLE_S:
+            return
+        moving = step.foreground.mask > 0
+        self._frames += 1
+        self._motion += float(moving.mean())
+        moving &= ~_covered(step, moving.shape)
+        self._restless += moving
+
+    def take_fine(self, step: Step) -> None:
+        """Add the same frame as finer settings see it."""
+        self._collect(step, self._fine_sizes)
+
+    def result(self) -> Objects:
+        """Of all frames so far."""
+        sizes = [float(np.median(sizes)) for sizes in self._fine_sizes.values()]
+        share, box = self._restless_place()
+        return Objects(
+            tracks=len(self._sizes),
+            fine_tracks=len(sizes),
+            median_px=float(np.median(sizes)) if sizes else None,
+            smallest_px=float(np.percentile(sizes, _SMALL)) if sizes else None,
+            least_px=self._least_px,
+            step=self._step,
+            motion_share=self._motion / max(1, self._frames),
+            restless_share=share,
+            restless_box=box,
+        )
+
+    def _collect(self, step: Step, sizes: dict[int, list[float]]) -> None:
+        """Sizes of the confirmed tracks that went somewhere."""
+        tracks = step.tracks
+        size = longer(tracks.box)
+        shown = tracks.seen & (tracks.status != TENTATIVE) & (tracks.travel > size + 2 * self._least_px)
+        for track, px in zip(tracks.id[shown].tolist(), size[shown].tolist(), strict=True):
+            sizes[track].append(px)
+
+    def _restless_place(self) -> tuple[float, tuple[int, int, int, int] | None]:
+        if self._restless is None or not self._frames:
+            return 0.0, None
+        often = np.where(self._restless > _OFTEN * self._frames, np.uint8(255), np.uint8(0))
+        places = find_blobs(Foreground(often, often.astype(np.float32), self._step), BlobSettings(min_area_share=0))
+        if not len(places):
+            return 0.0, None
+        left, top, width, height = places.box[places.area.argmax()].astype(int).tolist()
+        return float((often > 0).mean()), (left, top, width, height)
+
+
+def _covered(step: Step, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """(h, w) the boxes of confirmed tracks, with a margin."""
+    assert step.foreground is not None
+    boxes: Floats = step.tracks.box[step.tracks.status != TENTATIVE] / step.foreground.step
+    covered = np.zeros(shape, bool)
+    for left, top, width, height in boxes:
+        margin = _MARGIN * max(width, height) + 2
+        rows = slice(max(0, int(top - margin)), max(0, int(top + height + margin)))
+        covered[rows, max(0, int(left - margin)) : max(0, int(left + width + margin))] = True
+    return covered

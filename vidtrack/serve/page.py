@@ -16,6 +16,7 @@ from vidtrack.serve.door import open_door, url_of
 from vidtrack.serve.guard import guarded
 
 _MOST = 100  # connections at a time; a camera that is opened again needs file handles too
+_ASK_S = 5.0  # in which a client has to say something
 _END_S = 0.5
 
 
@@ -81,4 +82,4 @@ class _Connection(H11Protocol):
         if len(self.connections) > _MOST:
             transport.abort()
             return
-        self.timeout_keep_alive_task = self.loop.call_later(self.timeout_keep_alive, self.timeout_keep_alive_handler)
+        self.timeout_keep_alive_task = self.loop.call_later(_ASK_S, self.timeout_keep_alive_handler)

@@ -91,8 +91,8 @@ class GroupTracker:
         """The groups (G,) that the scan shows, and a measurement of each.
 
         R is the mean of the measurements' own over their number n, and more where members are missing: by the
-        measurements' mean the members' scatter over n, since it is chance which of them were seen; by the members, also
-        when they are back, the square of their surprise over n, since one plot may have stood for several.
+        measurements' mean the members' scatter over n, since it is chance which of them were seen; by the members the
+        square of their surprise over n, since a plot may stand for several.
         """
         members = self.members.only(~self.members.doubtful)
         members = members.only(np.isin(members.group, members.group[members.measurement >= 0]))
@@ -100,12 +100,12 @@ class GroupTracker:
         seen = members.measurement >= 0
         n, size = np.bincount(row[seen], minlength=len(names)), np.bincount(row, minlength=len(names))
         centre = _means(row, members.z, size)
-        own, off = scan.R[members.measurement[seen]], members.z - centre[row]
-        lacking, doubt = (members.streak < 2, members.surprise) if self.rule.by == "members" else (~seen, off)
-        partial, doubt = np.isin(row, row[lacking])[seen, None, None], doubt[seen]
+        own, measured = scan.R[members.measurement[seen]], scan.z[members.measurement[seen]]
+        doubt = (members.surprise if self.rule.by == "members" else members.z - centre[row])[seen]
+        partial = (n < size)[row[seen], None, None]
         R = _means(row[seen], own + partial * doubt[:, :, None] * doubt[:, None, :], n) / n[:, None, None]
         if self.rule.by == "measurements":
-            centre = _means(row[seen], members.z[seen], n)
+            centre = _means(row[seen], measured, n)
         return names, Scan(scan.t, centre, R, noise=scan.noise)
 
     def _follow(self, tracks: Tracks, names: Ints) -> None:

@@ -77,16 +77,25 @@ class Members(NamedTuple):
     def seen(self, taken: Ints, group: Ints, scan: Scan, scans: int) -> Members:
         """After a scan whose measurements (M,) are of these groups: each where it was seen, else where it went.
 
+        While others of the group are missing, a plot may stand for several. The farther it is from where a member was
+        expected, the less the member follows it: by the share of the measurement's variance in the square of that.
         Who was seen in so many `scans` in a row counts from then on; who was not, and is missed, is nobody, unless
         nobody in the group counts yet.
         """
-        hit = taken >= 0
-        z = self.z.copy()
-        z[hit] = scan.z[taken[hit]]
+        hit, doubtful = taken >= 0, self.doubtful
+        surprise, var = np.zeros_like(self.z), np.ones(len(self.z))
+        surprise[hit] = scan.z[taken[hit]] - self.z[hit]
+        var[hit] = scan.R[taken[hit]].trace(axis1=1, axis2=2)
+        lacking = np.isin(self.group, self.group[~hit & ~doubtful])
+        follow = np.where(lacking, var / (var + (surprise**2).sum(axis=1)), 1.0)
         streak = np.where(hit, self.streak + 1, 0)
-        stay = hit | ~self.doubtful
-        sure = self.sure | (streak >= scans)
-        old = self._replace(z=z, surprise=z - self.z, measurement=taken, streak=streak, sure=sure).only(stay)
+        old = self._replace(
+            z=self.z + follow[:, None] * surprise,
+            surprise=surprise,
+            measurement=taken,
+            streak=streak,
+            sure=self.sure | (streak >= scans),
+        ).only(hit | ~doubtful)
         others = np.setdiff1d(np.arange(len(scan)), taken[hit])
         return old.joined(Members.new(group[others], scan.z[others], others, scans == 1))
 

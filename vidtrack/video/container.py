@@ -110,6 +110,7 @@ class VideoFile:
         rate = stamp_rate([stamp for stamp in stamps if stamp is not None])
         measured = None if rate is None else rate * ticks_per_s
         header = float(self._stream.average_rate or 0)
+        self._stats.header_fps = header or None
         fps = settings.fps or nominal_rate(header, measured) or self._rate_by_main_header()
         if measured is not None and (settings.fps is not None or not is_plausible(measured)):
             ticks_per_s *= fps / measured
@@ -120,6 +121,7 @@ class VideoFile:
         period_s = avi_period_s(self._path)
         if period_s is not None and is_plausible(1 / period_s):
             return 1 / period_s
+        self._stats.fps_assumed = True
         self._stats.warn(
             f"{self._path} states no rate a camera can have; {FALLBACK_FPS:g} frames/s assumed, "
             "state the true rate with --fps"

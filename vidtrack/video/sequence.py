@@ -40,6 +40,7 @@ def untimed_rate(info: SequenceInfo, settings: SourceSettings, stats: SourceStat
         return settings.fps
     if info.fps is not None:
         return info.fps
+    stats.fps_assumed = True
     stats.warn(f"the input carries no time; {FALLBACK_FPS:g} frames/s assumed, state the true rate with --fps")
     return FALLBACK_FPS
 

@@ -16,6 +16,8 @@ class SourceStats:
     frames_dropped  frames a live source had to leave out; files never drop one
     decode_errors   pictures that could not be read, or only with damage
     truncated       the file is shorter than its container says, or its end cannot be decoded
+    header_fps      rate that the source states; None if it states none
+    fps_assumed     nothing tells the rate
     warnings        what the user was told, in order
     """
 
@@ -23,6 +25,8 @@ class SourceStats:
     frames_dropped: int = 0
     decode_errors: int = 0
     truncated: bool = False
+    header_fps: float | None = None
+    fps_assumed: bool = False
     warnings: list[str] = field(default_factory=list)
 
     def warn(self, message: str) -> None:

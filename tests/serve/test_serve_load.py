@@ -1,0 +1,106 @@
+"""Many, slow and dead clients cost little, and the tracker nothing."""
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from page_client import MadeUp, connect, get, page_over
+
+ASK = b"GET /%s HTTP/1.1\r\nHost: localhost\r\n\r\n"
+
+
+def answers(url):
+    return get(url + "healthz", timeout=2)[0] == 200
+
+
+def test_pictures_are_made_once_for_all_and_not_too_often():
+    camera = MadeUp(encode_s=0.05)
+    with page_over({"gate": camera}) as url, ThreadPoolExecutor(12) as viewers:
+        began = time.monotonic()
+        pictures = list(viewers.map(lambda _: get(url + "picture/0.jpg")[2], range(60)))
+        took_s = time.monotonic() - began
+    assert len(pictures) == 60
+    assert camera.most_at_once == 1
+    assert camera.pictures <= 1 + took_s / 0.2
+
+
+def test_nothing_is_made_while_nobody_looks():
+    camera = MadeUp()
+    with page_over({"gate": camera}) as url:
+        get(url + "healthz")
+        assert camera.pictures == 0
+        looks = camera.looks
+        time.sleep(0.2)
+        assert camera.looks == looks
+
+
+def test_a_client_that_never_reads_delays_nobody():
+    camera = MadeUp(tracks=[{"track_id": number} for number in range(2000)])
+    with page_over({"gate": camera}) as url:
+        deaf = [connect(url, ASK % path) for path in (b"tracks", b"tracks", b"picture/0.jpg", b"status")]
+        time.sleep(0.5)
+        before = camera.looks
+        assert answers(url)
+        assert camera.looks <= before + 50  # its stream stands still: it waits for the client, not for frames
+        for client in deaf:
+            client.close()
+        assert answers(url)
+
+
+def test_a_client_that_takes_nothing_is_cut_off(monkeypatch):
+    monkeypatch.setattr("vidtrack.serve.door._GONE_S", 0.5)
+    with page_over({"gate": MadeUp(tracks=[{"track_id": number} for number in range(20000)])}) as url:
+        client = connect(url, ASK % b"tracks")
+        time.sleep(3.0)
+        with pytest.raises(ConnectionResetError):
+            while client.recv(65536):
+                pass
+
+
+def test_who_connects_has_to_ask_soon(monkeypatch):
+    monkeypatch.setattr("vidtrack.serve.page._ASK_S", 0.2)
+    with page_over({"gate": MadeUp()}) as url:
+        client = connect(url)
+        client.settimeout(5)
+        assert client.recv(10) == b""
+
+
+def test_the_number_of_connections_is_bounded(monkeypatch):
+    monkeypatch.setattr("vidtrack.serve.page._MOST", 5)
+    with page_over({"gate": MadeUp()}) as url:
+        silent = [connect(url, b"GET /") for _ in range(20)]
+        time.sleep(0.3)
+        for client in silent:
+            client.settimeout(0.1)
+        assert sum(_is_open(client) for client in silent) == 5
+        for client in silent:
+            client.close()
+        time.sleep(0.1)
+        assert answers(url)
+
+
+def _is_open(client):
+    try:
+        return client.recv(1) != b""
+    except TimeoutError:
+        return True
+    except ConnectionError:
+        return False
+
+
+def test_the_page_ends_at_once_whoever_is_looking():
+    with page_over({"gate": MadeUp()}) as url:
+        clients = [connect(url, ASK % b"tracks") for _ in range(3)]
+        time.sleep(0.3)
+        began = time.monotonic()
+    assert time.monotonic() - began < 1.0
+    for client in clients:
+        client.close()
+
+
+def test_nonsense_is_refused_in_silence(capfd):
+    with page_over({"gate": MadeUp()}) as url:
+        client = connect(url, b"\x16\x03\x01\x02\x00 no http\r\n\r\n")
+        assert b" 400 " in client.recv(1000)
+        assert answers(url)
+    assert capfd.readouterr() == ("", "")

@@ -1,0 +1,132 @@
+"""Looks at a source for some seconds and measures what a tracker will meet. The page to read first here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, closing
+from time import perf_counter
+
+import numpy as np
+
+from vidtrack.config import Settings
+from vidtrack.doctor.findings import Findings, Reception, Speed
+from vidtrack.doctor.objects import ObjectMeter, finer
+from vidtrack.doctor.opening import is_live, looked_at, open_pictures
+from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.tracking.tracker import Tracker
+from vidtrack.video.detections import is_detections, open_detections
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.address import redact
+from vidtrack.video.live.stats import LiveStats
+from vidtrack.video.quality.blocks import blockiness
+from vidtrack.video.quality.flicker import flicker
+from vidtrack.video.quality.light import light
+from vidtrack.video.quality.samples import Samples
+from vidtrack.video.quality.shake import ShakeMeter
+from vidtrack.video.quality.timing import timing
+from vidtrack.video.stats import SourceStats
+
+_PATIENCE = 6.0  # times the seconds asked for: pictures may be large and the machine slow
+_BLOCKS_EVERY = 25  # frames
+
+
+def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
+    """What `seconds` of a source are like.
+
+    A live source is only read for half of the time, for its pace, and watched for the other half; a file is read
+    first and watched then. Raises SourceError if it cannot be opened or yields nothing, FormatError for a bad line
+    of detections.
+    """
+    if is_detections(source):
+        return _of_detections(source, settings)
+    live = is_live(source)
+    span = seconds / 2 if live else seconds
+    with ExitStack() as stack:
+        opened = stack.enter_context(closing(open_pictures(source, settings)))
+        began = perf_counter()
+        times = np.array([frame.time_s for frame in looked_at(opened, span, _PATIENCE * seconds)])
+        decode_s = None if live else (perf_counter() - began) / len(times)
+        reception = _reception(opened.stats)
+        if not live:
+            opened = stack.enter_context(closing(open_pictures(source, settings)))
+        watch = Watch(settings, (opened.height, opened.width))
+        watch.all(looked_at(opened, span, _PATIENCE * seconds))
+    pace = timing(times, watch.samples.repeats) if len(times) > 1 else None
+    return Findings(
+        source=redact(source),
+        kind="live" if live else "video",
+        width=opened.width,
+        height=opened.height,
+        fps=opened.fps,
+        reception=reception,
+        timing=pace,
+        light=light(watch.samples),
+        flicker=flicker(watch.samples, pace.rate if pace else opened.fps),
+        shake=watch.shake.result(),
+        blockiness=float(np.median(watch.blockiness)),
+        objects=watch.objects.result(),
+        speed=Speed(decode_s, float(np.median(watch.track_s))),
+    )
+
+
+class Watch:
+    """Everything that is measured on the pictures, and on their tracks."""
+
+    def __init__(self, settings: Settings, shape: tuple[int, int]) -> None:
+        self.samples = Samples()
+        self.shake = ShakeMeter()
+        self.blockiness: list[float] = []
+        self.objects = ObjectMeter(settings, shape)
+        self.track_s: list[float] = []
+        self._settings = settings
+        self._bounds = (shape[1], shape[0])
+
+    def all(self, frames: Iterable[Frame]) -> None:
+        """Watch the frames: as the settings see them, and as finer ones do."""
+        fine = finer(self._settings, self._bounds[::-1])
+        for step in video_steps(self._seen(frames), build_detector(fine), self._tracker(fine), fine):
+            self.objects.take_fine(step)
+
+    def _seen(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """The same frames, after they were tracked and measured."""
+        settings = self._settings
+        for step in video_steps(frames, build_detector(settings), self._tracker(settings), settings):
+            frame = step.frame
+            assert frame is not None
+            self.track_s.append(sum(seconds for stage, seconds in step.stage_s.items() if stage != "read"))
+            self.objects.take(step)
+            self.samples.take(frame)
+            self.shake.take(frame)
+            if frame.index % _BLOCKS_EVERY == 0:
+                self.blockiness.append(blockiness(frame.y))
+            yield frame
+
+    def _tracker(self, settings: Settings) -> Tracker:
+        return build_tracker(settings.tracker, self._bounds)
+
+
+def _reception(stats: SourceStats) -> Reception:
+    live = stats if isinstance(stats, LiveStats) else LiveStats()
+    return Reception(
+        header_fps=stats.header_fps,
+        fps_assumed=stats.fps_assumed,
+        truncated=stats.truncated,
+        decode_errors=stats.decode_errors,
+        dropped=stats.frames_dropped,
+        reconnects=live.reconnects,
+        stalls=live.stalls,
+    )
+
+
+def _of_detections(source: str, settings: Settings) -> Findings:
+    """Stored detections tell their size and rate; they have no pictures."""
+    opened = open_detections(source, settings)
+    return Findings(
+        source=source,
+        kind="detections",
+        width=opened.width,
+        height=opened.height,
+        fps=opened.fps,
+        reception=_reception(opened.stats),
+        timing=None,
+    )

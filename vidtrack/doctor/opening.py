@@ -1,0 +1,43 @@
+"""Opens whatever a run could read, to look at it for some seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from time import monotonic
+
+from vidtrack.config import Settings
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.address import parse_address
+from vidtrack.video.live.source import LiveSource
+from vidtrack.video.recording import Recording, is_recording
+from vidtrack.video.source import Source, open_source
+
+
+def is_live(source: str) -> bool:
+    """Whether this is a camera or a stream, not a file."""
+    return "://" in source or source.isdecimal() or Path(source).is_char_device()
+
+
+def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Recording:
+    """A source of frames. Raises SourceError if it cannot be opened."""
+    if is_live(source):
+        return LiveSource(parse_address(source, settings.live.timeout_s), settings.live)
+    if is_recording(source):
+        return Recording(source)
+    return open_source(source, settings.source)
+
+
+def looked_at(frames: Source | LiveSource | Recording, seconds: float, patience_s: float) -> Iterator[Frame]:
+    """The frames of so many seconds: of the source's own time, and not after `patience_s` by the clock."""
+    began_s: float | None = None
+    until_s = monotonic() + patience_s
+    for frame in frames:
+        if frame is not None:
+            if began_s is None:
+                began_s = frame.time_s
+            if frame.time_s - began_s >= seconds:
+                return
+            yield frame
+        if monotonic() > until_s:
+            return
