@@ -18,12 +18,31 @@ def scan(t, z, seed=0):
     return vt.Scan(t, z, 4.0 * np.eye(2), amplitude=2 + np.random.default_rng(seed).exponential(3.0, len(z)))
 
 
+EXCLUSIVE = {"gnn", "greedy", "mht"}
+"""Methods that give no measurement to two tracks."""
+SHARING = {"jpda", "jpda-star"}
+"""Methods that give no measurement away more than once in sum."""
+
+
 class Watch:
-    """A tracker whose snapshots are checked as they come."""
+    """A tracker whose decisions and snapshots are checked as they come."""
 
     def __init__(self, method, **settings):
+        self.method = method
         self.tracker = vt.Tracker(associate=ALL[method](), **settings)
         self.gone, self.alive = set(), set()
+        self._update = self.tracker.bank.update
+        self.tracker.bank.update = self._decided
+
+    def _decided(self, decision, scan, sensor):
+        total = decision.beta0 + np.bincount(decision.row, decision.beta, len(decision.parent))
+        np.testing.assert_allclose(total, 1.0, atol=1e-9)
+        assert ((decision.beta >= 0) & (decision.beta <= 1 + 1e-9)).all()
+        if self.method in SHARING:
+            exact = np.ones(len(total), bool) if decision.approximate is None else ~decision.approximate
+            given = exact[decision.row]
+            assert np.bincount(decision.measurement[given], decision.beta[given]).max(initial=0.0) <= 1 + 1e-9
+        self._update(decision, scan, sensor)
 
     def step(self, scan):
         with warnings.catch_warnings():
@@ -37,20 +56,24 @@ class Watch:
         assert np.isfinite(tracks.x).all()
         assert not len(tracks) or np.linalg.eigvalsh(tracks.P).min() > 0
         assert ((tracks.existence >= 0) & (tracks.existence <= 1)).all()
+        if self.method in EXCLUSIVE:
+            taken = tracks.measurement[tracks.measurement >= 0]
+            assert len(taken) == len(set(taken.tolist())), "two tracks with one measurement"
         return tracks
 
 
 @pytest.mark.parametrize("method", ALL)
 @given(
     seed=st.integers(0, 2**32 - 1),
-    detection=st.sampled_from([0.0, 0.5, 0.9, 1.0]),
-    clutter=st.sampled_from([0.0, 1e-5, 1e-2]),
+    detection=st.sampled_from([0.0, 0.5, 0.9, 1.0, None]),
+    clutter=st.sampled_from([0.0, 1e-5, 1e-2, None]),
     gate=st.sampled_from([0.0, 0.9, 0.999, 1.0]),
+    life=st.sampled_from([vt.LifeCycle(), vt.LogRatio()]),
 )
 @settings(max_examples=20, deadline=None)
-def test_random_sequences(method, seed, detection, clutter, gate):
+def test_random_sequences(method, seed, detection, clutter, gate, life):
     rng = np.random.default_rng(seed)
-    watch = Watch(method, gate=gate, detection_probability=detection, clutter_density=clutter)
+    watch = Watch(method, gate=gate, detection_probability=detection, clutter_density=clutter, life=life, smooth=True)
     targets, velocity = rng.uniform(0, 60, (5, 2)), rng.normal(0, 10, (5, 2))
     t = 0.0
     for k in range(25):

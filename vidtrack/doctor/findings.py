@@ -52,9 +52,9 @@ class Speed:
 class Objects:
     """What moves. Sizes are the longer side of a box, in source pixels.
 
-    tracks         seen with the settings as they are
-    fine_tracks    seen in a finer picture by a finer detector
-    median_px, smallest_px   size of the latter; the smallest one in ten; None without any
+    tracks         that went somewhere
+    missed         more of them that finer settings find
+    median_px, smallest_px   size of both; the smallest one in ten; None without any
     least_px       size that the settings can see
     step           source pixels per pixel of the processed picture
     motion_share   of the picture, in motion in the average frame
@@ -63,7 +63,7 @@ class Objects:
     """
 
     tracks: int
-    fine_tracks: int
+    missed: int
     median_px: float | None
     smallest_px: float | None
     least_px: float

@@ -12,7 +12,7 @@ from vidtrack.config import BlobSettings, Settings
 from vidtrack.doctor.findings import Objects
 from vidtrack.output.sink import Step
 from vidtrack.scan import TENTATIVE, Floats
-from vidtrack.tracking.boxes import longer
+from vidtrack.tracking.boxes import best_cover, longer, widened
 from vidtrack.video.background.picture import reduction
 from vidtrack.video.blobs import find_blobs
 from vidtrack.video.foreground import Foreground
@@ -20,6 +20,8 @@ from vidtrack.video.foreground import Foreground
 _SETTLE_S = 2.0  # in which what stood in the first picture comes out of the scene
 _OFTEN = 0.2  # share of the frames
 _SMALL = 10  # percentile
+_PIECE = 0.3  # share of a box that lies in another one, of which it is a piece
+_LASTING = 5  # frames
 _FINE_MAJORITY_PX, _FINE_AREA_PX = 3, 6  # of the finer detector
 _MARGIN = 0.25  # of a box's size, around it: what moves there is the vehicle's shadow or glare
 
@@ -55,7 +57,8 @@ class ObjectMeter:
         self._least_px = least_px(settings, shape)
         self._step = reduction(shape[0], settings.source.scale)
         self._sizes: dict[int, list[float]] = defaultdict(list)  # by track
-        self._fine_sizes: dict[int, list[float]] = defaultdict(list)
+        self._missed_sizes: dict[int, list[float]] = defaultdict(list)
+        self._boxes: Floats = np.empty((0, 4))  # of all tracks of the newest frame
         self._begun_s: float | None = None
         self._frames = 0
         self._motion = 0.0
@@ -64,7 +67,8 @@ class ObjectMeter:
     def take(self, step: Step) -> None:
         """Add a frame as the settings see it."""
         assert step.foreground is not None
-        self._collect(step, self._sizes)
+        self._boxes = widened(step.tracks.box, _MARGIN)
+        self._collect(step, np.ones(len(step.tracks), bool), self._sizes)
         if self._begun_s is None:
             self._begun_s = step.time_s
             self._restless = np.zeros(step.foreground.mask.shape, np.int32)
@@ -77,16 +81,20 @@ class ObjectMeter:
         self._restless += moving
 
     def take_fine(self, step: Step) -> None:
-        """Add the same frame as finer settings see it."""
-        self._collect(step, self._fine_sizes)
+        """Add the same frame as finer settings see it: what is small, and no piece of what was seen anyway."""
+        box = step.tracks.box
+        cover = best_cover(box, self._boxes)[1]
+        self._collect(step, (cover < _PIECE) & (longer(box) < 2 * self._least_px), self._missed_sizes)
 
     def result(self) -> Objects:
         """Of all frames so far."""
-        sizes = [float(np.median(sizes)) for sizes in self._fine_sizes.values()]
+        seen = [float(np.median(sizes)) for sizes in self._sizes.values()]
+        missed = [float(np.median(sizes)) for sizes in self._missed_sizes.values() if len(sizes) >= _LASTING]
+        sizes = seen + missed
         share, box = self._restless_place()
         return Objects(
-            tracks=len(self._sizes),
-            fine_tracks=len(sizes),
+            tracks=len(seen),
+            missed=len(missed),
             median_px=float(np.median(sizes)) if sizes else None,
             smallest_px=float(np.percentile(sizes, _SMALL)) if sizes else None,
             least_px=self._least_px,
@@ -96,11 +104,12 @@ class ObjectMeter:
             restless_box=box,
         )
 
-    def _collect(self, step: Step, sizes: dict[int, list[float]]) -> None:
-        """Sizes of the confirmed tracks that went somewhere."""
+    def _collect(self, step: Step, among: NDArray[np.bool_], sizes: dict[int, list[float]]) -> None:
+        """Sizes of those confirmed tracks, among (T,), that went somewhere."""
         tracks = step.tracks
         size = longer(tracks.box)
-        shown = tracks.seen & (tracks.status != TENTATIVE) & (tracks.travel > size + 2 * self._least_px)
+        confirmed = among & tracks.seen & (tracks.status != TENTATIVE)
+        shown = confirmed & (tracks.travel > size + 2 * self._least_px)
         for track, px in zip(tracks.id[shown].tolist(), size[shown].tolist(), strict=True):
             sizes[track].append(px)
 
@@ -118,10 +127,9 @@ class ObjectMeter:
 def _covered(step: Step, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """(h, w) the boxes of confirmed tracks, with a margin."""
     assert step.foreground is not None
-    boxes: Floats = step.tracks.box[step.tracks.status != TENTATIVE] / step.foreground.step
+    boxes = widened(step.tracks.box[step.tracks.status != TENTATIVE], _MARGIN) / step.foreground.step
     covered = np.zeros(shape, bool)
-    for left, top, width, height in boxes:
-        margin = _MARGIN * max(width, height) + 2
-        rows = slice(max(0, int(top - margin)), max(0, int(top + height + margin)))
-        covered[rows, max(0, int(left - margin)) : max(0, int(left + width + margin))] = True
+    corners = np.column_stack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
+    for left, top, right, bottom in np.maximum(corners, 0).astype(int):
+        covered[top : bottom + 1, left : right + 1] = True
     return covered

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import socket
 from ipaddress import ip_address
@@ -52,4 +53,4 @@ def _host_and_port(place: str) -> tuple[str, int]:
 def _why(error: OSError) -> str:
     if isinstance(error, socket.gaierror):
         return "the host name is unknown"
-    return (error.strerror or str(error)).lower()
+    return os.strerror(error.errno).lower()

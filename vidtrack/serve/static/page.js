@@ -8,7 +8,7 @@ const seen = new IntersectionObserver((entries) => {
 });
 
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
-const number = (value, digits = 0) => (value === undefined || value === null ? "–" : value.toFixed(digits));
+const number = (value, digits = 0, unit = "") => (value === undefined || value === null ? "–" : value.toFixed(digits) + unit);
 
 function span(seconds) {
   if (seconds < 120) return `${Math.round(seconds)} s`;
@@ -39,9 +39,9 @@ function numbers(camera) {
     ["frames/s in", number(reading.fps_in, 1)],
     ["frames/s tracked", number(camera.fps_out, 1)],
     ["last frame", age === undefined || age === null ? "–" : `${span(age)} ago`, !camera.up],
-    ["latency p50", `${number(latency.p50)} ms`],
-    ["latency p95", `${number(latency.p95)} ms`],
-    ["latency p99", `${number(latency.p99)} ms`],
+    ["latency p50", number(latency.p50, 0, " ms")],
+    ["latency p95", number(latency.p95, 0, " ms")],
+    ["latency p99", number(latency.p99, 0, " ms")],
     ["frames tracked", number(reading.frames_read)],
     ["dropped", number(reading.frames_dropped)],
     ["decode errors", number(reading.decode_errors), reading.decode_errors > 0],
@@ -87,7 +87,7 @@ function addCard() {
   const card = document.getElementById("camera").content.firstElementChild.cloneNode(true);
   document.querySelector("main").append(card);
   seen.observe(card);
-  watch(card.querySelector(".picture"), card, cards.push(card) - 1);
+  watch(card.querySelector(".picture img"), card, cards.push(card) - 1);
   return card;
 }
 
@@ -96,7 +96,10 @@ async function watch(picture, card, place) {
   for (;;) {
     if (card.inSight && !document.hidden) {
       await new Promise((done) => {
-        picture.onload = picture.onerror = done;
+        picture.onload = picture.onerror = (event) => {
+          picture.classList.toggle("missing", event.type === "error");
+          done();
+        };
         picture.src = `picture/${place}.jpg?${Date.now()}`;
       });
     }

@@ -1,4 +1,4 @@
-"""How the camera moves: phase correlation of each picture with the one before, in tiles that vote."""
+"""How the camera moves: phase correlation of each picture with an earlier one, in tiles that vote."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ _COLUMNS = 512  # pictures are reduced to at most so many
 _TILES = (4, 3)  # columns and rows: traffic fills less than half of them
 _TEXTURE = 3.0  # grey levels; standard deviation below which a tile shows nothing to hold on to
 _FEWEST = 4  # tiles with texture
+_ANCHORED_S = 1.0
 _OFTEN = 90  # percentile: gusts count, a lorry that fills the picture once does not
 
 
@@ -32,46 +33,49 @@ class Shake:
 
 
 class ShakeMeter:
-    """Measures the displacement of each picture against the one before."""
+    """Measures where each picture is against one of up to a second before: by then traffic has moved on."""
 
     def __init__(self) -> None:
-        self._former: NDArray[np.float32] | None = None
-        self._shifts: list[Floats] = []
-        self._step = 1
+        self._anchor: NDArray[np.float32] | None = None
+        self._anchor_s = 0.0
+        self._anchor_at = np.zeros(2)
+        self._places: list[Floats] = []
 
     def take(self, frame: Frame) -> None:
         """Add a picture."""
-        self._step = max(1, math.ceil(frame.shape[1] / _COLUMNS))
-        h, w = (size // self._step for size in frame.shape)
-        picture = cv2.resize(frame.y[: h * self._step, : w * self._step], (w, h), interpolation=cv2.INTER_AREA)
-        current = picture.astype(np.float32)
-        if self._former is not None:
-            shift = _shift(self._former, current)
-            if shift is not None:
-                self._shifts.append(shift * self._step)
-        self._former = current
+        step = max(1, math.ceil(frame.shape[1] / _COLUMNS))
+        h, w = (size // step for size in frame.shape)
+        picture = cv2.resize(frame.y[: h * step, : w * step], (w, h), interpolation=cv2.INTER_AREA).astype(np.float32)
+        if self._anchor is None:
+            self._anchor, self._anchor_s = picture, frame.time_s
+            return
+        shift = _shift(self._anchor, picture)
+        if shift is None:
+            return
+        self._places.append(self._anchor_at + shift * step)
+        if frame.time_s - self._anchor_s > _ANCHORED_S:
+            self._anchor, self._anchor_s, self._anchor_at = picture, frame.time_s, self._places[-1]
 
     def result(self) -> Shake:
         """Of all pictures so far."""
-        if not self._shifts:
+        if len(self._places) < 2:
             return Shake(None, None)
-        shifts = np.array(self._shifts)
-        drift = shifts.sum(axis=0)
-        swing = np.linalg.norm(shifts - shifts.mean(axis=0), axis=1)
-        return Shake(float(np.percentile(swing, _OFTEN)), float(np.linalg.norm(drift)))
+        places = np.array(self._places)
+        swing = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        return Shake(float(np.percentile(swing, _OFTEN)), float(np.linalg.norm(places[-1])))
 
 
-def _shift(former: NDArray[np.float32], current: NDArray[np.float32]) -> Floats | None:
+def _shift(anchor: NDArray[np.float32], current: NDArray[np.float32]) -> Floats | None:
     """(2,) median over the tiles with texture; None if they are too few."""
     columns, rows = _TILES
-    h, w = former.shape[0] // rows, former.shape[1] // columns
+    h, w = anchor.shape[0] // rows, anchor.shape[1] // columns
     if min(h, w) < 8:
         return None
     window = cv2.createHanningWindow((w, h), cv2.CV_32F)
     shifts = []
     for top in range(0, rows * h, h):
         for left in range(0, columns * w, w):
-            a, b = (np.ascontiguousarray(p[top : top + h, left : left + w]) for p in (former, current))
+            a, b = (np.ascontiguousarray(p[top : top + h, left : left + w]) for p in (anchor, current))
             if a.std() > _TEXTURE:
                 shifts.append(cv2.phaseCorrelate(a - a.mean(), b - b.mean(), window)[0])
     return np.median(shifts, axis=0) if len(shifts) >= _FEWEST else None

@@ -1,0 +1,104 @@
+"""The page in a real browser, at the sizes of a phone and of a desk."""
+
+import re
+import shutil
+import subprocess
+
+import cv2
+import numpy as np
+import pytest
+from page_client import MadeUp, page_over
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SIZES = {"phone": (390, 1600), "desk": (1400, 1000)}
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (Debian's package chromium)")
+
+
+class NoPicture(MadeUp):
+    def picture(self):
+        return None
+
+
+def browse(url, size, folder, *options):
+    """What Chromium says after the page has lived for some seconds."""
+    command = [
+        CHROMIUM,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--hide-scrollbars",
+        "--disable-dev-shm-usage",
+        f"--user-data-dir={folder / 'profile'}",
+        f"--window-size={size[0]},{size[1]}",
+        "--virtual-time-budget=3000",
+        *options,
+        url,
+    ]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+
+
+@pytest.fixture(scope="module")
+def url():
+    with page_over({"gate": MadeUp(), "yard": NoPicture(state="waiting", frame_age_s=73.0)}) as url:
+        yield url
+
+
+def text_of(html):
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html.partition("<template")[0]))
+
+
+def test_the_page_says_everything(url, tmp_path):
+    html = browse(url, SIZES["desk"], tmp_path, "--dump-dom")
+    text = text_of(html)
+    assert "1 of 2 cameras deliver" in text
+    gate, _, yard = text.partition("yard waiting")
+    for fact in (
+        "gate running rtsp://***@10.0.0.7:554/stream",
+        "tracks now 2",
+        "frames/s in 25.0",
+        "frames/s tracked 24.6",
+        "latency p50 41 ms",
+        "latency p99 89 ms",
+        "dropped 120",
+        "stalls 1",
+        "reconnects 2",
+        "could not be written rerun 7",
+        "north left 12",
+        "7 confirmed 311 180 100",
+        "the camera said",
+    ):
+        assert fact in gate
+    assert "last frame 73 s ago" in yard
+    assert "<b>stop</b>" not in html  # what a camera says is text, never markup
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_the_picture_fills_the_width_and_nothing_overflows(url, tmp_path, name):
+    width, height = SIZES[name]
+    file = tmp_path / "shot.png"
+    browse(url, SIZES[name], tmp_path, f"--screenshot={file}")
+    shot = cv2.imread(str(file)).astype(int)
+    assert shot.shape[:2] == (height, width)
+    made_up = np.abs(shot - 90).max(axis=2) < 6  # the camera's grey
+    columns = np.flatnonzero(made_up.sum(axis=0) > 100)
+    card = width if name == "phone" else width / 2
+    assert columns[0] < 40
+    assert np.ptp(columns) > 0.8 * card
+    edge = shot[:, -8:]  # the margin at the right is empty
+    assert np.abs(edge - edge[0, 0]).max() < 8
+
+
+def test_a_page_without_its_program_says_so(tmp_path):
+    """The program ends while the page is open: what is shown is no longer believed."""
+    html = tmp_path / "lost.html"
+    with page_over({"gate": MadeUp()}) as url:
+        pass
+    script = __import__("vidtrack.serve.app", fromlist=["app"])._STATIC
+    for name in ("page.css", "page.js"):
+        (tmp_path / "static").mkdir(exist_ok=True)
+        (tmp_path / "static" / name).write_bytes((script / name).read_bytes())
+    html.write_bytes((script / "page.html").read_bytes())
+    text = text_of(browse(f"file://{html}", SIZES["phone"], tmp_path, "--dump-dom"))
+    assert "no answer from vidtrack at" in text
+    assert url not in text
