@@ -11,7 +11,7 @@ from vidtrack.steps import scan_steps
 def scans(rng, count=30):
     """Two targets, each with one to three plots a scan, and empty scans."""
     for k in range(count):
-        place = np.array([[0.0, 0.0], [500.0, 0.0]]) + [10.0 * k, 0.0]
+        place = np.array([[10.0 * k, 0.0], [500.0 + 10.0 * k, 0.0]])
         z = np.repeat(place, rng.integers(1, 4, 2), axis=0)
         z = z + 3 * rng.normal(size=z.shape) if k % 10 != 5 else np.empty((0, 2))
         yield k, vt.Scan(float(k), z, 9 * np.eye(2))

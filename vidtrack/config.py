@@ -201,7 +201,7 @@ class TrackerSettings(_Group):
 
 class OutputSettings(_Group):
     smooth: bool = False
-    """tracks are smoothed: each row uses the measurements after it too"""
+    """tracks are smoothed: each row uses the measurements after it too; not in live runs"""
     smooth_lag_s: float | None = Field(None, gt=0)
     """s; how far ahead smoothing looks, rows appearing one to two times as late; None: to the end, when all appear"""
     lines: tuple[str, ...] = ()

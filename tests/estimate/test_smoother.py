@@ -119,10 +119,10 @@ def looked_back(snapshots):
 
 
 def rms(snapshots, truth, scans=None):
-    error = [
-        np.linalg.norm(tracks.xy - true[np.argmin(np.linalg.norm(true[None] - tracks.xy[:, None], axis=2), axis=1)], axis=1)
-        for tracks, true in zip(snapshots, truth, strict=True)
-    ]  # fmt: skip
+    error = []
+    for tracks, true in zip(snapshots, truth, strict=True):
+        nearest = np.linalg.norm(true[None] - tracks.xy[:, None], axis=2).argmin(axis=1)
+        error.append(np.linalg.norm(tracks.xy - true[nearest], axis=1))
     return np.sqrt(np.mean(np.concatenate([error[k] for k in scans or range(len(error))]) ** 2))
 
 

@@ -48,7 +48,7 @@ class MadeUp:
     def status(self):
         self.looks += 1
         now_s = time.time()
-        track = {"track_id": 7, "status": "confirmed", "x_px": 310.5, "y_px": 180.25, "vx_px_s": 60.0, "vy_px_s": -80.0}
+        where = {"x_px": 310.5, "y_px": 180.25, "vx_px_s": 60.0, "vy_px_s": -80.0, "box_px": [290.0, 165.0, 41.0, 30.5]}
         return {
             "state": "running",
             "reading": READING,
@@ -60,7 +60,7 @@ class MadeUp:
             "time_s": self.looks / 25,
             "frame_age_s": 0.04,
             "fps_out": 24.6,
-            "tracks": [track | {"box_px": [290.0, 165.0, 41.0, 30.5]}, track | {"track_id": 12, "box_px": [1, 2, 3, 4]}],
+            "tracks": [{"track_id": number, "status": "confirmed", **where} for number in (7, 12)],
             "counts": {"north": {"left": 12, "right": 9}, 'in "A"\\': {"up": 3, "down": 0}},
         } | self.changes
 

@@ -100,9 +100,9 @@ def test_tracks_are_a_stream_of_json(url):
 
 
 def test_a_frame_is_sent_once():
-    with page_over({"gate": MadeUp(frame=3), "yard": MadeUp()}) as url:
-        with urllib.request.urlopen(url + "tracks", timeout=10) as stream:
-            lines = [json.loads(stream.readline()) for _ in range(6)]
+    cameras = {"gate": MadeUp(frame=3), "yard": MadeUp()}
+    with page_over(cameras) as url, urllib.request.urlopen(url + "tracks", timeout=10) as stream:
+        lines = [json.loads(stream.readline()) for _ in range(6)]
     assert [line["camera"] for line in lines] == ["gate"] + 5 * ["yard"]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from vidtrack.cli.tracking import chosen_settings, tracking_options
 
 if TYPE_CHECKING:
     from vidtrack.output.status import LiveStatus
+    from vidtrack.serve.page import Page
 
 _TELL_S = 60.0
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
@@ -27,7 +29,7 @@ _BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
 Examples:
   vidtrack live 0 --line gate:320,0,320,480
   vidtrack live rtsp://USER:PASSWORD@192.168.1.20/stream -o cam1 --roll 1h --keep 7d --state cam1.state
-  vidtrack live http://camera.local/video.mjpg --record tape --end 600""",
+  vidtrack live http://camera.local/video.mjpg --http 8080 --record tape --end 600""",
 )
 @click.argument("source")
 @common("Folder for the results.  [default: runs/NAME]")
@@ -38,6 +40,14 @@ Examples:
 @click.option("--keep", "keeps", multiple=True, metavar="TIME|SIZE", help="Delete the oldest: 7d or 10GB, or both.")
 @click.option("--state", type=click.Path(path_type=Path), metavar="FILE", help="Go on from this file, and save to it.")
 @click.option("--record", type=click.Path(path_type=Path), metavar="DIR", help="Keep what the camera sends, to replay.")
+@click.option("--http", metavar="[HOST:]PORT", help="Serve a live page; without HOST for this machine only.")
+@click.option(
+    "--http-token",
+    metavar="TOKEN",
+    envvar="VIDTRACK_TOKEN",
+    show_envvar=True,
+    help="The page's password; a must where other machines can see it.",
+)
 def command(
     source: str,
     output: Path | None,
@@ -53,6 +63,8 @@ def command(
     decisions: bool,
     state: Path | None,
     record: Path | None,
+    http: str | None,
+    http_token: str | None,
     **chosen: Any,
 ) -> None:
     """Track the vehicles that SOURCE sees: a camera's index, a V4L2 device, or an rtsp:// or http:// stream.
@@ -69,16 +81,25 @@ def command(
     from vidtrack.config import load
     from vidtrack.live.outputs import Extras
     from vidtrack.live.run import LiveRun
+    from vidtrack.serve.camera import Camera
     from vidtrack.video.live.address import secrets
 
-    hide_arguments(secrets(source))
+    hide_arguments([*secrets(source), *([http_token] if http_token else [])])
     start_log(verbose, quiet)
     settings = load(config_file, [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)])
     if first_run() and not quiet:
         click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
     extras = Extras(rerun, video, save_masks, decisions, state, record)
     try:
-        with LiveRun(source, settings, output, extras, force=force) as run, stopping(run.stop):
+        with (
+            _page(http, http_token) as page,
+            LiveRun(source, settings, output, extras, force=force) as run,
+            stopping(run.stop),
+        ):
+            if page is not None:
+                page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
+                if not quiet:
+                    click.echo(f"vidtrack: the page is at {page.url}", err=True)
             told_s = time.monotonic()
             for _ in run:
                 if not quiet and time.monotonic() - told_s > _TELL_S:
@@ -90,6 +111,15 @@ def command(
         click.echo("vidtrack: stopped before the first picture, or at once", err=True)
         return
     click.echo(run.folder)
+
+
+def _page(http: str | None, token: str | None) -> AbstractContextManager[Page | None]:
+    """The live page with its port taken, before any camera is opened."""
+    if http is None:
+        return nullcontext()
+    from vidtrack.serve.page import Page
+
+    return Page(http, token)
 
 
 def _live_settings(

@@ -21,7 +21,7 @@ _SETTLE_S = 2.0  # in which what stood in the first picture comes out of the sce
 _OFTEN = 0.2  # share of the frames
 _SMALL = 10  # percentile
 _PIECE = 0.3  # share of a box that lies in another one, of which it is a piece
-_LASTING = 5  # frames
+_LASTING_S = 1.0  # that a small object has to be seen; noise is not
 _FINE_MAJORITY_PX, _FINE_AREA_PX = 3, 6  # of the finer detector
 _MARGIN = 0.25  # of a box's size, around it: what moves there is the vehicle's shadow or glare
 
@@ -60,9 +60,10 @@ class ObjectMeter:
         self._missed_sizes: dict[int, list[float]] = defaultdict(list)
         self._boxes: Floats = np.empty((0, 4))  # of all tracks of the newest frame
         self._begun_s: float | None = None
-        self._frames = 0
+        self._frames = 0  # after the scene has settled, which were so long:
+        self._watched_s = 0.0
         self._motion = 0.0
-        self._restless: NDArray[np.int32] | None = None
+        self._restless: NDArray[np.int32] = np.empty((0, 0), np.int32)
 
     def take(self, step: Step) -> None:
         """Add a frame as the settings see it."""
@@ -72,7 +73,8 @@ class ObjectMeter:
         if self._begun_s is None:
             self._begun_s = step.time_s
             self._restless = np.zeros(step.foreground.mask.shape, np.int32)
-        if step.time_s - self._begun_s < _SETTLE_S:
+        self._watched_s = step.time_s - self._begun_s - _SETTLE_S
+        if self._watched_s < 0:
             return
         moving = step.foreground.mask > 0
         self._frames += 1
@@ -84,12 +86,14 @@ class ObjectMeter:
         """Add the same frame as finer settings see it: what is small, and no piece of what was seen anyway."""
         box = step.tracks.box
         cover = best_cover(box, self._boxes)[1]
-        self._collect(step, (cover < _PIECE) & (longer(box) < 2 * self._least_px), self._missed_sizes)
+        small = longer(box) < 2 * self._least_px
+        self._collect(step, small & (cover < _PIECE), self._missed_sizes)
 
     def result(self) -> Objects:
         """Of all frames so far."""
         seen = [float(np.median(sizes)) for sizes in self._sizes.values()]
-        missed = [float(np.median(sizes)) for sizes in self._missed_sizes.values() if len(sizes) >= _LASTING]
+        lasting = _LASTING_S * self._frames / max(self._watched_s, _LASTING_S)
+        missed = [float(np.median(sizes)) for sizes in self._missed_sizes.values() if len(sizes) >= lasting]
         sizes = seen + missed
         share, box = self._restless_place()
         return Objects(
@@ -114,7 +118,7 @@ class ObjectMeter:
             sizes[track].append(px)
 
     def _restless_place(self) -> tuple[float, tuple[int, int, int, int] | None]:
-        if self._restless is None or not self._frames:
+        if not self._frames:
             return 0.0, None
         often = np.where(self._restless > _OFTEN * self._frames, np.uint8(255), np.uint8(0))
         places = find_blobs(Foreground(often, often.astype(np.float32), self._step), BlobSettings(min_area_share=0))

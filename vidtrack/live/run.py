@@ -163,6 +163,7 @@ class LiveRun:
             "reconnects": stats.reconnects,
             "stalls": stats.stalls,
             "truncated": False,
+            **self._memory.tracker.rates.as_dict(),
             "latency_ms": self.board.latency_ms(),
             "lost": self._lost(),
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from time import monotonic
 from typing import Any, Generic, TypeVar
 
@@ -31,7 +31,12 @@ class Camera:
     @classmethod
     def of(cls, board: StatusBoard, stale_s: float) -> Camera:
         """A camera of this process."""
-        return cls(lambda: asdict(board.now()), board.picture, stale_s)
+
+        def status() -> Status:
+            now = board.now()
+            return {field.name: getattr(now, field.name) for field in fields(now)}
+
+        return cls(status, board.picture, stale_s)
 
     def delivers(self, status: Status) -> bool:
         """Whether the camera runs and its frames are tracked."""

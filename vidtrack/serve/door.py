@@ -53,4 +53,4 @@ def _host_and_port(place: str) -> tuple[str, int]:
 def _why(error: OSError) -> str:
     if isinstance(error, socket.gaierror):
         return "the host name is unknown"
-    return os.strerror(error.errno).lower()
+    return os.strerror(error.errno or 0).lower()

@@ -1,4 +1,4 @@
-"""The experiment of table 2: range filters in a contest while the target speeds up with 2.5 g, on equal measurements."""
+"""The experiment of table 2: filters of the range in a contest, while the target speeds up with 2.5 g."""
 
 from __future__ import annotations
 

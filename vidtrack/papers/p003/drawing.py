@@ -24,11 +24,10 @@ def time_figure(each: Study) -> Figure:
         one, every = panels[c], panels[c + len(CHANNELS)]
         for way in WAYS:
             error = each.error[way.name][..., c]
-            look = {"color": way.colour, "lw": 0.8 if way.bank is None else 1.3}
-            one.plot(TIMES, error[:, 0], **look, alpha=0.4 if way.bank is None else 1)
+            one.plot(TIMES, error[:, 0], color=way.colour, lw=1.0, ls=way.line, alpha=1 if way.bank else 0.4)
             mean, se = mean_and_se(np.abs(error))
             every.fill_between(TIMES, mean - 1.96 * se, mean + 1.96 * se, color=way.colour, alpha=0.2, lw=0)
-            every.plot(TIMES, mean, **look, label=way.name)
+            every.plot(TIMES, mean, color=way.colour, lw=1.3, ls=way.line, label=way.name)
         style.title(one, f"{channel}: error of one run [{unit}]")
         style.title(every, f"{channel}: mean |error|, 95 % [{unit}]")
         every.set_ylim(bottom=0)
@@ -57,19 +56,18 @@ def time_rows(each: Study, claim: str) -> list[Row]:
 
 def histogram(each: Study, channel: int, bins: Floats, paper: Sequence[tuple[str, float, str]]) -> Figure:
     """Distribution of a channel's errors after three seconds; the paper's bounds as (label, half width, colour)."""
-    drawing, (ax,) = style.figure(panel=(7.2, 4.4))
+    drawing, (ax,) = style.figure(panel=(7.2, 5.2))
     for way in WAYS:
         error = each.error[way.name][SETTLED, :, channel].ravel()
         label = f"{way.name}: 95 % within ±{each.half_width(way.name, channel):.3g} {UNITS[channel]}"
-        ax.hist(error, bins, density=True, histtype="step", color=way.colour, lw=1.5, label=label)
+        ax.hist(error, list(bins), density=True, histtype="step", color=way.colour, lw=1.5, ls=way.line, label=label)
     for label, width, colour in paper:
         ax.axvline(-width, color=colour, ls=":", lw=1.2, label=label)
         ax.axvline(width, color=colour, ls=":", lw=1.2)
     ax.set_xlim(bins[0], bins[-1])
-    ax.set_ylim(0, 1.45 * ax.get_ylim()[1])
     ax.set_xlabel(f"error of {CHANNELS[channel]} [{UNITS[channel]}]")
     ax.set_ylabel("density")
-    style.legend(ax, ncols=2, loc="upper center")
+    drawing.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return drawing
 
 

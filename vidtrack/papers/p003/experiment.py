@@ -23,7 +23,7 @@ RUNS = 100
 SCANS = 232
 PARTICLES = 2000
 SCAN_S = MULTIFUNCTION.scan_s
-TIMES = SCAN_S * np.arange(SCANS)
+TIMES: Floats = SCAN_S * np.arange(SCANS, dtype=float)
 SETTLED = TIMES > 3.0
 
 MODEL = ConstantVelocity(1, accel=1.0)
@@ -42,8 +42,8 @@ class Channels:
 def polar(flight: Flight) -> Floats:
     """(SCANS, 3) true range [m], azimuth [deg] without jumps, elevation [deg]."""
     measured = MULTIFUNCTION.measures(flight(TIMES)[0])
-    measured[:, 1] = np.unwrap(measured[:, 1], period=360)
-    return measured
+    azimuth = np.degrees(np.unwrap(np.radians(measured[:, 1])))
+    return np.column_stack([measured[:, 0], azimuth, measured[:, 2]])
 
 
 def measure(truth: Floats, sigma: Floats, runs: int, rng: Generator, glint: Glint = NO_GLINT) -> Channels:

@@ -27,7 +27,7 @@ def reproduce(runs: int | None, seed: int) -> Result:
     kalman, particles = (each.half_width(name, ELEVATION) for name in ("Kalman, tuned", "particles, the paper's"))
     verdict = (
         f"95 % of a tuned Kalman filter's elevation errors are within {kalman:.3f} degrees and of the paper's particle "
-        f"filter's within {particles:.3f}; within 0.007 degrees no filter comes with measurements of 0.04 degrees, so the "
-        f"paper's must be much better than that; mean errors: {summary(each, ELEVATION)}."
+        f"filter's within {particles:.3f}; no filter here comes within 0.007 degrees, for which the paper's "
+        f"measurements must be much better than 0.04 degrees; mean errors: {summary(each, ELEVATION)}."
     )
     return Result(histogram(each, ELEVATION, BINS, PAPER), histogram_rows(each, ELEVATION, BINS, CLAIM), verdict)

@@ -23,8 +23,8 @@ def reproduce(runs: int | None, seed: int) -> Result:
     each = study(incoming(rng)[0].flight, RUNS if runs is None else runs, rng)
     kalman, particles = (each.half_width(name, RANGE) for name in ("Kalman, tuned", "particles, the paper's"))
     verdict = (
-        f"the printed numbers say that the Kalman filter is better, the text says the opposite; with errors of 5 m 95 % "
-        f"of a tuned Kalman filter's are within {kalman:.2f} m and of the paper's particle filter's within "
-        f"{particles:.2f} m; mean errors: {summary(each, RANGE)}."
+        f"the printed numbers say that the Kalman filter is better, the text says the opposite; with measurements of "
+        f"5 m 95 % of a tuned Kalman filter's errors are within {kalman:.2f} m and of the paper's particle filter's "
+        f"within {particles:.2f} m; mean errors: {summary(each, RANGE)}."
     )
     return Result(histogram(each, RANGE, BINS, PAPER), histogram_rows(each, RANGE, BINS, CLAIM), verdict)

@@ -23,8 +23,8 @@ UNITS = ("m", "deg", "deg")
 INDEX = 0.02
 """Tracking index accel dt^2 / sigma of a filter for a channel that hardly accelerates."""
 
-UNDERTUNED = 0.1
-"""Share of the right acceleration that the under-tuned filter is told."""
+TOLD = 0.1
+"""Share of the right acceleration that an under-tuned filter is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,19 +33,21 @@ class Way:
 
     bank   made from a seed; None: the measurement as it is
     knows  share of the channel's acceleration that it is told
+    line   how it is drawn
     """
 
     name: str
     colour: str
     bank: Callable[[int], Estimator] | None
     knows: float = 1.0
+    line: str = "-"
 
 
 WAYS = (
     Way("measurement", style.GREY, None),
-    Way("Kalman, under-tuned", style.ORANGE, lambda seed: KalmanBank(MODEL), UNDERTUNED),
+    Way("Kalman, told a tenth", style.ORANGE, lambda seed: KalmanBank(MODEL), TOLD),
     Way("Kalman, tuned", style.BLUE, lambda seed: KalmanBank(MODEL)),
-    Way("particles, bootstrap", style.GREEN, lambda seed: ParticleBank(MODEL, PARTICLES, seed=seed)),
+    Way("particles, bootstrap", style.GREEN, lambda seed: ParticleBank(MODEL, PARTICLES, seed=seed), line="--"),
     Way("particles, the paper's", style.RED, lambda seed: ErrorSignalBank(MODEL, PARTICLES, seed=seed)),
 )
 
@@ -69,16 +71,17 @@ class Study:
 def study(flight: Flight, runs: int, rng: Generator) -> Study:
     """Run all ways on the same measurements of a flight.
 
-    Tuned filters are told what a channel's acceleration exceeds in one scan of a hundred, so not the jump of the climb
-    rate with which the altitude manoeuvre begins.
+    Tuned filters are told each channel's largest acceleration; in the altitude manoeuvre that is the jump of the climb
+    rate with which it begins, spread over three scans.
     """
     truth, sigma = polar(flight), np.array(MULTIFUNCTION.sigma)
-    largest = np.quantile(np.abs(np.diff(truth, 2, axis=0)), 0.99, axis=0) / SCAN_S**2
+    largest = np.abs(np.gradient(np.gradient(truth, SCAN_S, axis=0), SCAN_S, axis=0)).max(axis=0)
     accel = np.maximum(largest, INDEX * sigma / SCAN_S**2)
     seen = measure(truth, sigma, runs, rng)
     error = {}
     for way in WAYS:
-        bank = way.bank and way.bank(int(rng.integers(2**32)))
-        found = estimate(bank, seen, np.tile(way.knows * accel, runs)) if bank else seen.z
+        found = seen.z
+        if way.bank:
+            found = estimate(way.bank(int(rng.integers(2**32))), seen, np.tile(way.knows * accel, runs))
         error[way.name] = (found - seen.truth).reshape(SCANS, runs, len(sigma))
     return Study(error, accel)

@@ -1,0 +1,130 @@
+"""`vidtrack doctor`: what a source is like, and which setting will hurt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vidtrack.cli.options import settings_options, start_log
+
+if TYPE_CHECKING:
+    from vidtrack.doctor.advice import Advice
+    from vidtrack.doctor.findings import Findings
+
+_FAILED = 1
+_SETTING = {"scale": "source.scale", "mask": "source.mask", "fps": "source.fps", "start": "source.start_s"}
+
+
+@click.command(
+    name="doctor",
+    short_help="Look at a source, and say which setting will hurt.",
+    epilog="""\b
+Examples:
+  vidtrack doctor traffic.avi
+  vidtrack doctor rtsp://USER:PASSWORD@192.168.1.20/stream --seconds 60
+  vidtrack doctor traffic.avi --scale 0.5 --json - | jq .advice""",
+)
+@click.argument("source")
+@click.option("--seconds", type=click.FloatRange(min=1), default=10.0, show_default=True, help="Look at so much of it.")
+@settings_options
+@click.option("--scale", type=float, metavar="F", help="As for track: detect in a reduced picture.")
+@click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="As for track: look where it is white.")
+@click.option("--fps", type=float, metavar="N", help="As for track: the true rate.")
+@click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
+@click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
+@click.option("--quiet", is_flag=True, help="Only the exit code, and --json.")
+@click.option("-v", "--verbose", count=True, help="Say more; twice: everything.")
+def command(
+    source: str,
+    seconds: float,
+    config_file: Path | None,
+    assignments: tuple[str, ...],
+    json_to: str | None,
+    quiet: bool,
+    verbose: int,
+    **chosen: Any,
+) -> int:
+    """Look at SOURCE for some seconds: a video, an image folder or glob, a MOT det.txt, a camera or a stream.
+
+    Measures rate, light, noise, flicker, shake, what moves, and whether this machine keeps up; says what will hurt a
+    run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it cannot be opened.
+    """
+    from vidtrack.cli.hide import hide_arguments
+    from vidtrack.cli.json_file import write_json
+    from vidtrack.compiled import first_run
+    from vidtrack.config import load
+    from vidtrack.doctor.examine import examine
+    from vidtrack.doctor.judge import judge
+    from vidtrack.video.live.address import secrets
+
+    hide_arguments(secrets(source))
+    start_log(verbose, quiet=not verbose)  # what is worth a warning is among the advice
+    given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
+    settings = load(config_file, [*assignments, *given])
+    if first_run() and not quiet:
+        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+    findings = examine(source, settings, seconds)
+    advice = judge(findings, settings)
+    if json_to is not None:
+        write_json(_content(findings, advice), json_to)
+    if json_to != "-" and not quiet:
+        _print_report(findings, advice)
+    return _FAILED if any(one.problem for one in advice) else 0
+
+
+def _content(findings: Findings, advice: Sequence[Advice]) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    fine = not any(one.problem for one in advice)
+    return {"fine": fine, **asdict(findings), "advice": [asdict(one) for one in advice]}
+
+
+def _print_report(findings: Findings, advice: Sequence[Advice]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("measured", "value", title=Text(findings.source))
+    for name, value in _rows(findings):
+        table.add_row(name, value)
+    console = Console()
+    console.print(table)
+    for one in advice:
+        style = "bold red" if one.problem else "bold"
+        options = "".join(f"\n    {option}" for option in one.options)
+        console.print(Text.assemble((f"{one.name}: ", style), one.text, (options, "green")), soft_wrap=True)
+    if not any(one.problem for one in advice):
+        console.print("nothing that will hurt was found", style="green")
+
+
+def _rows(findings: Findings) -> Iterator[tuple[str, str]]:
+    """What was measured, in words."""
+    yield "picture", f"{findings.width} x {findings.height} px"
+    if (timing := findings.timing) is not None:
+        yield "rate", f"{timing.rate:.4g} frames/s over {timing.pictures} pictures"
+        yield "intervals", f"vary by {timing.jitter:.1%}, longest {1e3 * timing.longest_gap_s:.0f} ms"
+        yield "missing, repeated", f"{timing.missing_share:.1%}, {timing.repeated_share:.1%} of the pictures"
+    else:
+        yield "rate", f"{findings.fps:.4g} frames/s"
+    if (light := findings.light) is not None:
+        yield "brightness", f"{light.brightness:.0f} of 255; 5 % are above {light.bright:.0f}"
+        yield "black, white", f"{light.black_share:.1%}, {light.white_share:.1%} of the picture"
+        yield "noise", f"{light.noise:.1f} grey levels"
+    if (flicker := findings.flicker) is not None:
+        yield "flicker", f"{flicker.whole:.1%} of the light at {flicker.whole_hz:.1f} Hz; bands {flicker.bands:.1%}"
+    if (shake := findings.shake) is not None and shake.px is not None:
+        yield "shake", f"{shake.px:.2f} px between pictures; {shake.drift_px:.1f} px from first to last"
+    if findings.blockiness is not None:
+        yield "compression", f"steps at blocks {findings.blockiness:.2f} times those elsewhere"
+    if (objects := findings.objects) is not None:
+        yield "driving", f"{objects.tracks} tracks, {objects.missed} small ones missed"
+        if objects.median_px is not None:
+            yield "their size", f"median {objects.median_px:.0f} px, one in ten below {objects.smallest_px:.0f} px"
+        yield "least size", f"{objects.least_px:.1f} px can be seen"
+        yield "in motion", f"{objects.motion_share:.1%} of the picture; {objects.restless_share:.1%} going nowhere"
+    if (speed := findings.speed) is not None:
+        decoding = "" if speed.decode_s is None else f"{1e3 * speed.decode_s:.1f} ms to decode, "
+        yield "this machine", f"{decoding}{1e3 * speed.track_s:.1f} ms to track: {speed.rate:.0f} frames/s"
