@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import at_rest, positions, velocities
+from vidtrack.estimate.model import Columns, at_rest
 from vidtrack.scan import Floats, Ints
 
 LONG = 10.0
@@ -16,7 +16,7 @@ LONG = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class ConstantAcceleration:
+class ConstantAcceleration(Columns):
     """Nearly constant acceleration (Bar-Shalom, Li, Kirubarajan 2001, section 6.3).
 
     change  standard deviation of the acceleration's change, per s^2
@@ -39,16 +39,6 @@ class ConstantAcceleration:
     def states(self) -> int:
         """n, components of the state."""
         return 3 * self.dim
-
-    @property
-    def position(self) -> tuple[int, ...]:
-        """Columns of the state that are positions."""
-        return positions(self.dim)
-
-    @property
-    def velocity(self) -> tuple[int, ...]:
-        """Columns of the state that are velocities."""
-        return velocities(self.dim)
 
     def transition(self, dt: float, x: Floats) -> Floats:
         """F (1, n, n) over dt seconds."""
@@ -75,7 +65,7 @@ class ConstantAcceleration:
 
 
 @dataclass(frozen=True, slots=True)
-class Singer:
+class Singer(Columns):
     """Acceleration that fades: exponentially correlated in time (Singer 1970).
 
     accel   standard deviation of the acceleration, per s^2
@@ -96,16 +86,6 @@ class Singer:
     def states(self) -> int:
         """n, components of the state."""
         return 3 * self.dim
-
-    @property
-    def position(self) -> tuple[int, ...]:
-        """Columns of the state that are positions."""
-        return positions(self.dim)
-
-    @property
-    def velocity(self) -> tuple[int, ...]:
-        """Columns of the state that are velocities."""
-        return velocities(self.dim)
 
     def transition(self, dt: float, x: Floats) -> Floats:
         """F (1, n, n) over dt seconds."""

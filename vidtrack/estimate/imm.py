@@ -31,9 +31,7 @@ class IMMBank:
 
     def __init__(self, models: Sequence[Motion], stay_s: Sequence[float]) -> None:
         if len(models) != len(stay_s) or len(models) < 2:
-            raise ConfigError(
-                f"IMM: {len(models)} models, {len(stay_s)} stays; give two models or more, a stay each"
-            )
+            raise ConfigError(f"IMM: {len(models)} models, {len(stay_s)} stays; give two models or more, a stay each")
         if len({model.dim for model in models}) > 1:
             raise ConfigError("IMM: the models move in different numbers of dimensions")
         if not min(stay_s) > 0:

@@ -50,14 +50,21 @@ class Motion(Protocol):
         """x (B, n), P (B, n, n) of new rows from one located measurement each: (B, d), (B, d, d); scale (B,)."""
 
 
-def positions(dim: int) -> tuple[int, ...]:
-    """Columns of the positions."""
-    return tuple(range(0, 2 * dim, 2))
+class Columns:
+    """Where positions and velocities stand in the state of a model with `dim`."""
 
+    __slots__ = ()
+    dim: int
 
-def velocities(dim: int) -> tuple[int, ...]:
-    """Columns of the velocities."""
-    return tuple(range(1, 2 * dim, 2))
+    @property
+    def position(self) -> tuple[int, ...]:
+        """Columns of the state that are positions."""
+        return tuple(range(0, 2 * self.dim, 2))
+
+    @property
+    def velocity(self) -> tuple[int, ...]:
+        """Columns of the state that are velocities."""
+        return tuple(range(1, 2 * self.dim, 2))
 
 
 def at_rest(position: Floats, cov: Floats, sigma: Floats) -> tuple[Floats, Floats]:

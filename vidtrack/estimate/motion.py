@@ -9,14 +9,14 @@ from numba import njit
 
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import at_rest, positions, velocities
+from vidtrack.estimate.model import Columns, at_rest
 from vidtrack.scan import Floats, Ints
 
 Settled = np.ndarray  # (T,) bool: rows whose heading may shape the process noise
 
 
 @dataclass(frozen=True, slots=True)
-class ConstantVelocity:
+class ConstantVelocity(Columns):
     """Nearly constant velocity, state [x, vx, y, vy, ...].
 
     accel    standard deviation of the acceleration along the heading, per s^2
@@ -52,16 +52,6 @@ class ConstantVelocity:
     def states(self) -> int:
         """n, components of the state."""
         return 2 * self.dim
-
-    @property
-    def position(self) -> tuple[int, ...]:
-        """Columns of the state that are positions."""
-        return positions(self.dim)
-
-    @property
-    def velocity(self) -> tuple[int, ...]:
-        """Columns of the state that are velocities."""
-        return velocities(self.dim)
 
     def transition(self, dt: float, x: Floats) -> Floats:
         """F (1, n, n) over dt seconds."""

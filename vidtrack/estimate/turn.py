@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import at_rest, positions, velocities
+from vidtrack.estimate.model import Columns, at_rest
 from vidtrack.scan import Floats, Ints
 
 STRAIGHT = 1e-4
@@ -15,7 +15,7 @@ STRAIGHT = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class CoordinatedTurn:
+class CoordinatedTurn(Columns):
     """State [x, vx, y, vy, w], or [x, vx, y, vy, z, vz, w] with a level turn; w is the turn rate [rad/s].
 
     w is counted from x to y (Bar-Shalom, Li, Kirubarajan 2001, section 11.7).
@@ -47,16 +47,6 @@ class CoordinatedTurn:
     def states(self) -> int:
         """n, components of the state."""
         return 2 * self.dim + 1
-
-    @property
-    def position(self) -> tuple[int, ...]:
-        """Columns of the state that are positions."""
-        return positions(self.dim)
-
-    @property
-    def velocity(self) -> tuple[int, ...]:
-        """Columns of the state that are velocities."""
-        return velocities(self.dim)
 
     def transition(self, dt: float, x: Floats) -> Floats:
         """F (T, n, n) over dt seconds at each row's own turn rate."""
