@@ -103,3 +103,12 @@ def test_what_is_no_longer_true_is_no_longer_believed(tmp_path):
     assert "no answer from vidtrack at" in text_of(html)
     assert "tracks now 2" in text_of(html)
     assert '<article class="">' in html
+
+
+def test_the_token_reaches_everything_that_the_page_loads(tmp_path):
+    camera = MadeUp()
+    with page_over({"gate": camera}, token="sesame") as url:
+        html = browse(url.replace("://", "://any:sesame@"), SIZES["phone"], tmp_path, "--dump-dom")
+        assert "gate running" in text_of(html)
+        assert camera.pictures > 0
+        assert "gate running" not in text_of(browse(url, SIZES["phone"], tmp_path, "--dump-dom"))

@@ -170,3 +170,30 @@ def test_a_lone_members_edges_are_those_of_its_blob():
 def test_a_cover_that_makes_no_sense_is_refused(cover):
     with pytest.raises(ConfigError, match=str(cover)):
         Groups(cover=cover)
+
+
+def in_two_pieces(apart_s):
+    """A lorry whose cab and trailer are two blobs at first, and one for the rest of its way."""
+
+    def boxes(t):
+        x, gap = 40 + SPEED * t, 4 if t < apart_s else -2
+        return [centred(x, 120, 40, 24), centred(x + 20 + gap + 8, 122, 16, 18)]
+
+    return boxes
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_piece_that_was_hardly_ever_alone_is_no_vehicle_of_its_own(seed):
+    seen = play(default_tracker(), in_two_pieces(0.36), 3.0, jitter=0.3, seed=seed)
+    assert len(confirmed_ids(seen)) == 2
+    assert len(seen[-1]) == 1
+    (_, piece), *_ = events(seen, "delete")
+    assert [event.reason for tracks in seen for event in tracks.events if event.track_id == piece][-1] == (
+        "part of the vehicle that it never left"
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_who_was_alone_for_long_stays_a_vehicle_in_the_group(seed):
+    seen = play(default_tracker(), in_two_pieces(1.0), 3.5, jitter=0.3, seed=seed)
+    assert len(seen[-1]) == len(confirmed_ids(seen)) == 2

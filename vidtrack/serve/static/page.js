@@ -2,6 +2,7 @@
 
 const STATUS_MS = 1000;
 const PICTURE_MS = 200;
+const HERE = location.origin + location.pathname; // without the password that the address may hold: fetch refuses it
 const cards = [];
 const seen = new IntersectionObserver((entries) => {
   for (const entry of entries) entry.target.inSight = entry.isIntersecting;
@@ -110,7 +111,7 @@ async function watch(picture, card, place) {
 async function look() {
   const summary = document.getElementById("summary");
   try {
-    const answer = await fetch("status", { signal: AbortSignal.timeout(10000) });
+    const answer = await fetch(`${HERE}status`, { signal: AbortSignal.timeout(10000) });
     if (!answer.ok) throw new Error(answer.statusText);
     const cameras = await answer.json();
     cameras.forEach((camera, place) => show(cards[place] ?? addCard(), camera));
