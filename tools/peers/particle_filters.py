@@ -48,6 +48,8 @@ def particles(z: np.ndarray, step: float, sigma: float, accel: float, number: in
     from particles.collectors import Moments
     from particles.state_space_models import Bootstrap, StateSpaceModel
 
+    rng = np.random.default_rng(0)
+
     class Moved(dists.ProbDist):
         dim = 2
 
@@ -55,18 +57,18 @@ def particles(z: np.ndarray, step: float, sigma: float, accel: float, number: in
             self.x = x
 
         def rvs(self, size: int | None = None) -> np.ndarray:
-            a = accel * np.random.standard_normal(len(self.x))
+            a = accel * rng.standard_normal(len(self.x))
             x0, x1 = self.x[:, 0], self.x[:, 1]
             return np.column_stack([x0 + step * x1 + step**2 / 2 * a, x1 + step * a])
 
     class Flight(StateSpaceModel):
-        def PX0(self) -> dists.ProbDist:
+        def PX0(self) -> dists.ProbDist:  # noqa: N802
             return dists.MvNormal(loc=np.array([z[0], 0.0]), cov=np.diag([sigma**2, 200.0**2]))
 
-        def PX(self, t: int, xp: np.ndarray) -> dists.ProbDist:
+        def PX(self, t: int, xp: np.ndarray) -> dists.ProbDist:  # noqa: N802
             return Moved(xp)
 
-        def PY(self, t: int, xp: np.ndarray, x: np.ndarray) -> dists.ProbDist:
+        def PY(self, t: int, xp: np.ndarray, x: np.ndarray) -> dists.ProbDist:  # noqa: N802
             return dists.Normal(loc=x[:, 0], scale=sigma)
 
     def run() -> np.ndarray:
@@ -84,9 +86,10 @@ def stonesoup(z: np.ndarray, step: float, sigma: float, accel: float, number: in
     from stonesoup.models.transition.linear import ConstantVelocity
     from stonesoup.predictor.particle import ParticlePredictor
     from stonesoup.resampler.particle import ESSResampler
+    from stonesoup.types.array import StateVectors
     from stonesoup.types.detection import Detection
     from stonesoup.types.hypothesis import SingleHypothesis
-    from stonesoup.types.state import GaussianState, ParticleState
+    from stonesoup.types.state import ParticleState
     from stonesoup.updater.particle import ParticleUpdater
 
     start = datetime.datetime(2000, 1, 1)
@@ -95,8 +98,9 @@ def stonesoup(z: np.ndarray, step: float, sigma: float, accel: float, number: in
     updater = ParticleUpdater(model, ESSResampler())
 
     def run() -> np.ndarray:
-        prior = GaussianState([[z[0]], [0.0]], np.diag([sigma**2, 200.0**2]), timestamp=start)
-        state = ParticleState.from_gaussian(prior, number)
+        rng = np.random.default_rng(0)
+        first = rng.multivariate_normal([z[0], 0.0], np.diag([sigma**2, 200.0**2]), number)
+        state = ParticleState(StateVectors(first.T), weight=np.full(number, 1 / number), timestamp=start)
         found = np.empty(len(z))
         for k in range(len(z)):
             at = start + datetime.timedelta(seconds=(k + 1) * step)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from vidtrack.config import Settings
 from vidtrack.doctor.advice import Advice, scale_option, set_option
-from vidtrack.doctor.findings import Findings, Objects, Shake
+from vidtrack.doctor.findings import Findings, Objects
+from vidtrack.video.background.picture import reduction
 
 _THRESHOLD, _MAJORITY = "detector.disturbance.luma_threshold", "detector.disturbance.majority_px"
 _SHAKE_PX, _STRONG_SHAKE_PX = 1.0, 3.5  # processed pixels from one frame to the next
@@ -18,33 +19,32 @@ _RESTLESS = 0.005  # of the picture
 _CROWDED = 0.4  # of the picture
 
 
-def on_motion(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """Everything that has to do with motion."""
-    objects, shake = findings.objects, findings.shake
-    if objects is None or shake is None:
+def on_camera(findings: Findings, settings: Settings) -> Iterator[Advice]:
+    """Whether it stands still."""
+    shake, step = findings.shake, reduction(findings.height, settings.source.scale)
+    if shake is None:
         return
-    moved = list(_on_camera(shake, objects.step, findings.width, settings))
-    yield from moved
-    if not any(advice.problem for advice in moved):  # otherwise what is seen to move is the camera
-        yield from _on_sizes(objects, settings)
-        yield from _on_unrest(objects, settings)
-
-
-def _on_camera(shake: Shake, step: int, width: int, settings: Settings) -> Iterator[Advice]:
     if shake.px is None or shake.drift_px is None:
         text = "the picture has too little structure to tell whether the camera shakes"
         yield Advice("structure", False, text)
         return
     threshold = set_option(_THRESHOLD, _SHAKE_THRESHOLD)
-    text = f"the camera shakes by {shake.px:.1f} px from one picture to the next"
-    if shake.drift_px > _PAN * width:
+    text = f"the camera shakes by {shake.px:.1f} px from one picture to the next: edges become false vehicles"
+    if shake.drift_px > _PAN * findings.width:
         text = f"the camera moved by {shake.drift_px:.0f} px while it was watched"
         yield Advice("pan", True, f"{text}: the scene is learnt again and again; vidtrack needs a fixed camera")
     elif shake.px / step > _STRONG_SHAKE_PX:
-        text = f"{text}: edges become false vehicles, and the reduced picture that would help hides small ones"
-        yield Advice("shake", True, f"{text}; fix its mount, until then", (scale_option(2 * step), threshold))
+        text = f"{text}; fix its mount. A reduced picture helps, and hides small vehicles"
+        yield Advice("shake", True, text, (scale_option(2 * step), threshold))
     elif shake.px / step > _SHAKE_PX and settings.detector.disturbance.luma_threshold < _SHAKE_THRESHOLD:
-        yield Advice("shake", True, f"{text}: edges become false vehicles; fix its mount, until then", (threshold,))
+        yield Advice("shake", True, f"{text}; fix its mount, until then", (threshold,))
+
+
+def on_objects(findings: Findings, settings: Settings) -> Iterator[Advice]:
+    """What moves, of a camera that stands still and sees well."""
+    if findings.objects is not None:
+        yield from _on_sizes(findings.objects, settings)
+        yield from _on_unrest(findings.objects, settings)
 
 
 def _on_sizes(objects: Objects, settings: Settings) -> Iterator[Advice]:

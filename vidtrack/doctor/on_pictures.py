@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vidtrack.config import Settings
+from vidtrack.config import DisturbanceSettings, Settings
 from vidtrack.doctor.advice import Advice, scale_option, set_option
 from vidtrack.doctor.findings import Findings
 from vidtrack.video.background.picture import reduction
@@ -22,11 +22,18 @@ _CLIPPED = 0.15  # of the picture
 _BLOCKS = 1.3
 
 
+def on_noise(findings: Findings, settings: Settings) -> Iterator[Advice]:
+    """The sensor's noise."""
+    step = reduction(findings.height, settings.source.scale)
+    if findings.light is not None and findings.light.noise / step > _NOISE:
+        text = f"each pixel varies by {findings.light.noise:.0f} grey levels: noise is taken for traffic"
+        yield Advice("noise", True, f"{text}; a reduced picture averages it", (scale_option(2 * step),))
+
+
 def on_pictures(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """Everything that has to do with how the pictures look."""
+    """Light, lamps and compression."""
     if findings.light is not None:
         yield from _on_light(findings.light, settings)
-        yield from _on_noise(findings.light.noise, reduction(findings.height, settings.source.scale))
         if findings.flicker is not None:
             yield from _on_flicker(findings.flicker, findings.light, settings)
     if findings.blockiness is not None and findings.blockiness > _BLOCKS:
@@ -36,7 +43,7 @@ def on_pictures(findings: Findings, settings: Settings) -> Iterator[Advice]:
 
 def _on_light(light: Light, settings: Settings) -> Iterator[Advice]:
     now = settings.detector.disturbance.luma_threshold
-    fitting = max(_LEAST_THRESHOLD, round(now * light.bright / _DAYLIGHT))
+    fitting = max(_LEAST_THRESHOLD, round(DisturbanceSettings().luma_threshold * light.bright / _DAYLIGHT))
     if light.bright < _BLACK:
         text = (
             f"the picture is black, 95 % of it below {light.bright:.0f} of 255: no setting finds vehicles without lamps"
@@ -50,12 +57,6 @@ def _on_light(light: Light, settings: Settings) -> Iterator[Advice]:
     if light.white_share > _CLIPPED:
         text = f"{light.white_share:.0%} of the picture is white: bright vehicles cannot be seen there"
         yield Advice("glare", False, f"{text}; a shorter exposure would show them")
-
-
-def _on_noise(noise: float, step: int) -> Iterator[Advice]:
-    if noise / step > _NOISE:
-        text = f"each pixel varies by {noise:.0f} grey levels: noise is taken for traffic"
-        yield Advice("noise", True, f"{text}; a reduced picture averages it", (scale_option(2 * step),))
 
 
 def _on_flicker(flicker: Flicker, light: Light, settings: Settings) -> Iterator[Advice]:

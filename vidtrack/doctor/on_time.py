@@ -56,7 +56,7 @@ def _on_rate(findings: Findings, timing: Timing) -> Iterator[Advice]:
         text = f"the camera promises {findings.fps:.3g} frames/s and gives {timing.rate:.3g}"
         yield Advice("promise", True, f"{text}: long exposure in the dark, or a weak network")
     if timing.rate < _SLOW:
-        text = f"{timing.rate:.3g} frames/s: vehicles jump by more than their length from one picture to the next"
+        text = f"{timing.rate:.3g} frames/s: fast vehicles jump by more than their length from one picture to the next"
         yield Advice("slow", True, f"{text}; take 10 or more")
     if timing.repeated_share > _REPEATED:
         true_rate = timing.rate * (1 - timing.repeated_share)
