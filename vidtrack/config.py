@@ -330,7 +330,7 @@ def load(
             raise ConfigError(f"cannot read settings {path}: {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{path} is not valid TOML: {error}") from None
-    tree = _over(base or {}, tree)
+    tree = merged(base or {}, tree)
     for assignment in assignments:
         name, value = _split(assignment) if isinstance(assignment, str) else assignment
         _assign(tree, name.split("."), value)
@@ -345,11 +345,11 @@ def parse(tree: Mapping[str, Any]) -> Settings:
         raise ConfigError("\n".join(_complaint(detail) for detail in error.errors())) from None
 
 
-def _over(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
-    """`tree` where it says something, `base` elsewhere."""
+def merged(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested settings: `tree` where it says something, `base` elsewhere."""
     both = dict(base) | dict(tree)
     groups = (name for name in tree if isinstance(base.get(name), dict) and isinstance(tree[name], dict))
-    return both | {name: _over(base[name], tree[name]) for name in groups}
+    return both | {name: merged(base[name], tree[name]) for name in groups}
 
 
 def _split(assignment: str) -> tuple[str, Any]:

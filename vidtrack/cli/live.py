@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,8 @@ from vidtrack.cli.options import common, settings_options, start_log
 from vidtrack.cli.tracking import chosen_settings, tracking_options
 
 if TYPE_CHECKING:
+    from vidtrack.config import Settings
+    from vidtrack.live.outputs import Extras
     from vidtrack.output.status import LiveStatus
     from vidtrack.serve.page import Page
 
@@ -31,7 +34,7 @@ Examples:
   vidtrack live rtsp://USER:PASSWORD@192.168.1.20/stream -o cam1 --roll 1h --keep 7d --state cam1.state
   vidtrack live http://camera.local/video.mjpg --http 8080 --record tape --end 600""",
 )
-@click.argument("source")
+@click.argument("sources", metavar="SOURCE...", nargs=-1, required=True)
 @common("Folder for the results.  [default: runs/NAME]")
 @settings_options
 @tracking_options
@@ -49,7 +52,7 @@ Examples:
     help="The page's password; a must where other machines can see it.",
 )
 def command(
-    source: str,
+    sources: tuple[str, ...],
     output: Path | None,
     seed: int,
     force: bool,
@@ -66,8 +69,10 @@ def command(
     http: str | None,
     http_token: str | None,
     **chosen: Any,
-) -> None:
+) -> int:
     """Track the vehicles that SOURCE sees: a camera's index, a V4L2 device, or an rtsp:// or http:// stream.
+
+    Several SOURCEs, or a file cameras.toml that lists them, get a process and a sub-folder each.
 
     The newest frame is tracked and older ones are dropped when the machine is too slow. A lost camera is opened
     again for as long as it takes. Ctrl-C and SIGTERM end the run, with exit code 0.
@@ -76,40 +81,57 @@ def command(
     the time in UTC. Times are seconds since the first picture. What --record keeps, vidtrack track repeats.
     """
     from vidtrack.cli.hide import hide_arguments
-    from vidtrack.cli.signals import Terminated, stopping
+    from vidtrack.cli.live_many import are_many, track_many
+    from vidtrack.cli.signals import Terminated
     from vidtrack.compiled import first_run
     from vidtrack.config import load
     from vidtrack.live.outputs import Extras
-    from vidtrack.live.run import LiveRun
-    from vidtrack.serve.camera import Camera
     from vidtrack.video.live.address import secrets
 
-    hide_arguments([*secrets(source), *([http_token] if http_token else [])])
+    hide_arguments([*(text for source in sources for text in secrets(source)), *([http_token] if http_token else [])])
     start_log(verbose, quiet)
-    settings = load(config_file, [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)])
+    given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
+    settings = load(config_file, given)
     if first_run() and not quiet:
         click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
     extras = Extras(rerun, video, save_masks, decisions, state, record)
     try:
-        with (
-            _page(http, http_token) as page,
-            LiveRun(source, settings, output, extras, force=force) as run,
-            stopping(run.stop),
-        ):
-            if page is not None:
-                page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
-                if not quiet:
-                    click.echo(f"vidtrack: the page is at {page.url}", err=True)
-            told_s = time.monotonic()
-            for _ in run:
-                if not quiet and time.monotonic() - told_s > _TELL_S:
-                    told_s = time.monotonic()
-                    click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
-            if not quiet:
-                click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
+        with _page(http, http_token) as page:
+            if page is not None and not quiet:
+                click.echo(f"vidtrack: the page is at {page.url}", err=True)
+            if are_many(sources):
+                log = partial(start_log, verbose, quiet)
+                return track_many(sources, output, extras, config_file, given, page, log, force=force, quiet=quiet)
+            _track_one(sources[0], settings, output, extras, page, force=force, quiet=quiet)
     except (KeyboardInterrupt, Terminated):
         click.echo("vidtrack: stopped before the first picture, or at once", err=True)
-        return
+    return 0
+
+
+def _track_one(
+    source: str,
+    settings: Settings,
+    output: Path | None,
+    extras: Extras,
+    page: Page | None,
+    *,
+    force: bool,
+    quiet: bool,
+) -> None:
+    from vidtrack.cli.signals import stopping
+    from vidtrack.live.run import LiveRun
+    from vidtrack.serve.camera import Camera
+
+    with LiveRun(source, settings, output, extras, force=force) as run, stopping(run.stop):
+        if page is not None:
+            page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
+        told_s = time.monotonic()
+        for _ in run:
+            if not quiet and time.monotonic() - told_s > _TELL_S:
+                told_s = time.monotonic()
+                click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
+        if not quiet:
+            click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
     click.echo(run.folder)
 
 

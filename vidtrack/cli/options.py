@@ -35,11 +35,12 @@ def common(output_help: str) -> Callable[[Function], Function]:
     return decorate
 
 
-def start_log(verbose: int, quiet: bool) -> None:
-    """Warnings of the library to stderr, in the form of our own messages."""
+def start_log(verbose: int, quiet: bool, who: str = "") -> None:
+    """Warnings of the library to stderr, in the form of our own messages; `who`: the camera that they are about."""
     level = logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
     handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("vidtrack: %(levelname)s: %(message)s"))
+    about = f"{who}: " if who else ""
+    handler.setFormatter(logging.Formatter(f"vidtrack: {about}%(levelname)s: %(message)s"))
     logging.addLevelName(logging.WARNING, "warning")
     logging.addLevelName(logging.INFO, "info")
     logger = logging.getLogger("vidtrack")

@@ -1,0 +1,108 @@
+"""`vidtrack live` with several cameras: one line for each now and then, one table at the end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from vidtrack.live.many import Many, Worker
+    from vidtrack.live.outputs import Extras
+    from vidtrack.serve.page import Page
+
+_TELL_S = 60.0
+_LOOK_S = 0.5
+
+
+def are_many(sources: Sequence[str]) -> bool:
+    """Whether these are several cameras, or a list of them."""
+    return len(sources) > 1 or sources[0].lower().endswith(".toml")
+
+
+def track_many(
+    sources: Sequence[str],
+    output: Path | None,
+    extras: Extras,
+    config_file: Path | None,
+    assignments: Iterable[str | tuple[str, Any]],
+    page: Page | None,
+    start_log: Callable[[str], None],
+    *,
+    force: bool,
+    quiet: bool,
+) -> int:
+    """Track all until a signal; the exit code is 0 unless every camera failed by itself."""
+    from vidtrack.cli.signals import stopping
+    from vidtrack.live.cameras import extras_of, listed, named, settings_of
+    from vidtrack.live.many import Many
+    from vidtrack.live.worker import Job
+    from vidtrack.output.folder import open_run, usable
+
+    for_all: Mapping[str, Any] = {}
+    if len(sources) == 1:
+        cameras, for_all = listed(Path(sources[0]))
+    else:
+        cameras = named(sources)
+    wanted = [(camera, settings_of(camera, for_all, config_file, assignments)) for camera in cameras]
+    own = [extras_of(camera, extras) for camera in cameras]
+    folder = open_run(None, "live", force) if output is None else usable(output)
+    jobs = [
+        Job(camera.name, camera.address, settings, folder / camera.name, extra, force, start_log)
+        for (camera, settings), extra in zip(wanted, own, strict=True)
+    ]
+    with Many(jobs, folder) as many, stopping(many.stop):
+        if page is not None:
+            _show(page, many)
+        told_s = time.monotonic()
+        while many.running(_LOOK_S):
+            if not quiet and time.monotonic() - told_s > _TELL_S:
+                told_s = time.monotonic()
+                for name, worker in many.workers.items():
+                    click.echo(f"{name}: {_line(worker)}", err=True)
+    if not quiet:
+        _print_table(many)
+    click.echo(folder)
+    codes = [worker.exit_code or 0 for worker in many.workers.values() if worker.error]
+    return max(1, *codes) if len(codes) == len(jobs) else 0
+
+
+def _show(page: Page, many: Many) -> None:
+    from vidtrack.serve.camera import Camera
+
+    page.show(
+        {
+            name: Camera(worker.status, worker.picture, stale_s=2 * worker.job.settings.live.timeout_s)
+            for name, worker in many.workers.items()
+        }
+    )
+
+
+def _line(worker: Worker) -> str:
+    """A camera in one line."""
+    if worker.error is not None:
+        return f"ended: {worker.error}"
+    status = worker.status()
+    if "frame" not in status:
+        return str(status["state"])
+    reading = status["reading"]
+    return (
+        f"frame {status['frame']}, {reading['fps_in']:.1f} frames/s in, {status['fps_out']:.1f} tracked, "
+        f"{reading['frames_dropped']} dropped, {reading['reconnects']} reconnects"
+    )
+
+
+def _print_table(many: Many) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls")
+    summary = many.summary()
+    table = Table("camera", *(name.replace("frames_", "") for name in columns), "end")
+    for name, camera in summary["cameras"].items():
+        table.add_row(name, *(str(camera.get(column, "")) for column in columns), camera.get("error", "well"))
+    table.add_row("all", *(str(summary[column]) for column in columns), "", style="bold")
+    Console(stderr=True).print(table)
