@@ -76,6 +76,27 @@ def test_singular_covariance_is_refused_in_any_dimension(dim):
         Scan(0.0, np.zeros((1, dim)), R)
 
 
+@pytest.mark.parametrize(
+    ("noise", "complaint"),
+    [(np.nan * EYE, "finite"), ([[1, 2], [0, 1]], "symmetric"), (-EYE, "positive definite")],
+)
+def test_noise_is_a_covariance_too(noise, complaint):
+    with pytest.raises(ScanError, match=f"^noise is not {complaint}"):
+        Scan(0.0, np.zeros((3, 2)), EYE, noise=noise)
+    with pytest.raises(ScanError, match=f"^R is not {complaint}"):  # one for all, though there are none
+        Scan(0.0, np.empty((0, 2)), noise)
+
+
+def test_runs_are_numbered_from_zero():
+    with pytest.raises(ScanError, match="run of measurement 1 is -1"):
+        Scan(0.0, np.zeros((3, 2)), EYE, run=[0, -1, 2])
+
+
+def test_a_class_that_is_no_number_is_refused():
+    with pytest.raises(ScanError, match="label of measurement 1 is not finite"):
+        Scan(0.0, np.zeros((2, 2)), EYE, label=[1.0, np.nan])
+
+
 @given(scale=st.sampled_from([1e-12, 1e-6, 1.0, 1e6, 1e12]))
 @settings(deadline=None)
 def test_units_do_not_decide_what_is_a_covariance(scale):

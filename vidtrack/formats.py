@@ -36,6 +36,10 @@ NUMBER_COLUMNS = (
 )
 
 
+MOST_FRAMES = 10_000_000
+"""Days of video. A frame number above is a slip, or a time; every frame up to it would be an empty scan."""
+
+
 @dataclass(frozen=True, slots=True)
 class Table:
     """Rows of tracks, truth or detections; one row an object in a frame.
@@ -90,6 +94,8 @@ def read(path: str | Path) -> Table:
         start = file.read(4096)
     if start[:4] == b"PAR1":
         return read_parquet(path)
+    if b"\0" in start:
+        raise FormatError(f"{path} is no table of tracks: it is not text, and not Parquet")
     if not start.strip():
         return read_csv(path) if path.suffix.lower() == ".csv" else read_mot(path)
     return read_mot(path) if _is_number(start.replace(b",", b" ").split()[0]) else read_csv(path)
@@ -135,6 +141,7 @@ def read_mot(path: str | Path) -> Table:
     frame = _whole("frame", values[:, 0], place)
     identity = _whole("id", values[:, 1], place)
     _refuse(frame < 1, "frame", frame, "MOT frames count from 1", place)
+    _refuse(frame > MOST_FRAMES, "frame", frame, f"at most {MOST_FRAMES} are read", place)
     _refuse(
         np.minimum(values[:, 4], values[:, 5]) < 0, "width, height", values[:, 4:6], "neither may be negative", place
     )

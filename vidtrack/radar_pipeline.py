@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vidtrack.associate.gate import Gate
+from vidtrack.associate.methods import STRENGTH
 from vidtrack.config import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.filters import estimator, motion
@@ -31,9 +32,13 @@ def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 
 def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False, seed: int = 0) -> Tracker:
     """The tracker that the settings describe, for these measurements in metres; the seed is for particles.
 
-    Raises ConfigError for a filter that cannot be smoothed.
+    Raises ConfigError for a filter that cannot be smoothed, or a method that needs amplitudes where there are none.
     """
     radar, common = settings.radar, settings.tracker
+    if common.method in STRENGTH and found.amplitude is None:
+        raise ConfigError(
+            f"the plots have no amplitudes, by which {common.method} chooses; take another method (gnn, jpda, mht)"
+        )
     if settings.output.smooth and radar.estimator == "alpha-beta":
         raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
     return Tracker(

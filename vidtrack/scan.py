@@ -46,10 +46,10 @@ class Scan:
     box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre)
     amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class, -1 unknown:
                a track whose class is known takes no measurement of another
-    run        (M,) Monte Carlo run of each measurement; pairs form within equal runs only
+    run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form within equal runs only
 
-    Raises ScanError for wrong shapes, NaN or infinite numbers, and covariances that are not
-    symmetric positive definite.
+    Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
+    definite, and runs below 0.
     """
 
     t: float
@@ -82,6 +82,8 @@ class Scan:
             noise = R.mean(axis=0)
         if noise is not None and noise.shape != (dim, dim):
             raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
+        if noise is not None and (self.noise is not None or not count):  # no measurement has vouched for it
+            _refuse_no_covariance(noise[None], "R" if self.noise is None else "noise")
         object.__setattr__(self, "noise", noise)
         object.__setattr__(self, "t", float(self.t))
         object.__setattr__(self, "z", z)
@@ -96,7 +98,7 @@ class Scan:
             value = getattr(self, name)
             if value is None:
                 continue
-            value = np.ascontiguousarray(value, dtype=kind)
+            value = np.asarray(value)
             if value.shape != shape:
                 raise ScanError(f"{name} must be {shape} to match z, not {value.shape}")
             if not np.isfinite(value).all():
@@ -104,7 +106,10 @@ class Scan:
                 raise ScanError(
                     f"{name} of measurement {i} is not finite: {value[i]}; leave {name} out where it is unknown"
                 )
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, np.ascontiguousarray(value, dtype=kind))
+        if self.run is not None and self.run.min(initial=0) < 0:
+            i = int(np.argmin(self.run))
+            raise ScanError(f"run of measurement {i} is {self.run[i]}; runs are numbered from 0")
 
     def __len__(self) -> int:
         return len(self.z)
@@ -129,12 +134,21 @@ def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
     if not finite.all():
         i = int(np.argmin(finite))
         raise ScanError(f"measurement {i} is not finite: z={z[i]}, R={R[i].tolist()}; drop it before the scan is made")
+    _refuse_no_covariance(R, "R of measurement {}")
+
+
+def _refuse_no_covariance(R: Floats, name: str) -> None:
+    """Raise ScanError for the first of (B, m, m) that is none; {} in its name stands for its number."""
+    finite = np.isfinite(R).all(axis=(1, 2))
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ScanError(f"{name.format(i)} is not finite: {R[i].tolist()}")
     scale = np.abs(R).max(axis=(1, 2), initial=0.0)
     symmetric = np.abs(R - np.swapaxes(R, 1, 2)).max(axis=(1, 2), initial=0.0) <= 1e-9 * scale
     if not symmetric.all():
         i = int(np.argmin(symmetric))
-        raise ScanError(f"R of measurement {i} is not symmetric: {R[i].tolist()}")
-    if z.shape[1] == 2:  # the common case without a decomposition
+        raise ScanError(f"{name.format(i)} is not symmetric: {R[i].tolist()}")
+    if R.shape[1] == 2:  # the common case without a decomposition
         determinant = R[:, 0, 0] * R[:, 1, 1] - R[:, 0, 1] * R[:, 1, 0]
         positive = (R[:, 0, 0] > 0) & (determinant > 1e-14 * scale**2)
     else:
@@ -142,9 +156,7 @@ def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
         positive = smallest > 1e-14 * scale
     if not positive.all():
         i = int(np.argmin(positive))
-        raise ScanError(
-            f"R of measurement {i} is not positive definite: {R[i].tolist()}; give it a variance above zero"
-        )
+        raise ScanError(f"{name.format(i)} is not positive definite: {R[i].tolist()}; give it a variance above zero")
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from vidtrack.simulate import simulate
 from vidtrack.simulate.video_write import write_truth
 
 FPS = 15
+SECONDS = 7.0  # of each clip are looked at
 THRESHOLD = "detector.disturbance.luma_threshold"
 
 
@@ -37,6 +38,8 @@ def write(path, pictures, fps=FPS, stamps_ms=None):
     with av.open(str(path), "w") as container:
         stream = container.add_stream("ffv1", rate=fps)
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        if stamps_ms is not None:
+            stream.codec_context.time_base = Fraction(1, 1000)
         for k, picture in enumerate(pictures):
             levels = np.clip(np.rint(picture), 0, 255).astype(np.uint8)
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(levels), format="bgr24")
@@ -47,13 +50,14 @@ def write(path, pictures, fps=FPS, stamps_ms=None):
     return str(path)
 
 
-def advice_on(source, *assignments):
+def advice_on(source, *assignments, seconds=SECONDS):
     settings = load(assignments=assignments)
-    return {advice.name: advice for advice in judge(examine(source, settings), settings)}
+    return {advice.name: advice for advice in judge(examine(source, settings, seconds), settings)}
 
 
-def problems_of(source, *assignments):
-    return {name: advice.options for name, advice in advice_on(source, *assignments).items() if advice.problem}
+def problems_of(source, *assignments, seconds=SECONDS):
+    found = advice_on(source, *assignments, seconds=seconds)
+    return {name: advice.options for name, advice in found.items() if advice.problem}
 
 
 def flickering(pictures, amplitude, rows=0.0):
@@ -73,8 +77,8 @@ def test_a_clean_clip_is_left_alone(clean, tmp_path):
 
 def test_the_advice_is_no_longer_given_once_it_is_followed(clean, tmp_path):
     source = write(tmp_path / "clip.mkv", [0.5 * p for p in clean])
-    assert problems_of(source) == {"dark": (f"--set {THRESHOLD}=8",)}
-    assert problems_of(source, f"{THRESHOLD}=8") == {}
+    assert problems_of(source) == {"dark": (f"--set {THRESHOLD}=7",)}
+    assert problems_of(source, f"{THRESHOLD}=7") == {}
 
 
 @pytest.mark.parametrize(
@@ -116,7 +120,7 @@ def test_a_camera_that_pans(clean, tmp_path):
 def test_objects_that_are_too_small(tmp_path):
     pictures = list(simulate("junction", size=(120, 90)))
     expected = {"tiny": ("--set detector.disturbance.majority_px=5",)}
-    assert problems_of(write(tmp_path / "clip.mkv", pictures)) == expected
+    assert problems_of(write(tmp_path / "clip.mkv", pictures), seconds=10.0) == expected
 
 
 def test_a_reduced_picture_that_makes_them_too_small(clean, tmp_path):
@@ -150,11 +154,10 @@ def test_images_carry_no_rate(clean, tmp_path):
 def test_a_wrong_header_is_told_and_does_no_harm(clean, tmp_path):
     stamps = [round(1000 * k / FPS) for k in range(len(clean))]
     source = write(tmp_path / "clip.mkv", clean, fps=60, stamps_ms=stamps)
-    findings = examine(source, load())
-    assert findings.timing.rate == pytest.approx(FPS, rel=0.01)
-    if findings.reception.header_fps != pytest.approx(FPS, rel=0.05):
-        assert not advice_on(source)["header"].problem
-    assert problems_of(source) == {}
+    found = advice_on(source)
+    assert "says 60 frames/s, the pictures' times 15" in found["header"].text
+    assert not found["header"].problem
+    assert set(found) == {"header"}
 
 
 def test_gaps_longer_than_tracks_live(clean, tmp_path):
@@ -167,8 +170,9 @@ def test_a_variable_rate_is_told_and_does_no_harm(clean, tmp_path):
     random = np.random.default_rng(0)
     stamps = np.cumsum(random.integers(50, 85, len(clean))).tolist()
     source = write(tmp_path / "clip.mkv", clean, stamps_ms=stamps)
-    assert not advice_on(source)["variable rate"].problem
-    assert problems_of(source) == {}
+    found = advice_on(source)
+    assert not found["variable rate"].problem
+    assert set(found) == {"variable rate"}
 
 
 def test_pictures_that_are_repeated(clean, tmp_path):

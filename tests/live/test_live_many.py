@@ -122,7 +122,7 @@ def test_cameras_that_all_fail_end_the_run(tmp_path):
     nobody = "http://u:geheim@127.0.0.1:9/x"
     sets = [part for assignment in QUICK for part in ("--set", assignment)]
     process = start("live", nobody, nobody, "/dev/video77", "-o", "out", *sets, cwd=tmp_path)
-    output, talk = process.communicate(timeout=60)
+    _, talk = process.communicate(timeout=60)
     assert process.returncode == 3, talk
     assert "geheim" not in talk
     assert "Traceback" not in talk

@@ -153,6 +153,8 @@ def test_a_track_ends_where_the_picture_ends():
         {"confirm_window": 64},
         {"coast_s": None, "coast_scans": None},
         {"coast_scans": -1},
+        {"coast_s": -1.0},
+        {"coast_s": float("nan")},
     ],
 )
 def test_a_life_that_makes_no_sense_is_refused(bad):

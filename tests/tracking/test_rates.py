@@ -96,3 +96,20 @@ def test_numbers_for_each_run_stay_with_their_run_when_tracks_die():
     given = Rates(detection, 1e-3).of(tracks.run)
     np.testing.assert_array_equal(given[0], [0.5, 0.9])
     assert given[1] == 1e-3
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"detection_probability": -0.1},
+        {"detection_probability": np.array([0.5, 1.5])},
+        {"detection_probability": np.nan},
+        {"clutter_density": -1e-5},
+        {"clutter_density": np.inf},
+        {"clutter_density": None, "surveyed": 0.0},
+        {"box_s": 0.0},
+    ],
+)
+def test_what_is_no_rate_is_refused(given):
+    with pytest.raises(vt.ConfigError, match="it must"):
+        vt.Tracker(**given)

@@ -219,6 +219,13 @@ def test_known_states_can_be_put_in():
     np.testing.assert_allclose(tracks.xy, [[6.0, 7.0]], atol=0.1)
 
 
+def test_an_id_that_was_given_is_not_given_again():
+    tracker = Tracker()
+    tracker.add(0.0, np.zeros((1, 4)), np.eye(4)[None], ids=np.array([7]))
+    tracks = tracker.step(Scan(0.0, np.array([[0.0, 0.0], [50.0, 50.0]]), EYE))
+    assert tracks.id.tolist() == [7, 8]
+
+
 def test_choices_tell_who_was_taken_and_who_came_second():
     tracker = Tracker(ConstantVelocity(speed=1.0), explain=True)
     tracker.step(Scan(0.0, np.zeros((1, 2)), EYE))

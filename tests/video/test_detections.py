@@ -60,7 +60,8 @@ def test_scores_count_by_their_order_only(tmp_path):
 
     np.testing.assert_allclose(scores([0.1, 0.9, 0.4, 0.4]), [0.25, 1, 0.75, 0.75])
     np.testing.assert_allclose(scores([-1, 140, 30, 30]), [0.25, 1, 0.75, 0.75])
-    np.testing.assert_allclose(scores([1, 1]), [1, 1])
+    assert scores([1, 1]) is None, "no score tells one from the other"
+    assert scores([0.3]) is None
 
 
 def test_seqinfo_gives_rate_size_and_length(det):
@@ -94,7 +95,7 @@ def test_start_and_end(det):
 
 
 @pytest.mark.parametrize(
-    "line", ["2,-1,a,5,6,7,1", "2,-1,5,6", "0,-1,1,1,5,5,1", "2,-1,nan,1,5,5,1", "2,-1,1,1,-5,5,1"]
+    "line", ["2,-1,a,5,6,7,1", "2,-1,5,6", "0,-1,1,1,5,5,1", "2,-1,nan,1,5,5,1", "2,-1,1,1,-5,5,1", "1e10,-1,1,1,5,5,1"]
 )
 def test_malformed_line_is_named(det, line):
     det.write_text(LINES + line + "\n")

@@ -20,3 +20,6 @@ METHODS: dict[str, Callable[[], Associator]] = {
     "jpda": JPDA,
 }
 """What an associator needs to know comes with each problem."""
+
+STRENGTH = ("sn", "psn")
+"""Those that choose by amplitude or score, and refuse scans with neither."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vidtrack.cli.options import settings_options, start_log
+from vidtrack.cli.options import common, settings_options, start_log
 
 if TYPE_CHECKING:
     from vidtrack.doctor.advice import Advice
@@ -35,14 +35,16 @@ Examples:
 @click.option("--fps", type=float, metavar="N", help="As for track: the true rate.")
 @click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
 @click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
-@click.option("--quiet", is_flag=True, help="Only the exit code, and --json.")
-@click.option("-v", "--verbose", count=True, help="Say more; twice: everything.")
+@common("Folder for doctor.json.  [default: only printed]")
 def command(
     source: str,
     seconds: float,
     config_file: Path | None,
     assignments: tuple[str, ...],
     json_to: str | None,
+    output: Path | None,
+    seed: int,
+    force: bool,
     quiet: bool,
     verbose: int,
     **chosen: Any,
@@ -58,6 +60,7 @@ def command(
     from vidtrack.config import load
     from vidtrack.doctor.examine import examine
     from vidtrack.doctor.judge import judge
+    from vidtrack.output.folder import open_run
     from vidtrack.video.live.address import secrets
 
     hide_arguments(secrets(source))
@@ -66,8 +69,11 @@ def command(
     settings = load(config_file, [*assignments, *given])
     if first_run() and not quiet:
         click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+    folder = None if output is None else open_run(output, "doctor", force)
     findings = examine(source, settings, seconds)
     advice = judge(findings, settings)
+    if folder is not None:
+        write_json(_content(findings, advice), str(folder / "doctor.json"))
     if json_to is not None:
         write_json(_content(findings, advice), json_to)
     if json_to != "-" and not quiet:

@@ -49,11 +49,23 @@ def start_log(verbose: int, quiet: bool, who: str = "") -> None:
     logger.setLevel(min(level, logging.WARNING))
 
 
+def _recording(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
+    """Where --rerun records to; a slip of the pen in "spawn" is no file."""
+    if value is None or value in ("spawn", "serve") or value.endswith(".rrd"):
+        return value
+    raise click.BadParameter(f"{value!r} is not FILE.rrd, spawn or serve.")
+
+
 def association_options(function: Function) -> Function:
     """--method, --distance, --rerun, --decisions: what tracking pictures and tracking plots have in common."""
     for option in (
         click.option("--decisions", is_flag=True, help="Write why each track got what it got."),
-        click.option("--rerun", metavar="FILE.rrd|spawn|serve", help="Record or show everything in rerun."),
+        click.option(
+            "--rerun",
+            metavar="FILE.rrd|spawn|serve",
+            callback=_recording,
+            help="Record or show everything in rerun.",
+        ),
         click.option(
             "--distance",
             type=click.Choice(["mahalanobis", "decoupled", "euclidean"]),

@@ -70,8 +70,9 @@ class Worker:
 
     def stop(self) -> None:
         """Tell it to end; without waiting."""
-        self._told = True
-        self._process.terminate()
+        if self.exit_code is None:
+            self._told = True
+            self._process.terminate()
 
     def kill(self) -> None:
         """End it at once."""

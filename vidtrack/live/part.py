@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
+import pyarrow as pa
+
 from vidtrack.errors import StoppedEarly
 from vidtrack.output.counts import HEADER
 from vidtrack.output.decisions import DecisionLog
@@ -85,6 +87,7 @@ class Part:
 
     def _add_parquet(self) -> None:
         write_parquet(self.folder / "tracks.parquet", schema(VIDEO), [read_tracks(self._tracks.path)])
+        pa.default_memory_pool().release_unused()
 
 
 def count(summary: Summary, steps: Sequence[Step]) -> None:

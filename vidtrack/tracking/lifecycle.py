@@ -130,6 +130,8 @@ def refuse_immortal(coast_s: float | None, coast_scans: int | None) -> None:
     """Raise ConfigError where a track would never end for want of evidence."""
     if coast_s is None and coast_scans is None:
         raise ConfigError("tracks would never be deleted: give coast_s or coast_scans")
+    if coast_s is not None and not coast_s >= 0:
+        raise ConfigError(f"coast_s is {coast_s}; it must not be negative")
     if coast_scans is not None and not 1 <= coast_scans <= 62:
         raise ConfigError(f"coast_scans is {coast_scans}; it must lie in 1..62")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.errors import ConfigError
 from vidtrack.scan import MERGED, TENTATIVE, Decision, Floats, Ints, Scan
 from vidtrack.tracking.register import Register
 
@@ -27,11 +28,19 @@ class Rates:
     P_D: scans in which tracks were seen, of all scans of confirmed tracks that share no blob. Misses count once the
     track is seen again: those of a target that has gone say nothing of how well targets are seen. Clutter: what
     confirmed tracks leave, one measurement before the first scan included. Old scans are forgotten exponentially.
+
+    Raises ConfigError for numbers that are no probability, density or area.
     """
 
     STATE = ("hits", "trials", "false", "scans", "low", "high")
 
     def __init__(self, detection: Rate = 0.9, clutter: Rate = 1e-5, space: float | None = None) -> None:
+        if detection is not None and not np.all((np.asarray(detection) >= 0) & (np.asarray(detection) <= 1)):
+            raise ConfigError(f"detection probability is {detection}; it must lie in 0..1")
+        if clutter is not None and not np.all((np.asarray(clutter) >= 0) & np.isfinite(clutter)):
+            raise ConfigError(f"clutter density is {clutter}; it must be finite and not negative")
+        if space is not None and not 0 < space < np.inf:
+            raise ConfigError(f"surveyed area is {space}; it must be finite and above zero")
         self._detection = detection
         self._clutter = clutter
         self._space = space

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from vidtrack.associate.adaptive import thresholded
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.associate.trust import EQUAL, Trust
-from vidtrack.errors import ScanError
+from vidtrack.detection.threshold import ThresholdController
+from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.model import Motion
@@ -59,10 +61,14 @@ class Tracker:
     births     whether measurements that belong to no track start one
     detection_probability, clutter_density [per px^2 or m^2]   for weights and existence probability: numbers, arrays
                (B,) with one for each Monte Carlo run, or None: estimated from the scans (`rates` has what they are)
+    threshold  sets the threshold on amplitudes for each track and scan, from its innovation covariance; P_D and clutter
+               density follow from it, whatever was given for them. None: measurements are taken as they are
     surveyed   area [px^2 or m^2] that the estimate of clutter is about; None: the picture, else where measurements lie
     box_s      time constant [s] with which a track's box follows its blobs' boxes
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
+
+    Raises ConfigError for numbers out of range.
     """
 
     STATE = ("t", "bank", "register", "sharing", "forest", "rates")
@@ -82,6 +88,7 @@ class Tracker:
         births: bool = True,
         detection_probability: Rate = 0.9,
         clutter_density: Rate = 1e-5,
+        threshold: ThresholdController | None = None,
         surveyed: float | None = None,
         box_s: float = 0.3,
         explain: bool = False,
@@ -98,10 +105,13 @@ class Tracker:
         self.life: Life = life or LifeCycle()
         self.shape = shape
         self.trust = trust or EQUAL
+        self.threshold = threshold
         self.births = births
         if surveyed is None and bounds:
             surveyed = bounds[0] * bounds[1]
         self.rates = Rates(detection_probability, clutter_density, surveyed)
+        if not box_s > 0:
+            raise ConfigError(f"box_s is {box_s}; it must be above zero")
         self.box_s = box_s
         self.explain = explain
         self.smooth = smooth
@@ -167,6 +177,7 @@ class Tracker:
         runs = np.zeros(count, np.int64) if run is None else run
         new = self.register.append(t, x[:, position], boxes, BELIEF, runs)
         self.register.id[first:] = new if ids is None else ids
+        self.register.next_id = max(self.register.next_id, 1 + int(self.register.id[first:].max(initial=0)))
         self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
         return self.register.id[first:].copy()
@@ -210,6 +221,8 @@ class Tracker:
             self.gate, zhat, cov, scan, *self.rates.of(self.register.run),
             run=self.register.run, label=self.register.label, angles=sensor.angles,
         )  # fmt: skip
+        if self.threshold is not None:
+            problem = thresholded(problem, self.threshold)
         if self.shape is None or blobs is None:
             return problem
         return replace(problem, pairs=self.shape.weigh(problem.pairs, self._boxes(), blobs))

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from vidtrack.associate.methods import STRENGTH
 from vidtrack.config import DetectionSettings, Settings
-from vidtrack.errors import SourceError
+from vidtrack.errors import ConfigError, SourceError
 from vidtrack.formats import read_mot
 from vidtrack.scan import Floats, Scan
 from vidtrack.tracking.boxes import longer
@@ -34,7 +35,11 @@ def is_detections(path: str) -> bool:
 
 
 def open_detections(path: str, settings: Settings) -> Detections:
-    """Read a MOT file of detections. Raises SourceError if it cannot be read, FormatError naming a bad line."""
+    """Read a MOT file of detections.
+
+    Raises SourceError if it cannot be read, FormatError naming a bad line, ConfigError for a method that needs scores
+    where there are none.
+    """
     return Detections(Path(path), settings)
 
 
@@ -46,7 +51,8 @@ class Detections:
 
     z is the centre of a box, R the square of its jitter (at least LEAST_SIGMA_PX). The score is the share
     of the file's detections that do not score higher: scales differ between detectors, only the order
-    counts. Frames without a line are empty scans, up to the sequence's length.
+    counts. Where all score the same, or nothing, scans have no scores. Frames without a line are empty scans, up to
+    the sequence's length.
     """
 
     def __init__(self, path: Path, settings: Settings) -> None:
@@ -59,6 +65,12 @@ class Detections:
         order = np.argsort(table.frame, kind="stable")
         self._frame, self._box = table.frame[order], table.box[order]
         self._score = _rank(table.conf)[order]
+        self._ranked = table.conf.min() < table.conf.max()
+        if settings.tracker.method in STRENGTH and not self._ranked:
+            raise ConfigError(
+                f"{path} has no scores that differ, by which {settings.tracker.method} chooses; "
+                "take another method (gnn, jpda, mht)"
+            )
         self.stats = SourceStats()
         info = read_sequence_info(path.parent)
         self.name = info.name or path.stem
@@ -76,7 +88,8 @@ class Detections:
             rows = slice(*np.searchsorted(self._frame, [index, index + 1]))
             time_s = index / self.fps
             self.stats.frames_read += 1
-            yield index, time_s, _scan(time_s, self._box[rows], self._score[rows], self.settings.jitter or JITTER)
+            score = self._score[rows] if self._ranked else None
+            yield index, time_s, _scan(time_s, self._box[rows], score, self.settings.jitter or JITTER)
 
 
 def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
@@ -85,7 +98,7 @@ def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
     return settings.model_copy(update=open_ones)
 
 
-def _scan(time_s: float, box: Floats, score: Floats, jitter: float) -> Scan:
+def _scan(time_s: float, box: Floats, score: Floats | None, jitter: float) -> Scan:
     """Boxes (M, 4) as measurements of their centres."""
     size = box[:, 2:]
     sigma = np.maximum(jitter * longer(box), LEAST_SIGMA_PX)

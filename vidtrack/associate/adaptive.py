@@ -1,0 +1,32 @@
+"""A detection threshold of each track's own, set scan by scan from its innovation covariance (paper 000)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from vidtrack.associate.problem import Problem
+from vidtrack.detection.amplitude import RAYLEIGH, detection_probability
+from vidtrack.detection.threshold import ThresholdController
+from vidtrack.errors import ScanError
+
+
+def thresholded(problem: Problem, controller: ThresholdController) -> Problem:
+    """What the problem is when each track sees only what exceeds its own threshold.
+
+    The controller sets P_F (T,) from S; P_D and clutter density (T,) become those of that threshold, P_F / V_c. The
+    scan holds what exceeded the controller's p_fa_max, with amplitudes in units of the noise.
+
+    Raises ScanError for a scan with measurements and without amplitudes.
+    """
+    scan = problem.scan
+    if scan.noise is None:  # an empty scan that does not say what it would have measured with
+        return problem
+    if scan.amplitude is None and len(scan):
+        raise ScanError("the scan has no amplitudes, which a threshold of each track's own needs; leave it out")
+    p_fa = controller.p_fa(problem.cov + scan.noise)
+    problem = replace(
+        problem, detection=detection_probability(p_fa, controller.snr), clutter=p_fa / controller.cell_volume
+    )
+    if scan.amplitude is None:
+        return problem
+    return problem.only(scan.amplitude[problem.pairs.measurement] >= RAYLEIGH.threshold(p_fa)[problem.pairs.row])
