@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from vidtrack.associate.strongest import StrongestNeighbour as StrongestNeighbour
     from vidtrack.config import Settings as Settings
     from vidtrack.config import load as load_settings  # noqa: F401
+    from vidtrack.detection.threshold import ThresholdController as ThresholdController
     from vidtrack.errors import ConfigError as ConfigError
     from vidtrack.errors import Error as Error
     from vidtrack.errors import FormatError as FormatError
@@ -23,8 +24,19 @@ if TYPE_CHECKING:
     from vidtrack.errors import ScanError as ScanError
     from vidtrack.errors import SourceError as SourceError
     from vidtrack.errors import StoppedEarly as StoppedEarly
+    from vidtrack.estimate.acceleration import ConstantAcceleration as ConstantAcceleration
+    from vidtrack.estimate.acceleration import Singer as Singer
+    from vidtrack.estimate.fixed_gain import FixedGainBank as FixedGainBank
+    from vidtrack.estimate.imm import IMMBank as IMMBank
+    from vidtrack.estimate.kalman import KalmanBank as KalmanBank
     from vidtrack.estimate.motion import ConstantVelocity as ConstantVelocity
+    from vidtrack.estimate.particle import ParticleBank as ParticleBank
+    from vidtrack.estimate.turn import CoordinatedTurn as CoordinatedTurn
+    from vidtrack.estimate.unscented import UnscentedBank as UnscentedBank
     from vidtrack.pipeline import track as track
+    from vidtrack.radar.sensors import PositionRangeRate as PositionRangeRate
+    from vidtrack.radar.sensors import RangeAzimuth as RangeAzimuth
+    from vidtrack.radar.sensors import RangeAzimuthElevation as RangeAzimuthElevation
     from vidtrack.radar_pipeline import track_plots as track_plots
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
@@ -40,8 +52,11 @@ if TYPE_CHECKING:
 
 _HOME = {
     "ConfigError": "errors",
+    "ConstantAcceleration": "estimate.acceleration",
     "ConstantVelocity": "estimate.motion",
+    "CoordinatedTurn": "estimate.turn",
     "Error": "errors",
+    "FixedGainBank": "estimate.fixed_gain",
     "FormatError": "errors",
     "Formation": "tracking.formation",
     "GNN": "associate.hard",
@@ -50,25 +65,34 @@ _HOME = {
     "GreedyGNN": "associate.hard",
     "GroupTracker": "tracking.formation",
     "Groups": "tracking.groups",
+    "IMMBank": "estimate.imm",
     "JPDA": "associate.jpda",
+    "KalmanBank": "estimate.kalman",
     "LifeCycle": "tracking.lifecycle",
     "LogRatio": "tracking.log_ratio",
     "MHT": "tracking.mht",
     "NN": "associate.hard",
     "OutputError": "errors",
-    "PlotFormatError": "errors",
     "PDA": "associate.pda",
     "PSN": "associate.strongest",
+    "ParticleBank": "estimate.particle",
+    "PlotFormatError": "errors",
+    "PositionRangeRate": "radar.sensors",
+    "RangeAzimuth": "radar.sensors",
+    "RangeAzimuthElevation": "radar.sensors",
     "Scan": "scan",
     "ScanError": "errors",
     "Settings": "config",
+    "Singer": "estimate.acceleration",
     "SourceError": "errors",
     "Split": "tracking.splitting",
     "Status": "scan",
     "StoppedEarly": "errors",
     "StrongestNeighbour": "associate.strongest",
+    "ThresholdController": "detection.threshold",
     "Tracker": "tracking.tracker",
     "Tracks": "scan",
+    "UnscentedBank": "estimate.unscented",
     "load_settings": "config",
     "track": "pipeline",
     "track_plots": "radar_pipeline",

@@ -11,7 +11,7 @@ from types import TracebackType
 from vidtrack.config import Settings
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
-from vidtrack.output.folder import open_run
+from vidtrack.output.folder import begun
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.results import Results
 from vidtrack.output.sink import Step
@@ -52,12 +52,11 @@ class RadarRun:
         found = measurements(plots, settings.radar)
         tracker = build_radar_tracker(settings, found, explain=decisions or rerun is not None, seed=seed)
         self.name, self.scans = Path(path).stem, found.count
-        self.folder = open_run(output, self.name, force)
         account = {"plots": len(plots), "bad_rows": plots.bad_rows, "truncated": False}
-        summary = Summary(
-            self.folder / "summary.json", path, settings, lambda: account | tracker.rates.as_dict(), unit="scans"
-        )
-        with ExitStack() as stack:  # whatever fails below, what is open by then is closed
+        with begun(output, self.name, force) as self.folder, ExitStack() as stack:  # what fails below leaves nothing
+            summary = Summary(
+                self.folder / "summary.json", path, settings, lambda: account | tracker.rates.as_dict(), unit="scans"
+            )
             results = stack.enter_context(Results(summary))
             table = TrackTable(self.folder, RADAR if found.dim == 2 else RADAR_3D)
             plot = RadarPlot(self.folder / "tracks.png", settings.radar.position[:2])

@@ -12,7 +12,7 @@ from vidtrack.live.memory import Memory
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S, Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
-from vidtrack.output.folder import open_run
+from vidtrack.output.folder import begun
 from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
@@ -80,29 +80,29 @@ class Run:
                 self._steps = scan_steps(scans, tracker, settings.tracker.redundant)
             lines = parse_lines(settings.output.lines, opened.width, opened.height)
             self.name, self.frames = opened.name, opened.frames
-            self.folder = open_run(output, opened.name, force)
+            with begun(output, opened.name, force) as self.folder, ExitStack() as written:
+                counter = LineCounter(lines) if lines else None
+                summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
+                self._results = results = written.enter_context(Results(summary))
+                if counter is not None:
+                    results.add(CountsFile(self.folder / "counts.csv", counter))
+                plot = TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines)
+                hold_s = LIVE_HOLD_S if isinstance(opened, Recording) else HOLD_S
+                sinks = smoothed_first(settings.output, TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot)
+                results.add(Confirmed(*sinks, hold_s=hold_s))
+                if decisions:
+                    results.add(DecisionLog(self.folder / "decisions.csv"))
+                if masks is not None:
+                    results.add(Threaded(MaskFolder(masks)))
+                if video is not None:
+                    from vidtrack.output.video import AnnotatedVideo
 
-            counter = LineCounter(lines) if lines else None
-            summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
-            self._results = results = stack.enter_context(Results(summary))
-            if counter is not None:
-                results.add(CountsFile(self.folder / "counts.csv", counter))
-            plot = TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines)
-            hold_s = LIVE_HOLD_S if isinstance(opened, Recording) else HOLD_S
-            sinks = smoothed_first(settings.output, TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot)
-            results.add(Confirmed(*sinks, hold_s=hold_s))
-            if decisions:
-                results.add(DecisionLog(self.folder / "decisions.csv"))
-            if masks is not None:
-                results.add(Threaded(MaskFolder(masks)))
-            if video is not None:
-                from vidtrack.output.video import AnnotatedVideo
+                    results.add(Threaded(AnnotatedVideo(video, opened.fps, settings.output, lines)))
+                if rerun is not None:
+                    from vidtrack.output.rerun import RerunSink
 
-                results.add(Threaded(AnnotatedVideo(video, opened.fps, settings.output, lines)))
-            if rerun is not None:
-                from vidtrack.output.rerun import RerunSink
-
-                results.add(Threaded(RerunSink(rerun, shape, settings, lines)))
+                    results.add(Threaded(RerunSink(rerun, shape, settings, lines)))
+                stack.push(written.pop_all())
             self._open = stack.pop_all()
 
     def __iter__(self) -> Iterator[Step]:

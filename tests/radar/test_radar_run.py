@@ -16,7 +16,7 @@ from plot_files import GOOD, write
 
 from vidtrack import formats, score
 from vidtrack.cli.radar import command
-from vidtrack.config import load
+from vidtrack.config import Settings, TrackerSettings, load
 from vidtrack.errors import ConfigError, PlotFormatError
 from vidtrack.output.repair import repair
 from vidtrack.radar_pipeline import track_plots
@@ -194,6 +194,15 @@ def test_interrupted_results_are_complete_and_valid(tmp_path):
     assert summary["interrupted"] is True
     assert 0 < summary["scans"] < 4000
     assert len(formats.read(out)) == pq.read_table(out / "tracks.parquet").num_rows > 0
+
+
+@pytest.mark.parametrize("method", ["sn", "psn"])
+def test_methods_by_strength_need_amplitudes_and_leave_no_folder(tmp_path, method):
+    plots = tmp_path / "plots.csv"
+    plots.write_text("scan,time_s,x_m,y_m,sigma_x_m,sigma_y_m\n0,0.0,1.0,2.0,5,5\n1,1.0,3.0,2.0,5,5\n")
+    with pytest.raises(ConfigError, match=f"no amplitudes.* {method} chooses"):
+        RadarRun(str(plots), Settings(tracker=TrackerSettings(method=method)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_no_part_of_a_radar_run_needs_opencv(tmp_path, scenario):

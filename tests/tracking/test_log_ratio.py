@@ -139,7 +139,8 @@ def test_m_of_n_in_both_conventions(p, hits, window, any_window, initiated):
 
 
 @pytest.mark.parametrize(
-    ("misses", "detection", "scans"), [(3, 0.9, 1110.0), (3, 0.7, 51.48148148148146), (5, 0.5, 62.0)]
+    ("misses", "detection", "scans"),
+    [(3, 0.9, 1110.0), (3, 0.7, 51.48148148148146), (5, 0.5, 62.0), (3, 0.0, 3.0), (3, 1.0, np.inf)],
 )
 def test_mean_time_to_a_false_deletion(misses, detection, scans):
     assert scans_to_false_deletion(misses, detection) == pytest.approx(scans, abs=1e-9)

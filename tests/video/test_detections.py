@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vidtrack.config import Settings, SourceSettings
-from vidtrack.errors import FormatError, SourceError
+from vidtrack.config import Settings, SourceSettings, TrackerSettings
+from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.source import open_source
 
@@ -62,6 +62,15 @@ def test_scores_count_by_their_order_only(tmp_path):
     np.testing.assert_allclose(scores([-1, 140, 30, 30]), [0.25, 1, 0.75, 0.75])
     assert scores([1, 1]) is None, "no score tells one from the other"
     assert scores([0.3]) is None
+
+
+@pytest.mark.parametrize("method", ["sn", "psn"])
+def test_methods_by_strength_need_scores_that_differ(det, method):
+    by_strength = Settings(tracker=TrackerSettings(method=method))
+    assert len(list(open_detections(str(det), by_strength))) == 3
+    det.write_text("1,-1,10,20,40,100\n2,-1,12,20,40,100\n")
+    with pytest.raises(ConfigError, match=f"no scores.* {method} chooses"):
+        open_detections(str(det), by_strength)
 
 
 def test_seqinfo_gives_rate_size_and_length(det):

@@ -80,7 +80,7 @@ def command(
         _plot(outlook, tried, folder / "prediction.png")
     if json_to is not None:
         write_json(_content(outlook, tried), json_to)
-    if json_to != "-":
+    if json_to != "-" and not quiet:
         _print_table(outlook, tried, f"{kind} filter at {snr_db:g} dB, P_FA {pfa:g}, P_D {outlook.law.p_d:.4f}")
 
 

@@ -7,13 +7,12 @@ from numba import njit
 
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
+from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.particle import NO_GLINT, Glint, ParticleBank
 from vidtrack.estimate.particle_kernels import copy, normalise
 from vidtrack.estimate.sensor import Sensor
 from vidtrack.scan import Decision, Floats, Ints, Scan
-
-TURN = 2 * np.pi
 
 
 class ErrorSignalBank(ParticleBank):

@@ -61,7 +61,10 @@ def steady_prediction(model: Motion, dt: float, sigma: float) -> Floats:
     try:
         return np.asarray(solve_discrete_are(F.T, H.T, Q, sigma**2 * np.eye(len(H))))
     except np.linalg.LinAlgError:
-        raise ConfigError(f"alpha-beta: no settled gain for {model} at a step of {dt:g} s") from None
+        raise ConfigError(
+            f"alpha-beta: the gain of {type(model).__name__} does not settle at a step of {dt:g} s; "
+            "take another model, such as cv or ca, or another estimator"
+        ) from None
 
 
 def alpha_beta(index: float) -> tuple[float, float]:

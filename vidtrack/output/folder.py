@@ -38,6 +38,22 @@ def open_run(path: Path | None, source_name: str, force: bool) -> Path:
     return usable(_next_free(source_name) if path is None else _asked_for(path, force))
 
 
+@contextmanager
+def begun(path: Path | None, source_name: str, force: bool) -> Iterator[Path]:
+    """The folder for a run's results; what was put there is taken away again if the block, the run's start, fails.
+
+    Raises OutputError as open_run.
+    """
+    folder = open_run(path, source_name, force)
+    try:
+        yield folder
+    except BaseException:
+        with suppress(OSError):
+            _remove_results(folder)
+            folder.rmdir()
+        raise
+
+
 def usable(folder: Path) -> Path:
     """The folder, made if there is none, when files can be written into it. Raises OutputError."""
     try:

@@ -98,16 +98,17 @@ def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plot
 
 def _measured(table: Table) -> list[str]:
     """The columns that are measurements, in their order in z: polar ones where the file has both kinds."""
+    unknown = [name for name in table.names if name not in KNOWN] or table.names
     for name in TIME:
         if name not in table.columns:
-            raise PlotFormatError(f"{table.path} has no column {name!r}; {nearest(name, table.names)}")
+            raise PlotFormatError(f"{table.path} has no column {name!r}; {nearest(name, unknown)}")
     for kind in (POLAR, CARTESIAN):
         if set(kind[:2]) <= table.columns.keys():
             return [name for name in (*kind, DOPPLER) if name in table.columns]
     half = [kind for kind in (POLAR, CARTESIAN) if set(kind[:2]) & table.columns.keys()] or [POLAR, CARTESIAN]
     missing = [name for kind in half for name in kind[:2] if name not in table.columns]
     raise PlotFormatError(
-        f"{table.path} has no column {missing[0]!r}; {nearest(missing[0], table.names)}; a plot needs "
+        f"{table.path} has no column {missing[0]!r}; {nearest(missing[0], unknown)}; a plot needs "
         f"{' and '.join(POLAR[:2])}, or {' and '.join(CARTESIAN[:2])}"
     )
 

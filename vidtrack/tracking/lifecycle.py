@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Protocol
 
 import numpy as np
@@ -147,7 +148,7 @@ def confirmation_probability(p: float, hits: int, window: int, *, initiated: boo
 def scans_to_false_deletion(misses: int, detection: float) -> float:
     """Mean number of scans until so many misses in a row end the track of a target seen with this probability."""
     q = 1 - detection
-    return float((1 - q**misses) / (detection * q**misses))
+    return sum(q**-i for i in range(1, misses + 1)) if q > 0 else inf
 
 
 def _bit_length(history: np.ndarray) -> np.ndarray:
