@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import common, settings_options, start_log
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ Examples:
 @click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="As for track: look where it is white.")
 @click.option("--fps", type=float, metavar="N", help="As for track: the true rate.")
 @click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
-@click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
+@json_option
 @common("Folder for doctor.json.  [default: only printed]")
 def command(
     source: str,
@@ -55,7 +56,6 @@ def command(
     run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it cannot be opened.
     """
     from vidtrack.cli.hide import hide_arguments
-    from vidtrack.cli.json_file import write_json
     from vidtrack.compiled import first_run
     from vidtrack.config import load
     from vidtrack.doctor.examine import examine
@@ -72,11 +72,7 @@ def command(
     folder = None if output is None else open_run(output, "doctor", force)
     findings = examine(source, settings, seconds)
     advice = judge(findings, settings)
-    if folder is not None:
-        write_json(_content(findings, advice), str(folder / "doctor.json"))
-    if json_to is not None:
-        write_json(_content(findings, advice), json_to)
-    if json_to != "-" and not quiet:
+    if deliver(_content(findings, advice), json_to, folder and folder / "doctor.json", quiet):
         _print_report(findings, advice)
     return _FAILED if any(one.problem for one in advice) else 0
 

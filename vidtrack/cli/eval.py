@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import common, start_log
 
 SECTIONS = {
@@ -76,7 +77,7 @@ Examples:
 @click.argument("result", type=click.Path(path_type=Path))
 @click.argument("truth", type=click.Path(path_type=Path))
 @common("Folder for scores.json.  [default: only printed]")
-@click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
+@json_option
 @click.option("--iou", default=0.5, show_default=True, help="Boxes match from this intersection over union.")
 @click.option("--points", is_flag=True, help="Match positions instead of boxes.")
 @click.option("--max-distance", type=float, help="Positions match up to this distance.  [default: 20 px or 100 m]")
@@ -104,7 +105,6 @@ def command(
     the tracks table gives the consistency of the covariances (NIS, NEES). --seed is accepted for uniformity.
     """
     from vidtrack import formats, score
-    from vidtrack.cli.json_file import write_json
     from vidtrack.output.folder import open_run
 
     start_log(verbose, quiet)
@@ -121,11 +121,7 @@ def command(
         order=order,
         states=states,
     )
-    if folder is not None:
-        write_json(scores, str(folder / "scores.json"))
-    if json_to is not None:
-        write_json(scores, json_to)
-    if json_to != "-" and not quiet:
+    if deliver(scores, json_to, folder and folder / "scores.json", quiet):
         _print_table(scores, f"{result.name} against {truth.name}")
 
 

@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from vidtrack.errors import OutputError
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def json_option(function: Function) -> Function:
+    """--json."""
+    return click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")(
+        function
+    )
+
+
+def deliver(content: Mapping[str, Any], json_to: str | None, file: Path | None, quiet: bool) -> bool:
+    """Write a report where --json and -o (file) ask for it; whether it is to be shown as a table too."""
+    if file is not None:
+        write_json(content, str(file))
+    if json_to is not None:
+        write_json(content, json_to)
+    return json_to != "-" and not quiet
 
 
 def write_json(content: Mapping[str, Any], path: str) -> None:

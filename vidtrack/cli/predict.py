@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import common, start_log
 from vidtrack.cli.radar_problem import problem_options
 
@@ -40,7 +41,7 @@ Examples:
     "--runs", type=click.IntRange(min=1), metavar="N", help="Simulate N runs as well: the share of lost tracks."
 )
 @common("Folder for prediction.png.  [default: no picture]")
-@click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
+@json_option
 def command(
     kind: Literal["psn", "pda"],
     snr_db: float,
@@ -67,7 +68,6 @@ def command(
     With --runs a track counts as lost if its last error is above 20 (pda: 10), or the target was outside the gate
     in each of the last five scans.
     """
-    from vidtrack.cli.json_file import write_json
     from vidtrack.cli.radar_problem import clutter, db_to_linear
     from vidtrack.output.folder import open_run
     from vidtrack.radar.forecast import forecast, trial
@@ -78,9 +78,7 @@ def command(
     tried = None if runs is None else trial(outlook, runs, seed)
     if folder is not None:
         _plot(outlook, tried, folder / "prediction.png")
-    if json_to is not None:
-        write_json(_content(outlook, tried), json_to)
-    if json_to != "-" and not quiet:
+    if deliver(_content(outlook, tried), json_to, None, quiet):
         _print_table(outlook, tried, f"{kind} filter at {snr_db:g} dB, P_FA {pfa:g}, P_D {outlook.law.p_d:.4f}")
 
 

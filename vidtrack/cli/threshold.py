@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import common, start_log
 from vidtrack.cli.radar_problem import problem_options
 
@@ -38,7 +39,7 @@ Examples:
 @common("Folder for threshold.json.  [default: only printed]")
 @click.option("--cells", type=float, metavar="N", help="Resolution cells in the gate (pda).")
 @click.option("--pfa-max", default=1.0, show_default=True, help="Largest P_FA allowed.")
-@click.option("--json", "json_to", metavar="FILE|-", help="Write one JSON object to FILE, or print it.")
+@json_option
 def command(
     kind: str,
     snr_db: float,
@@ -63,7 +64,6 @@ def command(
     --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
     strongest neighbour filter. --seed is accepted for uniformity.
     """
-    from vidtrack.cli.json_file import write_json
     from vidtrack.cli.radar_problem import clutter, db_to_linear
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_run
@@ -87,11 +87,7 @@ def command(
             "error": best.error,
             "clamped": True,
         }
-    if folder is not None:
-        write_json(numbers, str(folder / "threshold.json"))
-    if json_to is not None:
-        write_json(numbers, json_to)
-    if json_to != "-" and not quiet:
+    if deliver(numbers, json_to, folder and folder / "threshold.json", quiet):
         _print_table(numbers, f"{kind} filter at {snr_db:g} dB")
 
 

@@ -163,9 +163,9 @@ class ParticleBank:
         log_weight: Floats,
     ) -> Floats:
         """Particles (K, N, n) of the successors, chosen anew where need be; log_weight (K, N) is changed along."""
-        chosen = np.empty((len(weight), *self.particles.shape[1:]))
         if self.resampling == Resampling.NONE:
             return self.particles[decision.parent]
+        chosen = np.empty((len(weight), *self.particles.shape[1:]))
         stream = self._streams(len(weight))
 
         def work(part: slice) -> None:

@@ -12,13 +12,13 @@ import numpy as np
 from numba import njit
 
 from vidtrack.compiled import CACHE, specialised
+from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.resampling import choose
 from vidtrack.estimate.stream import normal
 from vidtrack.scan import Floats, Ints
 
 Kernel = Callable[..., None]
 
-TURN = 2 * np.pi
 FARTHEST = 1e12
 """Half the squared distance, in standard deviations, beyond which all is equally unlikely; logarithms stay exact."""
 
