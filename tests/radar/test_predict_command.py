@@ -71,7 +71,7 @@ def test_simulated_runs_add_the_share_of_lost_tracks(kind, tmp_path):
         (("--snr-db", "inf", "--pfa", 0.1), "--snr-db is inf"),
         (("--snr-db", 16, "--pfa", 0.1, "--gate", 0), "gate is 0"),
         (("--snr-db", 16, "--pfa", 0.1, "--q", "nan"), "q is nan"),
-        (("--snr-db", 16, "--pfa", 0.1, "--weibull", "a,b"), "B,C"),
+        (("--snr-db", 16, "--pfa", 0.1, "--weibull", "-1,2"), "shape is -1"),
     ],
 )
 def test_wrong_values_are_refused_in_one_line(arguments, message):

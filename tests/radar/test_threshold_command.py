@@ -60,7 +60,6 @@ def test_table_and_file(tmp_path):
         (("--snr-db", 10, "--cells", 0), "--cells is 0"),
         (("--snr-db", 10, "--cells", 10, "--pfa-max", 2), "--pfa-max is 2"),
         (("--snr-db", 10, "--cells", 10, "--gate", 3), "gate of 4"),
-        (("--snr-db", 10, "--filter", "psn", "--weibull", "1"), "B,C"),
         (("--snr-db", 10, "--filter", "psn", "--weibull", "-1,2"), "shape is -1"),
         (("--snr-db", 10, "--filter", "psn", "--cell", -1), "cell volume is -1"),
     ],
@@ -69,3 +68,10 @@ def test_wrong_values_are_refused_in_one_line(arguments, message):
     with pytest.raises(ConfigError, match=message) as caught:
         run(*arguments)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["a,b", "1", "1,2,3"])
+def test_clutter_that_is_no_pair_of_numbers_is_refused(text):
+    outcome = CliRunner().invoke(command, ["--snr-db", "10", "--filter", "psn", "--weibull", text])
+    assert outcome.exit_code == 2
+    assert f"'{text}' is not two numbers B,C" in outcome.output

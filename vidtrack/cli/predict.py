@@ -12,6 +12,7 @@ from vidtrack.cli.options import common, start_log
 from vidtrack.cli.radar_problem import problem_options
 
 if TYPE_CHECKING:
+    from vidtrack.detection.amplitude import Weibull
     from vidtrack.radar.forecast import Forecast, Trial
 
 NAMES = {
@@ -48,7 +49,7 @@ def command(
     q: float,
     gate: float,
     cell: float,
-    weibull: str | None,
+    weibull: Weibull | None,
     pfa: float,
     scans: int,
     runs: int | None,
@@ -68,13 +69,14 @@ def command(
     With --runs a track counts as lost if its last error is above 20 (pda: 10), or the target was outside the gate
     in each of the last five scans.
     """
-    from vidtrack.cli.radar_problem import clutter, db_to_linear
+    from vidtrack.cli.radar_problem import db_to_linear
+    from vidtrack.detection.amplitude import RAYLEIGH
     from vidtrack.output.folder import open_run
     from vidtrack.radar.forecast import forecast, trial
 
     start_log(verbose, quiet)
     folder = None if output is None else open_run(output, "predict", force)
-    outlook = forecast(kind, db_to_linear(snr_db), pfa, clutter(weibull), q, gate, cell, scans)
+    outlook = forecast(kind, db_to_linear(snr_db), pfa, weibull or RAYLEIGH, q, gate, cell, scans)
     tried = None if runs is None else trial(outlook, runs, seed)
     if folder is not None:
         _plot(outlook, tried, folder / "prediction.png")

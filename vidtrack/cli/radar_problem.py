@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
+from vidtrack.cli.clutter import weibull_option
 from vidtrack.errors import ConfigError
-
-if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -18,9 +16,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def problem_options(function: Function) -> Function:
     """--q, --gate, --cell, --weibull: what both radar commands ask about the target and its surroundings."""
     for option in (
-        click.option(
-            "--weibull", metavar="B,C", help="Clutter amplitudes with P(a > t) = exp(-C t^B).  [default: noise]"
-        ),
+        weibull_option,
         click.option("--cell", default=0.1, show_default=True, help="Volume of a resolution cell, units of r."),
         click.option("--gate", default=4.0, show_default=True, help="Gate size in standard deviations."),
         click.option("--q", default=0.16, show_default=True, help="Variance of the acceleration, units of r / T^4."),
@@ -28,19 +24,6 @@ def problem_options(function: Function) -> Function:
     ):
         function = option(function)
     return function
-
-
-def clutter(text: str | None) -> Weibull:
-    """Amplitudes from "B,C"; None: receiver noise. Raises ConfigError."""
-    from vidtrack.detection.amplitude import RAYLEIGH, Weibull
-
-    if text is None:
-        return RAYLEIGH
-    try:
-        shape, rate = map(float, text.split(","))
-    except ValueError:
-        raise ConfigError(f"--weibull is {text!r}; give shape and rate as B,C, for example 1.5,0.693") from None
-    return Weibull(shape, rate)
 
 
 def db_to_linear(db: float) -> float:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from vidtrack.cli.clutter import weibull_option
 from vidtrack.cli.options import common, start_log
+
+if TYPE_CHECKING:
+    from vidtrack.detection.amplitude import Weibull
 
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
 RADAR = ("radar-tws", "radar-incoming", "radar-altitude", "radar-speed", "radar-crossing", "radar-unresolved")
@@ -28,21 +32,6 @@ class _Size(click.ParamType):
         if not (width.isdecimal() and height.isdecimal()):
             self.fail(f"{value!r} is not a size such as 1280x720", param, ctx)
         return int(width), int(height)
-
-
-class _Pair(click.ParamType):
-    """Two positive numbers B,C."""
-
-    name = "B,C"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float] | None:
-        try:
-            shape, rate = (float(part) for part in str(value).split(","))
-        except ValueError:
-            self.fail(f"{value!r} is not a pair of numbers such as 1.5,0.693", param, ctx)
-        return shape, rate
 
 
 @click.command(
@@ -66,7 +55,7 @@ Examples:
 @click.option(
     "--pfa", type=click.FloatRange(0, 0.1), help="Radar: false alarms per resolution cell.  [default: the scenario's]"
 )
-@click.option("--weibull", type=_Pair(), help="Radar: clutter amplitudes, P(a > t) = exp(-C t^B); 2,0.5 is Rayleigh.")
+@weibull_option
 @click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
 def command(
     scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, verbose: int, **chosen: Any
@@ -117,16 +106,14 @@ def _draw_plots(
     *,
     snr_db: float | None,
     pfa: float | None,
-    weibull: tuple[float, float] | None,
+    weibull: Weibull | None,
     glint: float | None,
 ) -> None:
-    from vidtrack.detection.amplitude import Weibull
     from vidtrack.output.folder import open_run
     from vidtrack.simulate.radar_scenarios import simulate_radar
     from vidtrack.simulate.radar_write import write_radar
 
-    clutter = None if weibull is None else Weibull(*weibull)
-    seen = simulate_radar(scenario, seed, snr_db=snr_db, p_fa=pfa, clutter=clutter, glint=glint)
+    seen = simulate_radar(scenario, seed, snr_db=snr_db, p_fa=pfa, clutter=weibull, glint=glint)
     write_radar(seen, open_run(output, scenario, force))
 
 

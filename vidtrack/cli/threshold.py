@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import common, start_log
 from vidtrack.cli.radar_problem import problem_options
+
+if TYPE_CHECKING:
+    from vidtrack.detection.amplitude import Weibull
 
 Numbers = dict[str, float | bool | None]
 
@@ -46,7 +50,7 @@ def command(
     q: float,
     gate: float,
     cell: float,
-    weibull: str | None,
+    weibull: Weibull | None,
     cells: float | None,
     pfa_max: float,
     output: Path | None,
@@ -64,7 +68,8 @@ def command(
     --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
     strongest neighbour filter. --seed is accepted for uniformity.
     """
-    from vidtrack.cli.radar_problem import clutter, db_to_linear
+    from vidtrack.cli.radar_problem import db_to_linear
+    from vidtrack.detection.amplitude import RAYLEIGH
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_run
     from vidtrack.radar.prediction import normalised
@@ -79,7 +84,7 @@ def command(
     if kind == "pda":
         numbers = _of_pda(snr, cells, pfa_max, gate, weibull)
     else:
-        best = best_psn_threshold(normalised(q, gate, cell), snr, clutter(weibull), pfa_max)
+        best = best_psn_threshold(normalised(q, gate, cell), snr, weibull or RAYLEIGH, pfa_max)
         numbers = {
             "p_fa": best.p_fa,
             "p_fa_one_percent": best.p_fa_one_percent,
@@ -91,7 +96,7 @@ def command(
         _print_table(numbers, f"{kind} filter at {snr_db:g} dB")
 
 
-def _of_pda(snr: float, cells: float | None, pfa_max: float, gate: float, weibull: str | None) -> Numbers:
+def _of_pda(snr: float, cells: float | None, pfa_max: float, gate: float, weibull: Weibull | None) -> Numbers:
     from vidtrack.detection.amplitude import detection_probability
     from vidtrack.detection.reduction import KE_GATE, q2
     from vidtrack.detection.threshold import closed_form, optimum
