@@ -18,7 +18,7 @@ def common(output_help: str) -> Callable[[Function], Function]:
     def decorate(function: Function) -> Function:
         for option in (
             click.option("-v", "--verbose", count=True, help="Say more; twice: everything."),
-            click.option("--quiet", is_flag=True, help="Only errors: no progress, no warnings."),
+            click.option("-q", "--quiet", is_flag=True, help="Only errors: no progress, no warnings."),
             click.option("--force", is_flag=True, help="Replace the results in a folder that is not empty."),
             click.option(
                 "--seed",
