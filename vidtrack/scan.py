@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -159,6 +159,18 @@ def _refuse_no_covariance(R: Floats, name: str) -> None:
         raise ScanError(f"{name.format(i)} is not positive definite: {R[i].tolist()}; give it a variance above zero")
 
 
+@njit(cache=CACHE, nogil=True)
+def starts(row: Ints, rows: int) -> Ints:
+    """(rows + 1,) where the entries of each row begin among `row` (B,), which is sorted; the last is their number."""
+    start = np.empty(rows + 1, np.int64)
+    b = 0
+    for t in range(rows + 1):
+        while b < len(row) and row[b] < t:
+            b += 1
+        start[t] = b
+    return start
+
+
 @dataclass(frozen=True, slots=True)
 class Decision:
     """What an associator decided: how K successor rows come from T rows and M measurements.
@@ -181,50 +193,58 @@ class Decision:
     spread: bool = True
     approximate: NDArray[np.bool_] | None = None
 
+    @property
+    def start(self) -> Ints:
+        """(K + 1,) the weights of successor k are start[k]..start[k + 1]."""
+        return starts(self.row, len(self.parent))
+
     def without(self, rows: NDArray[np.bool_]) -> Decision:
         """The same decision with these rows (K,) missed, which tells nothing about them."""
+        if not rows.any():
+            return self
         stay = ~rows[self.row]
         beta0 = np.where(rows, 1.0, self.beta0)
         inflation = None if self.inflation is None else np.where(rows, 0.0, self.inflation)
-        return replace(
-            self,
-            row=self.row[stay],
-            measurement=self.measurement[stay],
-            beta=self.beta[stay],
-            beta0=beta0,
-            inflation=inflation,
-        )
+        row, measurement, beta = self.row[stay], self.measurement[stay], self.beta[stay]
+        return Decision(self.parent, row, measurement, beta, beta0, inflation, self.spread, self.approximate)
 
     def joined(self, other: Decision) -> Decision:
         """Both decisions about disjoint sets of rows as one."""
         row = np.concatenate([self.row, other.row])
         order = np.argsort(row, kind="stable")
-        theirs = np.zeros(len(self.parent), bool)
-        theirs[other.row] = True
-        return replace(
-            self,
-            row=row[order],
-            measurement=np.concatenate([self.measurement, other.measurement])[order],
-            beta=np.concatenate([self.beta, other.beta])[order],
-            beta0=self.beta0 + other.beta0 - 1.0,
-            inflation=_chosen(theirs, other.inflation, self.inflation),
-            approximate=_chosen(theirs, other.approximate, self.approximate),
+        return Decision(
+            self.parent,
+            row.take(order),
+            np.concatenate([self.measurement, other.measurement]).take(order),
+            np.concatenate([self.beta, other.beta]).take(order),
+            self.beta0 + other.beta0 - 1.0,
+            _chosen(other.row, other.inflation, self.inflation),
+            self.spread,
+            _chosen(other.row, other.approximate, self.approximate),
         )
 
 
-def _chosen(theirs: NDArray[np.bool_], other: Any, own: Any) -> Any:
-    """Row by row the other's values or one's own, where a method gives any."""
-    return None if own is None else np.where(theirs, 0 if other is None else other, own)
+def _chosen(theirs: Ints, other: Any, own: Any) -> Any:
+    """Row by row the other's values, where the rows are theirs, or one's own, where a method gives any."""
+    if own is None:
+        return None
+    chosen = own.copy()
+    chosen[theirs] = 0 if other is None else other[theirs]
+    return chosen
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """A change in a track's life, with its reason in words."""
 
     t: float
     track_id: int
     kind: str  # "birth", "confirmed", "merge", "split", "delete"
     reason: str
+
+    @classmethod
+    def each(cls, t: float, ids: Ints, kind: str, reason: str) -> list[Event]:
+        """The same event for each of these tracks (N,)."""
+        return [cls(t, track, kind, reason) for track in ids.tolist()]
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,13 +98,18 @@ def test_targets_well_apart_are_each_tracked(method):
     np.testing.assert_allclose(tracks.xy[order], (start + 58.0)[np.lexsort(start.T[::-1])], atol=4.0)
 
 
+@pytest.mark.parametrize("spread", [0.0, 1.0])
+@pytest.mark.parametrize("count", [1, 5])
 @pytest.mark.parametrize("method", ALL)
-def test_a_heap_of_measurements_at_one_point(method):
-    """10,000 measurements at one place among tracks, and none afterwards."""
+def test_a_heap_of_measurements_in_the_gates_of_all_tracks(method, count, spread):
+    """10,000 measurements at one place or scattered in the gates, twice, and none afterwards."""
     watch = Watch(method, births=False)
-    watch.tracker.add(0.0, np.zeros((3, 4)), np.tile(np.eye(4), (3, 1, 1)))
-    watch.step(scan(0.04, np.zeros((10_000, 2))))
-    watch.step(scan(0.08, np.empty((0, 2))))
+    watch.tracker.add(0.0, np.zeros((count, 4)), np.tile(np.eye(4), (count, 1, 1)))
+    rng = np.random.default_rng(0)
+    for t in (0.04, 0.08):
+        watch.step(scan(t, spread * rng.normal(size=(10_000, 2))))
+        assert len(watch.tracker.bank) <= 200 * count, "as many rows as tracks have leaves at most"
+    watch.step(scan(0.12, np.empty((0, 2))))
 
 
 @pytest.mark.parametrize("method", set(ALL) - {"split", "mht"})
@@ -113,6 +118,14 @@ def test_a_heap_of_measurements_starts_one_track(method):
     for k in range(4):
         tracks = watch.step(scan(0.04 * k, np.zeros((2000, 2))))
         assert 1 <= len(tracks) <= 1 + k
+
+
+@pytest.mark.parametrize("method", ALL)
+def test_a_scattered_heap_starts_few_tracks(method):
+    watch, rng = Watch(method), np.random.default_rng(0)
+    for k in range(3):
+        tracks = watch.step(scan(0.04 * k, 0.5 * rng.normal(size=(10_000, 2))))
+        assert 1 <= len(tracks) <= 6 * (1 + k)
 
 
 def test_measurements_apart_each_start_a_track_in_their_own_run():

@@ -1,6 +1,6 @@
 """Multiple hypotheses: Reid's probabilities, the decisions that wait, and the bounds that hold."""
 
-from itertools import product
+from itertools import pairwise, product
 from math import exp, log, pi
 
 import numpy as np
@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidtrack as vt
+from vidtrack.associate.trust import Trust
 from vidtrack.state import gather, restore
+from vidtrack.tracking.generation import likeliest
 from vidtrack.tracking.hypotheses import Hypotheses, kept
 from vidtrack.tracking.methods import rule
 
@@ -212,6 +214,60 @@ def test_limits_of_the_probabilities(detection, clutter, gate):
         assert np.isfinite(found.log_p).all()
         np.testing.assert_allclose(probabilities(tracker).sum(), 1.0)
         assert np.isfinite(tracks.x).all()
+
+
+def test_what_was_seen_long_ago_costs_nothing():
+    """Measurements have running numbers; a tracker that has seen 10^12 goes on like one that has just begun."""
+    rng = np.random.default_rng(0)
+    young, old = (vt.Tracker(vt.ConstantVelocity(accel=2.0, speed=5.0), vt.MHT(), clutter_density=1e-3) for _ in "ab")
+    for k in range(12):
+        one = vt.Scan(float(k), rng.uniform(0, 40, (10, 2)), np.eye(2))
+        if k == 6:
+            window = old.forest.window
+            window.past[window.past >= 0] += 10**12
+            window.seen += 10**12
+        np.testing.assert_array_equal(young.step(one).x, old.step(one).x)
+
+
+@given(seed=st.integers(0, 2**32 - 1), most=st.integers(1, 6))
+def test_a_row_keeps_its_likeliest_measurements(seed, most):
+    """The first of equals, as a stable sort has them."""
+    rng = np.random.default_rng(seed)
+    start = np.concatenate([[0], np.cumsum(rng.integers(0, 12, 5))])
+    value = rng.integers(0, 5, start[-1]).astype(float)
+    chosen = likeliest(start, value, most)
+    for a, b in pairwise(start):
+        first = np.argsort(-value[a:b], kind="stable")[:most]
+        np.testing.assert_array_equal(np.flatnonzero(chosen[a:b]), np.sort(first))
+
+
+def test_a_tentative_track_keeps_its_name_while_it_is_doubted():
+    """The likeliest hypothesis calls its first measurements false; once it is believed it has the id of the first."""
+    tracker = vt.Tracker(vt.ConstantVelocity(dim=1, accel=0.1, speed=5.0), vt.MHT(n_scan=5), clutter_density=0.1)
+    ids, doubts = [], 0
+    for k in range(8):
+        tracks = tracker.step(scan(float(k), 2.0 * k))
+        ids.append(tracks.id.tolist())
+        doubts += len(tracker.forest.hypotheses.best) == 0
+    assert doubts >= 2
+    assert all(1 in known for known in ids)
+    assert tracks.status[tracks.id == 1] == [vt.Status.CONFIRMED]
+
+
+@pytest.mark.parametrize("method", [vt.MHT(), vt.Split()])
+def test_unsure_detections_continue_a_track_but_do_not_confirm_it(method):
+    tracker = vt.Tracker(
+        vt.ConstantVelocity(dim=1, accel=1.0, speed=1.0), method, trust=Trust(0.5), clutter_density=1e-4
+    )
+    scores = [0.9, 0.2, 0.9, 0.9, 0.2, 0.2]
+    status, taken = [], []
+    for k, score in enumerate(scores):
+        tracks = tracker.step(vt.Scan(float(k), np.array([[1.0 * k]]), np.eye(1), score=np.array([score])))
+        own = tracks.id == 1
+        status += tracks.status[own].tolist()
+        taken += tracks.measurement[own].tolist()
+    assert taken == [0] * 6
+    assert [s == vt.Status.TENTATIVE for s in status] == [True] * 3 + [False] * 3
 
 
 def test_without_births_no_hypothesis_has_any():

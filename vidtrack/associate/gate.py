@@ -11,10 +11,11 @@ import numpy as np
 from numba import njit
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.associate.grid import cells
 from vidtrack.compiled import CACHE, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Floats, Ints, Scan, starts
 
 Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
 FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)
@@ -50,36 +51,25 @@ class Pairs:
 
     def only(self, mask: np.ndarray) -> Pairs:
         """The pairs of a mask (N,)."""
-        row = self.row[mask]
-        start = np.searchsorted(row, np.arange(len(self.limit) + 1))
-        return Pairs(
-            row,
-            self.measurement[mask],
-            self.d2[mask],
-            self.nis[mask],
-            self.log_s[mask],
-            self.log_l[mask],
-            self.cost[mask],
-            self.limit,
-            start,
-        )
+        if mask.all():
+            return self
+        pair = np.flatnonzero(mask)
+        row = self.row.take(pair)
+        return self._as(row, pair, self.limit, starts(row, len(self.limit)))
 
     def of(self, rows: Ints) -> Pairs:
         """The pairs of these rows (K,), each as often as it is named."""
         count = np.diff(self.start)[rows]
         start = np.concatenate([[0], np.cumsum(count)])
         pair = np.repeat(self.start[rows] - start[:-1], count) + np.arange(start[-1])
+        return self._as(np.repeat(np.arange(len(rows)), count), pair, self.limit[rows], start)
+
+    def _as(self, row: Ints, pair: Ints, limit: Floats, start: Ints) -> Pairs:
+        """These pairs (K,) as those of rows (K,) with these limits."""
         return Pairs(
-            np.repeat(np.arange(len(rows)), count),
-            self.measurement[pair],
-            self.d2[pair],
-            self.nis[pair],
-            self.log_s[pair],
-            self.log_l[pair],
-            self.cost[pair],
-            self.limit[rows],
-            start,
-        )
+            row, self.measurement.take(pair), self.d2.take(pair), self.nis.take(pair),
+            self.log_s.take(pair), self.log_l.take(pair), self.cost.take(pair), limit, start,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +106,10 @@ class Gate:
         return np.full(len(cov), self.limit(cov.shape[1]))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
-        """(T,) P_G, the share of a target's own measurements that gates of these limits admit.
+        """(T,) P_G, the share of a target's own measurements that gates of these limits admit: `probability`.
 
-        Exact for mahalanobis; a box takes its axes for independent, the others count as `probability`.
+        A box takes its axes for independent.
         """
-        if self.distance == "mahalanobis":
-            return gammainc(dim / 2, limit / 2)
         return np.full(len(limit), self.probability ** (dim if self.distance == "box" else 1))
 
     def pairs(
@@ -138,15 +126,13 @@ class Gate:
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
         reach = _reach(cov, scan.R, limit, mode)
-        grid = Grid.over(scan.z[:, :2], runs, reach)
+        grid = cells(scan.z, runs, reach)
         row, measurement, d2, nis, log_s = _gated(zhat.shape[1], mode, angles)(
-            zhat, cov, own, reach, limit,
-            scan.z, scan.R, grid.order, grid.first, grid.origin, grid.cell, grid.shape,
-        )  # fmt: skip
-        start = np.searchsorted(row, np.arange(len(zhat) + 1))
+            zhat, cov, own, reach, limit, scan.z, scan.R, *grid
+        )
         log_l = -0.5 * (nis + log_s + zhat.shape[1] * np.log(TURN))
         cost = d2 if mode == EUCLIDEAN else d2 + log_s
-        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
+        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, starts(row, len(zhat)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +165,10 @@ class LikelihoodGate(Gate):
         log_s = np.linalg.slogdet(S)[1]
         return np.maximum(0.0, 2 * (odds - np.log(self.new_density)) - dim * np.log(TURN) - log_s)
 
+    def inside(self, limit: Floats, dim: int) -> Floats:
+        """(T,) P_G, the share of a target's own measurements that gates of these limits admit."""
+        return gammainc(dim / 2, limit / 2)
+
 
 @lru_cache
 def quantile(probability: float, dim: int) -> float:
@@ -186,77 +176,20 @@ def quantile(probability: float, dim: int) -> float:
     return float(2 * gammaincinv(dim / 2, probability))
 
 
+@njit(cache=CACHE, nogil=True)
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
     """(T, 2) half sides of the box around each gate, on the first two axes."""
-    if mode == EUCLIDEAN:
-        return np.repeat(np.sqrt(limit)[:, None], 2, axis=1)
     axes = min(2, cov.shape[1])
-    widest = [R[:, a, a].max(initial=0.0) for a in range(axes)]
-    with np.errstate(invalid="ignore"):  # a gate of one is infinite; of zero, empty
-        sides = [np.sqrt(limit * (cov[:, a, a] + widest[a])) for a in range(axes)]
-    return np.stack([sides[0], sides[-1]], axis=1)
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """Points sorted by (run, row of cells, column): cell c holds order[first[c]..first[c + 1]]."""
-
-    order: Ints
-    first: Ints
-    origin: Floats
-    cell: Floats
-    shape: Ints
-
-    @classmethod
-    def over(cls, z: Floats, run: Ints, reach: Floats) -> Grid:
-        """z (M, 1 or 2) points, runs numbered from 0; cells follow the mean gate, some four to a point at most."""
-        z = z if z.shape[1] == 2 else np.column_stack([z[:, 0], np.zeros(len(z))])
-        origin, extent = _extent(z)
-        runs = int(run.max(initial=0)) + 1
-        most = np.ceil(2 * np.sqrt(max(1, len(z)) / runs))
-        cell = np.maximum(np.maximum(_typical(reach), extent / most), 1e-9)
-        shape = (extent / cell).astype(np.int64) + 1
-        order, first = _sorted(z, run, runs, origin, cell, shape)
-        return cls(order, first, origin, cell, shape)
-
-
-@njit(cache=CACHE, nogil=True)
-def _extent(z: Floats) -> tuple[Floats, Floats]:
-    """Least coordinates (2,) of points (M, 2), and how far the others reach beyond."""
-    low, high = np.zeros(2), np.zeros(2)
-    for a in range(2):
-        if len(z):
-            low[a], high[a] = z[:, a].min(), z[:, a].max()
-    return low, high - low
-
-
-@njit(cache=CACHE, nogil=True)
-def _typical(reach: Floats) -> Floats:
-    """(2,) mean of the finite half sides, one where there is none."""
-    total, count = np.zeros(2), 0
-    for t in range(len(reach)):
-        if np.isfinite(reach[t, 0]) and np.isfinite(reach[t, 1]):
-            total += reach[t]
-            count += 1
-    return total / count if count else np.ones(2)
-
-
-@njit(cache=CACHE, nogil=True, error_model="numpy")
-def _sorted(z: Floats, run: Ints, runs: int, origin: Floats, cell: Floats, shape: Ints) -> tuple[Ints, Ints]:
-    """The points (M,) in the order of their cells, runs apart, and where each cell begins."""
-    key, order = np.empty(len(z), np.int64), np.empty(len(z), np.int64)
-    first = np.zeros(runs * shape[0] * shape[1] + 1, np.int64)
-    for j in range(len(z)):
-        column = min(np.int64((z[j, 0] - origin[0]) / cell[0]), shape[0] - 1)
-        line = min(np.int64((z[j, 1] - origin[1]) / cell[1]), shape[1] - 1)
-        key[j] = (run[j] * shape[1] + line) * shape[0] + column
-        first[key[j] + 1] += 1
-    first = np.cumsum(first)
-    place = first.copy()
-    for j in range(len(z)):
-        order[place[key[j]]] = j
-        place[key[j]] += 1
-    return order, first
+    widest = np.zeros(2)
+    for j in range(len(R)):
+        for a in range(axes):
+            widest[a] = max(widest[a], R[j, a, a])
+    reach = np.empty((len(cov), 2))
+    for t in range(len(cov)):
+        for side in range(2):
+            a = min(side, axes - 1)
+            reach[t, side] = np.sqrt(limit[t] if mode == EUCLIDEAN else limit[t] * (cov[t, a, a] + widest[a]))
+    return reach
 
 
 @lru_cache

@@ -69,12 +69,10 @@ class GNN:
     def decide(self, problem: Problem) -> Decision:
         """Optimal assignment, cluster by cluster."""
         pairs, measurements = problem.pairs, problem.measurements
-        never = (1 + problem.rows) * (1.0 + np.abs(pairs.cost).max(initial=0.0))
         if self.convention == "maximum-cardinality":
-            miss = np.full(problem.rows, never)
+            miss = np.full(problem.rows, _never(pairs.cost, problem.rows))
         else:
-            cluster = clusters(pairs.row, pairs.measurement, problem.rows, measurements)
-            miss = np.minimum(never, pairs.limit + _largest(cluster, pairs.row, pairs.cost - pairs.d2))
+            miss = _edge(pairs.row, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, measurements)
         return one_hot(assign(pairs.start, pairs.measurement, pairs.cost, miss, measurements))
 
 
@@ -113,14 +111,9 @@ HARD = (NN, GNN, GreedyGNN)
 
 def one_hot(taken: Ints) -> Decision:
     """Decision of a hard rule: taken (T,) measurement of each track, -1 for none."""
-    row = np.flatnonzero(taken >= 0)
-    return Decision(
-        parent=np.arange(len(taken)),
-        row=row,
-        measurement=taken[row],
-        beta=np.ones(len(row)),
-        beta0=(taken < 0).astype(float),
-    )
+    hit = taken >= 0
+    row = np.flatnonzero(hit)
+    return Decision(np.arange(len(taken)), row, taken.take(row), np.ones(len(row)), (~hit).astype(float))
 
 
 @njit(cache=CACHE, nogil=True)
@@ -146,13 +139,22 @@ def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measuremen
 
 
 @njit(cache=CACHE, nogil=True)
-def _largest(cluster: Ints, row: Ints, value: Floats) -> Floats:
-    """(T,) largest value over the pairs of each row's cluster; zero without pairs."""
-    most = np.full(len(cluster), -np.inf)
+def _never(cost: Floats, rows: int) -> float:
+    """More than any pairs can save."""
+    most = 0.0
+    for k in range(len(cost)):
+        most = max(most, abs(cost[k]))
+    return (1 + rows) * (1.0 + most)
+
+
+@njit(cache=CACHE, nogil=True)
+def _edge(row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, measurements: int) -> Floats:
+    """(T,) cost of a measurement at the edge of each row's gate (T,), if its ln|S| were the largest of the cluster."""
+    cluster = clusters(row, measurement, len(limit), measurements)
+    most = np.full(len(limit), -np.inf)
     for k in range(len(row)):
-        c = cluster[row[k]]
-        most[c] = max(most[c], value[k])
-    result = np.empty(len(cluster))
-    for t in range(len(cluster)):
-        result[t] = max(most[cluster[t]], most[t]) if most[cluster[t]] > -np.inf else 0.0
-    return result
+        most[cluster[row[k]]] = max(most[cluster[row[k]]], cost[k] - d2[k])
+    edge, never = np.empty(len(limit)), _never(cost, len(limit))
+    for t in range(len(limit)):
+        edge[t] = min(never, limit[t] + (most[cluster[t]] if most[cluster[t]] > -np.inf else 0.0))
+    return edge

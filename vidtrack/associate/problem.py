@@ -58,7 +58,7 @@ class Problem:
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))
         rows, dim = zhat.shape
         inside = gate.inside(pairs.limit, dim)
-        return cls(pairs, scan, cov, np.broadcast_to(detection, rows), np.broadcast_to(clutter, rows), inside)
+        return cls(pairs, scan, cov, np.full(rows, detection), np.full(rows, clutter), inside)
 
     @property
     def rows(self) -> int:
@@ -75,28 +75,36 @@ class Problem:
         """(T,) 1 - P_D P_G, the probability that a target gives no measurement in its gate."""
         return 1.0 - self.detection * self.inside
 
-    @cached_property
+    @property
     def log_missed(self) -> Floats:
         """(T,) ln(1 - P_D P_G), with VANISHING in place of zero."""
-        return self._log(self.missed)
+        return self._logs[0]
 
-    @cached_property
+    @property
     def log_ratio(self) -> Floats:
         """(N,) ln(P_D N(v; 0, S) / clutter density) of each pair: a target's measurement against a false one.
 
         Without clutter the density is VANISHING; -inf for a target that is never detected.
         """
-        with np.errstate(divide="ignore"):
-            detection = np.log(self.detection)
-        return (detection - self._log(self.clutter))[self.pairs.row] + self.pairs.log_l
+        return self._logs[1]
 
-    def _log(self, factor: Floats) -> Floats:
+    @cached_property
+    def _logs(self) -> tuple[Floats, Floats]:
+        least = -VANISHING - 4 * np.abs(self.pairs.log_l).max(initial=0.0)
         with np.errstate(divide="ignore"):
-            return np.maximum(np.log(factor), -VANISHING - 4 * np.abs(self.pairs.log_l).max(initial=0.0))
+            missed, detection, clutter = np.log(self.missed), np.log(self.detection), np.log(self.clutter)
+        density = detection - np.maximum(clutter, least)
+        return np.maximum(missed, least), density[self.pairs.row] + self.pairs.log_l
 
     def only(self, mask: np.ndarray) -> Problem:
         """The same with the pairs of a mask (N,)."""
-        return replace(self, pairs=self.pairs.only(mask))
+        return self.having(self.pairs.only(mask))
+
+    def having(self, pairs: Pairs) -> Problem:
+        """The same with other pairs of the same rows."""
+        if pairs is self.pairs:
+            return self
+        return Problem(pairs, self.scan, self.cov, self.detection, self.clutter, self.inside)
 
     def of(self, rows: Ints) -> Problem:
         """The same for these rows (K,), each as often as it is named: successors ask what their parents asked."""

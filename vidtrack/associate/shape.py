@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -45,7 +45,11 @@ class Shape:
         size2, stays = _compare(
             pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma, self.overlap
         )
-        return replace(pairs, cost=pairs.cost + size2, log_l=pairs.log_l - 0.5 * size2).only(stays)
+        weighed = Pairs(
+            pairs.row, pairs.measurement, pairs.d2, pairs.nis, pairs.log_s,
+            pairs.log_l - 0.5 * size2, pairs.cost + size2, pairs.limit, pairs.start,
+        )  # fmt: skip
+        return weighed.only(stays)
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")

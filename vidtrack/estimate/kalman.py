@@ -54,19 +54,18 @@ class KalmanBank:
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance H P H' (T, m, m); the innovation covariance is that plus R."""
         zhat, H, excess = self.linearised(sensor)
-        return zhat, projection(*H.shape[1:])(self.P, H) + excess
+        return zhat, projection(*H.shape[1:])(self.P, H, excess)
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
         """Successor rows from the weights of a decision (paper 004, eqs. 3 to 5; mixtures moment-matched)."""
         zhat, H, excess = self.linearised(sensor)
-        start = np.searchsorted(decision.row, np.arange(len(decision.parent) + 1))
         rows, m = len(decision.parent), H.shape[1]
         known = decision.inflation is not None and scan.noise is not None
         inflation = decision.inflation if known else np.zeros(rows)
         self.x, self.P = mixture_update(*H.shape[1:], sensor.angles)(
             self.x, self.P, H, excess, zhat, scan.z, scan.R,
-            decision.parent, start, decision.measurement, decision.beta, decision.beta0,
-            inflation, decision.spread, scan.noise if known else np.eye(m),
+            decision.parent, decision.start, decision.measurement, decision.beta, decision.beta0,
+            inflation, decision.spread, scan.noise if known else np.zeros((m, m)),
         )  # fmt: skip
         self.hits = self.hits[decision.parent] + (decision.beta0 < 0.5)
         self.scale = self.scale[decision.parent]
@@ -84,4 +83,6 @@ class KalmanBank:
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
-        self.x, self.P, self.hits, self.scale = self.x[rows], self.P[rows], self.hits[rows], self.scale[rows]
+        rows = np.arange(len(self))[rows]
+        for name in self.STATE:
+            setattr(self, name, getattr(self, name).take(rows, axis=0))

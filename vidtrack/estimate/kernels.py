@@ -15,7 +15,7 @@ from vidtrack.compiled import specialised
 from vidtrack.scan import Floats, Ints
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
-Projection = Callable[[Floats, Floats], Floats]
+Projection = Callable[[Floats, Floats, Floats], Floats]
 Update = Callable[..., tuple[Floats, Floats]]
 
 TURN = 2 * np.pi
@@ -56,12 +56,12 @@ def propagation(n: int) -> Propagation:
 
 @lru_cache
 def projection(m: int, n: int) -> Projection:
-    """H P H' (T, m, m) for all rows; H (T, m, n) or (1, m, n)."""
+    """H P H' + excess (T, m, m) for all rows; H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m)."""
 
-    def project(P: Floats, H: Floats) -> Floats:
+    def project(P: Floats, H: Floats, excess: Floats) -> Floats:
         out, HP = np.empty((len(P), m, m)), np.empty((m, n))
         for t in range(len(P)):
-            h = min(t, len(H) - 1)
+            h, s = min(t, len(H) - 1), min(t, len(excess) - 1)
             for a in range(m):
                 for j in range(n):
                     total = 0.0
@@ -73,8 +73,8 @@ def projection(m: int, n: int) -> Projection:
                     total = 0.0
                     for k in range(n):
                         total += HP[a, k] * H[h, b, k]
-                    out[t, a, b] = total
-                    out[t, b, a] = total
+                    out[t, a, b] = total + excess[s, a, b]
+                    out[t, b, a] = total + excess[s, b, a]
         return out
 
     return specialised(project, m, n)

@@ -12,8 +12,6 @@ from vidtrack.errors import ConfigError
 from vidtrack.estimate.model import Columns, at_rest
 from vidtrack.scan import Floats, Ints
 
-Settled = np.ndarray  # (T,) bool: rows whose heading may shape the process noise
-
 
 @dataclass(frozen=True, slots=True)
 class ConstantVelocity(Columns):
@@ -55,9 +53,7 @@ class ConstantVelocity(Columns):
 
     def transition(self, dt: float, x: Floats) -> Floats:
         """F (1, n, n) over dt seconds."""
-        F = np.eye(2 * self.dim)
-        F[self.position, self.velocity] = dt
-        return F[None]
+        return _moved_on(self.dim, dt)
 
     def jacobian(self, dt: float, x: Floats, F: Floats) -> Floats:
         """F: the motion is linear."""
@@ -69,19 +65,12 @@ class ConstantVelocity(Columns):
         x (T, n), P (T, n, n), hits (T,) updates so far, scale (T,) multiplies the standard deviations. The
         acceleration covariance is A = cross^2 I + (accel^2 - cross^2) u u', u the unit velocity (SPEC 004).
         """
-        settled = self.settled(x, P, hits)
         if self.hold_s is None:
-            time = np.array([dt**4 / 4, dt**3 / 2, dt**2])
+            time = dt**4 / 4, dt**3 / 2, dt**2
         else:
-            time = self.hold_s * np.array([dt**3 / 3, dt**2 / 2, dt])
+            time = self.hold_s * (dt**3 / 3), self.hold_s * (dt**2 / 2), self.hold_s * dt
         cross = self.accel if self.cross is None else self.cross
-        return _accelerations(x, scale, settled, self.accel, cross, time)
-
-    def settled(self, x: Floats, P: Floats, hits: np.ndarray) -> Settled:
-        """(T,) rows whose heading is known: enough updates, and a speed well above its own uncertainty."""
-        if self.cross is None:
-            return np.zeros(len(x), bool)
-        return _heading_known(x, P, hits, self.warmup, self.heading)
+        return _accelerations(x, P, hits, scale, self.accel, cross, time, self.warmup, self.heading)
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
         """State and covariance of new rows from one located measurement each.
@@ -93,17 +82,36 @@ class ConstantVelocity(Columns):
 
 
 @njit(cache=CACHE, nogil=True)
-def _accelerations(x: Floats, scale: Floats, settled: Settled, accel: float, cross: float, time: Floats) -> Floats:
-    """Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2."""
+def _moved_on(dim: int, dt: float) -> Floats:
+    """(1, n, n) identity, plus dt from each velocity to its position."""
+    F = np.zeros((1, 2 * dim, 2 * dim))
+    for a in range(2 * dim):
+        F[0, a, a] = 1.0
+    for a in range(0, 2 * dim, 2):
+        F[0, a, a + 1] = dt
+    return F
+
+
+@njit(cache=CACHE, nogil=True)
+def _accelerations(
+    x: Floats, P: Floats, hits: Ints, scale: Floats, accel: float, cross: float, time: tuple[float, float, float],
+    warmup: int, heading: float,
+) -> Floats:  # fmt: skip
+    """Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2.
+
+    A row's heading is known after enough updates, and while its speed is well above its own uncertainty.
+    """
     rows, n = x.shape
     dim = n // 2
     Q = np.empty((rows, n, n))
     for t in range(rows):
-        speed2 = 0.0
+        speed2, variance = 0.0, 0.0
         for a in range(dim):
             speed2 += x[t, 2 * a + 1] ** 2
-        across = (cross if settled[t] else accel) ** 2 * scale[t] ** 2
-        stretch = (accel**2 - cross**2) * scale[t] ** 2 / speed2 if settled[t] else 0.0
+            variance = max(variance, P[t, 2 * a + 1, 2 * a + 1])
+        settled = hits[t] > warmup and speed2 > heading**2 * variance
+        across = (cross if settled else accel) ** 2 * scale[t] ** 2
+        stretch = (accel**2 - cross**2) * scale[t] ** 2 / speed2 if settled else 0.0
         for a in range(dim):
             for b in range(dim):
                 A = stretch * x[t, 2 * a + 1] * x[t, 2 * b + 1]
@@ -114,15 +122,3 @@ def _accelerations(x: Floats, scale: Floats, settled: Settled, accel: float, cro
                 Q[t, 2 * a + 1, 2 * b] = A * time[1]
                 Q[t, 2 * a + 1, 2 * b + 1] = A * time[2]
     return Q
-
-
-@njit(cache=CACHE, nogil=True)
-def _heading_known(x: Floats, P: Floats, hits: np.ndarray, warmup: int, heading: float) -> Settled:
-    known = np.empty(len(x), np.bool_)
-    for t in range(len(x)):
-        speed2, variance = 0.0, 0.0
-        for a in range(1, x.shape[1], 2):
-            speed2 += x[t, a] ** 2
-            variance = max(variance, P[t, a, a])
-        known[t] = hits[t] > warmup and speed2 > heading**2 * variance
-    return known

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -38,13 +39,11 @@ class Position:
 
     def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
         """(T, d) the positions."""
-        return np.ascontiguousarray(x[:, position])
+        return x.take(position, axis=1)
 
     def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
         """(1, d, n): picks the position columns, the same for all rows."""
-        H = np.zeros((1, len(position), x.shape[1]))
-        H[0, range(len(position)), position] = 1.0
-        return H
+        return _selection(position, x.shape[1])
 
     def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
         """The measurements as they are."""
@@ -52,6 +51,12 @@ class Position:
 
 
 POSITION = Position()
+
+
+@lru_cache
+def _selection(columns: tuple[int, ...], n: int) -> Floats:
+    """(1, d, n) the matrix that picks these columns of n; nobody may write into it, or all would see that."""
+    return np.eye(n)[None, list(columns)]
 
 
 def wrapped(difference: Floats, angles: tuple[int, ...]) -> Floats:

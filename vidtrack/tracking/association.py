@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ from vidtrack.tracking.register import Register
 
 CLAIMED = 0.1
 """A measurement that tracks claim with more weight than this in sum starts no track."""
+UNSURE = 0.01
+"""Share of its likelihood that a detection which is not sure has in decisions that wait: more such are false."""
 
 Mask = np.ndarray
 Claim = Callable[[Ints], tuple[Ints, Mask]]
@@ -65,15 +68,14 @@ def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, c
 
 
 def deferred(
-    problem: Problem, forest: Forest, trust: Trust, confirmed: Mask, births: bool, register: Register,
-    events: list[Event],
-) -> Association:  # fmt: skip
+    problem: Problem, forest: Forest, trust: Trust, births: bool, register: Register, events: list[Event]
+) -> Association:
     """Rows become their successors in a forest, and so do the register's; no blob is shared."""
     pairs, sure = problem.pairs, trust.sure(problem.scan)
-    asked = problem.only(confirmed[pairs.row] | sure[pairs.measurement])
-    decision, born = forest.grow(asked, register, distinct(problem.scan, sure & births), events)
-    alone = np.full(len(decision.parent), -1)
-    return Association(problem.of(decision.parent), decision, alone, sure, born)
+    log_l = pairs.log_l + np.where(sure, 0.0, np.log(UNSURE))[pairs.measurement]
+    problem = replace(problem, pairs=replace(pairs, log_l=log_l))
+    problem, decision, born = forest.grow(problem, register, distinct(problem.scan, sure & births), events)
+    return Association(problem, decision, np.full(problem.rows, -1), sure, born)
 
 
 def _starter(rule: Associator) -> Associator:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Scan
+from vidtrack.scan import Floats, Scan
+from vidtrack.tracking.boxes import area, best_cover, widened
+
+FRAGMENT, NEAR, SMALL = 0.6, 0.5, 0.3
+"""A leftover blob starts no track where a tracked vehicle, widened by NEAR of its longer side, covers FRAGMENT of
+it, if the blob is smaller than SMALL of the vehicle: it is a piece of it, or of its shadow."""
 
 Mask = np.ndarray
 
@@ -28,3 +33,11 @@ def distinct(scan: Scan, free: Mask) -> Mask:
     new[1:] = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)
     first[candidates[order[new]]] = True
     return first
+
+
+def pieces(blobs: Floats, vehicles: Floats) -> Mask:
+    """(M,) blobs (M, 4) that are pieces of vehicles (V, 4) already tracked."""
+    vehicle, share = best_cover(blobs, widened(vehicles, NEAR))
+    piece = (vehicle >= 0) & (share >= FRAGMENT)
+    piece[piece] = area(blobs[piece]) < SMALL * area(vehicles[vehicle[piece]])
+    return piece

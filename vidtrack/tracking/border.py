@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats
 
 REACH = 2.0
@@ -23,14 +25,12 @@ class Border:
 
     def sides(self, box: Floats) -> Mask:
         """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border cuts."""
-        if np.isinf(self.width):
-            return np.zeros((len(box), 4), bool)
-        near, far = box[:, :2], box[:, :2] + box[:, 2:]
-        return np.concatenate([near < REACH, far > (self.width - REACH, self.height - REACH)], axis=1)
+        return _sides(box, self.width, self.height)
 
     def cut(self, box: Floats) -> Mask:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""
-        return np.asarray(self.sides(box).any(axis=1))
+        left, top, right, bottom = self.sides(box).T
+        return np.asarray(left | top | right | bottom)
 
     def outside(self, xy: Floats) -> Mask:
         """(N,) positions (N, d) beyond the border."""
@@ -47,7 +47,31 @@ class Border:
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) drawn out to the border on the given sides (N, 4)."""
-        near, far = box[:, :2], box[:, :2] + box[:, 2:]
-        near = np.where(sides[:, :2], np.minimum(near, 0.0), near)
-        far = np.where(sides[:, 2:], np.maximum(far, (self.width, self.height)), far)
-        return np.hstack([near, far - near])
+        return _reaching(box, sides, (self.width, self.height))
+
+
+@njit(cache=CACHE, nogil=True)
+def _sides(box: Floats, width: float, height: float) -> Mask:
+    sides = np.zeros((len(box), 4), np.bool_)
+    if np.isinf(width):
+        return sides
+    for i in range(len(box)):
+        sides[i, 0] = box[i, 0] < REACH
+        sides[i, 1] = box[i, 1] < REACH
+        sides[i, 2] = box[i, 0] + box[i, 2] > width - REACH
+        sides[i, 3] = box[i, 1] + box[i, 3] > height - REACH
+    return sides
+
+
+@njit(cache=CACHE, nogil=True)
+def _reaching(box: Floats, sides: Mask, picture: tuple[float, float]) -> Floats:
+    drawn = np.empty_like(box)
+    for i in range(len(box)):
+        for axis in range(2):
+            near, far = box[i, axis], box[i, axis] + box[i, axis + 2]
+            if sides[i, axis]:
+                near = min(near, 0.0)
+            if sides[i, axis + 2]:
+                far = max(far, picture[axis])
+            drawn[i, axis], drawn[i, axis + 2] = near, far - near
+    return drawn

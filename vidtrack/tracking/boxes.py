@@ -9,11 +9,29 @@ from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats, Ints
 
 
+@njit(cache=CACHE, nogil=True)
 def absolute(box: Floats, xy: Floats) -> Floats:
-    """(N, 4) boxes relative to their points (N, 2), placed in the picture."""
+    """(N, 4) boxes relative to their points (N, d), placed in the picture."""
     placed = box.copy()
-    placed[:, :2] += xy[:, :2]
+    for i in range(len(box)):
+        for axis in range(min(2, xy.shape[1])):
+            placed[i, axis] += xy[i, axis]
     return placed
+
+
+@njit(cache=CACHE, nogil=True)
+def follow(box: Floats, seen: Floats, taken: Ints, at_once: np.ndarray, share: Floats) -> None:
+    """Move boxes (T, 4) by a share (T,) towards those seen (M, 4) that they have `taken` (T,); -1: none.
+
+    at_once  (M,) boxes that are taken over as they are, as the first one of a track is
+    """
+    for t in range(len(box)):
+        j = taken[t]
+        if j < 0:
+            continue
+        jump = np.isnan(box[t, 0]) or at_once[j] or share[t] == 1.0
+        for side in range(4):
+            box[t, side] = seen[j, side] if jump else box[t, side] + share[t] * (seen[j, side] - box[t, side])
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")

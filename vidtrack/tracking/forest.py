@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,6 +11,19 @@ from vidtrack.scan import Decision, Event, Floats, Ints
 from vidtrack.tracking.register import Register
 
 Mask = np.ndarray
+
+
+class Growth(NamedTuple):
+    """What becomes of the trees in a scan.
+
+    problem   what each successor could choose from: of a heap of measurements only the likeliest
+    decision  how the successors come from the rows
+    born      (M,) measurements that start trees
+    """
+
+    problem: Problem
+    decision: Decision
+    born: Mask
 
 
 class Forest(Protocol):
@@ -26,11 +39,11 @@ class Forest(Protocol):
     @property
     def sure(self) -> Mask: ...
 
-    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> tuple[Decision, Mask]:
-        """Decide on a scan: the successors of the rows, and the measurements (M,) that start trees.
+    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
+        """Decide on a scan, and take the rows of the register over to the successors.
 
         The new trees become the last rows, in the order of their measurements. starts (M,) measurements that may
-        start one. Takes the rows of the register over to the successors.
+        start one.
         """
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:

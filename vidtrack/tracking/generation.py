@@ -137,10 +137,17 @@ def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, yo
 
 @njit(cache=CACHE, nogil=True)
 def likeliest(start: Ints, value: Floats, most: int) -> Mask:
-    """(P,) the `most` pairs of largest value in each row; row t has the pairs start[t]..start[t + 1]."""
+    """(P,) the `most` pairs of largest value in each row, the first of equals; row t has start[t]..start[t + 1]."""
     chosen = np.ones(len(value), np.bool_)
     for t in range(len(start) - 1):
-        if start[t + 1] - start[t] > most:
-            order = np.argsort(-value[start[t] : start[t + 1]], kind="mergesort")
-            chosen[start[t] + order[most:]] = False
+        mine = value[start[t] : start[t + 1]]
+        if len(mine) <= most:
+            continue
+        least = np.partition(mine, len(mine) - most)[len(mine) - most]
+        equals = most - (mine > least).sum()
+        for k in range(len(mine)):
+            if mine[k] == least and equals > 0:
+                equals -= 1
+            else:
+                chosen[start[t] + k] = mine[k] > least
     return chosen

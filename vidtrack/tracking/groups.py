@@ -55,36 +55,16 @@ class Groups:
 
         predicted (T, 4) boxes, taken (T,) measurement of each track or -1, blobs (M, 4) boxes.
         """
-        shared = np.full(len(predicted), -1)
-        orphans = np.flatnonzero(confirmed & (taken < 0))
-        hosts = confirmed & (taken >= 0)
-        claims = np.bincount(taken[hosts], minlength=len(blobs))  # a nearest neighbour may be everybody's
-        if len(orphans) and len(blobs):
-            blob, share = best_cover(predicted[orphans], blobs)
-            blob[share < self.cover] = -1
-            shared[orphans] = blob
-            np.add.at(claims, blob[blob >= 0], 1)
-        together = np.flatnonzero(hosts)[claims[taken[hosts]] > 1]
-        shared[together] = taken[together]
-        return shared
+        return _blob_of(predicted, taken, confirmed, blobs, self.cover)
 
     def changed(self, predicted: Floats, taken: Ints, blobs: Floats) -> np.ndarray:
         """(T,) tracks whose blob has another size than the vehicle, or one edge where it was and the other far off."""
-        changed = np.zeros(len(predicted), bool)
-        hit = np.flatnonzero(taken >= 0)
-        box, blob = predicted[hit], blobs[taken[hit]]
-        ratio = area(blob) / area(box)
-        sigma = np.hypot(self.edge * box[:, 2:], 1.0)
-        near = np.abs(blob[:, :2] - box[:, :2]) / sigma
-        far = np.abs(blob[:, :2] + blob[:, 2:] - box[:, :2] - box[:, 2:]) / sigma
-        halved = (np.minimum(near, far) < 1) & (np.maximum(near, far) > ONE_SIDED)
-        changed[hit] = (ratio > self.growth) | (ratio < 1 / self.growth) | halved[:, 0] | halved[:, 1]
-        return changed
+        return _changed(predicted, taken, blobs, self.growth, self.edge)
 
     def explained(self, predicted: Floats, shared: Ints, blobs: Floats) -> np.ndarray:
         """(M,) blobs at least half of whose area the tracks on them account for; the others hide somebody new."""
         on = shared >= 0
-        return np.bincount(shared[on], area(predicted[on]), minlength=len(blobs)) >= 0.5 * area(blobs)
+        return np.bincount(shared[on], area(predicted)[on], minlength=len(blobs)) >= 0.5 * area(blobs)
 
     def measure(
         self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, hides: np.ndarray
@@ -97,6 +77,41 @@ class Groups:
         """
         gate = np.where(hides, self.gate / 2, self.gate)
         return _from_edges(predicted, box, var, blob, blobs, cut, gate, self.edge)
+
+
+@njit(cache=CACHE, nogil=True)
+def _blob_of(predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Floats, cover: float) -> Ints:
+    shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
+    orphans = np.flatnonzero(confirmed & (taken < 0))
+    blob, share = best_cover(predicted[orphans], blobs)
+    for k in range(len(orphans)):
+        if share[k] >= cover:
+            shared[orphans[k]] = blob[k]
+            claims[blob[k]] += 1
+    hosts = np.flatnonzero(confirmed & (taken >= 0))
+    for t in hosts:
+        claims[taken[t]] += 1
+    for t in hosts:  # a nearest neighbour may be everybody's
+        if claims[taken[t]] > 1:
+            shared[t] = taken[t]
+    return shared
+
+
+@njit(cache=CACHE, nogil=True, error_model="numpy")
+def _changed(predicted: Floats, taken: Ints, blobs: Floats, growth: float, edge: float) -> np.ndarray:
+    changed = np.zeros(len(predicted), np.bool_)
+    for t in range(len(predicted)):
+        if taken[t] < 0:
+            continue
+        box, blob = predicted[t], blobs[taken[t]]
+        ratio = blob[2] * blob[3] / (box[2] * box[3])
+        changed[t] = ratio > growth or ratio < 1 / growth
+        for axis in range(2):
+            sigma = np.hypot(edge * box[2 + axis], 1.0)
+            near = abs(blob[axis] - box[axis]) / sigma
+            far = abs(blob[axis] + blob[2 + axis] - box[axis] - box[2 + axis]) / sigma
+            changed[t] |= min(near, far) < 1 and max(near, far) > ONE_SIDED
+    return changed
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")

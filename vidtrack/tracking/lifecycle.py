@@ -7,10 +7,12 @@ from math import inf
 from typing import Protocol
 
 import numpy as np
+from numba import njit
 from scipy.special import bdtrc
 
+from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Floats
+from vidtrack.scan import MERGED, TENTATIVE, Floats, Ints
 from vidtrack.tracking.register import Register
 
 Mask = np.ndarray
@@ -32,8 +34,8 @@ class Life(Protocol):
     @property
     def ends(self) -> str: ...
 
-    def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
-        """(T,) tentative rows that now deserve belief. xy (T, d) positions, size (T,) of the objects."""
+    def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
+        """(T,) tentative rows that now deserve belief. travel (T,) from where they began, size (T,) of the objects."""
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) rows that what was seen of them, and what was not, speaks against."""
@@ -86,15 +88,14 @@ class LifeCycle:
         """As likely as not."""
         return 0.0
 
-    def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
-        """(T,) tentative rows with enough hits, age and travel. xy (T, d) positions, size (T,) of the objects."""
-        enough = self._hits(register) >= self.confirm_hits
-        return enough & grown(register, t, xy, self.confirm_s, self.confirm_travel * size)
+    def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
+        """(T,) tentative rows with enough hits, age and travel (T,); size (T,) of the objects."""
+        hits, _ = _seen(register.history, self.confirm_window)
+        return (hits >= self.confirm_hits) & grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
-        scans = np.minimum(_bit_length(register.history), self.confirm_window)
-        misses = scans - self._hits(register)
+        _, misses = _seen(register.history, self.confirm_window)
         return (register.status == TENTATIVE) & (misses > self.confirm_window - self.confirm_hits)
 
     def lost(self, register: Register, t: float) -> Mask:
@@ -102,14 +103,11 @@ class LifeCycle:
         known = register.status != TENTATIVE
         return (known & missed(register, self.coast_scans)) | unseen(register, t, self.coast_s, self.hidden_s)
 
-    def _hits(self, register: Register) -> np.ndarray:
-        return np.bitwise_count(register.history & ((1 << self.confirm_window) - 1)).astype(np.int64)
 
-
-def grown(register: Register, t: float, xy: Floats, age_s: float, travel: Floats) -> Mask:
-    """(T,) tentative rows that are old enough and have moved far enough (T,) from where they began."""
+def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
+    """(T,) tentative rows that are old enough and whose travel (T,) is at least so much (T,)."""
     old = t - register.born_s >= age_s * (1 - 1e-9)
-    return (register.status == TENTATIVE) & old & (np.linalg.norm(xy - register.start, axis=1) >= travel)
+    return (register.status == TENTATIVE) & old & (travel >= least)
 
 
 def missed(register: Register, scans: int | None) -> Mask:
@@ -151,6 +149,16 @@ def scans_to_false_deletion(misses: int, detection: float) -> float:
     return sum(q**-i for i in range(1, misses + 1)) if q > 0 else inf
 
 
-def _bit_length(history: np.ndarray) -> np.ndarray:
-    """Scans since birth: the birth itself is the highest bit set."""
-    return np.frexp(history.astype(float))[1].astype(np.int64)
+@njit(cache=CACHE, nogil=True)
+def _seen(history: Ints, window: int) -> tuple[Ints, Ints]:
+    """Hits and misses (T,) among the last scans, so many; the birth of a row is the highest bit of its history (T,)."""
+    hits, misses = np.zeros(len(history), np.int64), np.zeros(len(history), np.int64)
+    for t in range(len(history)):
+        rest = history[t]
+        for _ in range(window):
+            if rest == 0:
+                break
+            hits[t] += rest & 1
+            misses[t] += 1 - (rest & 1)
+            rest >>= 1
+    return hits, misses

@@ -75,9 +75,9 @@ class LogRatio:
         """ln of the density of new targets over that of clutter."""
         return log(self.new_share)
 
-    def confirmed(self, register: Register, t: float, xy: Floats, size: Floats) -> Mask:
-        """(T,) tentative rows with enough score, age and travel. xy (T, d) positions, size (T,) of the objects."""
-        return (register.score >= self.highest) & grown(register, t, xy, self.confirm_s, self.confirm_travel * size)
+    def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
+        """(T,) tentative rows with enough score, age and travel (T,); size (T,) of the objects."""
+        return (register.score >= self.highest) & grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) rows whose score has fallen too far."""

@@ -9,8 +9,8 @@ import numpy as np
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Decision, Event, Floats, Ints
-from vidtrack.tracking.forest import Window, one_each
+from vidtrack.scan import TENTATIVE, Event, Floats, Ints
+from vidtrack.tracking.forest import Growth, Window, one_each
 from vidtrack.tracking.generation import NEVER, agreeing, children, likeliest
 from vidtrack.tracking.hypotheses import Hypotheses, surviving
 from vidtrack.tracking.register import Register
@@ -85,7 +85,7 @@ class HypothesisForest:
         self.told = np.empty(0, bool)
         self.shown = np.empty(0, np.int64)
 
-    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> tuple[Decision, Mask]:
+    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
         """Cluster, generate, prune, decide the scan N back."""
         problem = problem.only(likeliest(problem.pairs.start, problem.pairs.log_l, self.rule.branches))
         tree = np.unique(register.id, return_inverse=True)[1]
@@ -107,22 +107,22 @@ class HypothesisForest:
         gone = np.setdiff1d(register.id, register.id[parent])
         events.extend(Event(problem.scan.t, int(i), "delete", "no likely hypothesis holds it") for i in gone)
         register.keep(parent)
-        return one_each(parent, taken), born
+        return Growth(problem.of(parent), one_each(parent, taken), born)
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
-        """The likeliest hypothesis is shown, and what may have begun with a measurement that it calls false.
+        """The likeliest hypothesis is shown, and what tentative tracks may be doing that it calls false.
 
         A tree that is not shown any more will come back, if ever, under another id.
         """
-        best, newest = self.hypotheses.best, self.window.past[:, 0]
-        begun = np.flatnonzero((self.window.age == 0) & ~np.isin(newest, newest[best]))
-        self.shown = np.concatenate([best, begun])
+        best, p = self.hypotheses.best, self._held()
+        self.shown = np.concatenate([best, self._doubted(best, p, register)])
         now = np.isin(register.id, register.id[self.shown])
         for old, new in zip(*register.rename(self.told & ~now), strict=True):
             events.append(Event(t, int(old), "delete", "the likeliest hypothesis has no such track"))
             events.append(Event(t, int(new), "birth", f"less likely hypotheses go on with track {old}"))
         self.told = now
-        self.sure = self._probability(register.id) >= SURE
+        tree = np.unique(register.id, return_inverse=True)[1]
+        self.sure = np.bincount(tree, p)[tree] >= SURE
 
     def keep(self, kept: Mask) -> None:
         """Drop all rows but these; hypotheses that differ in others only become one."""
@@ -191,8 +191,7 @@ class HypothesisForest:
         """(T,) leaves that depend on each other have the same number."""
         past = self.window.past
         leaf, scan = np.nonzero(past >= 0)
-        number = past[leaf, scan]
-        number -= number.min(initial=0)
+        number = self.window.seen - 1 - past[leaf, scan]
         trees = number.max(initial=-1) + 1 + tree
         every = np.arange(len(tree))
         return clusters(
@@ -205,9 +204,23 @@ class HypothesisForest:
         cluster[self.hypotheses.leaf] = self.hypotheses.cluster
         return cluster
 
-    def _probability(self, name: Ints) -> Floats:
-        """(T,) sum of the probabilities of the hypotheses that have a leaf of each row's tree of this name."""
-        tree = np.unique(name, return_inverse=True)[1]
+    def _doubted(self, best: Ints, p: Floats, register: Register) -> Ints:
+        """Of each tentative tree that the best leaves (B,) have nothing of, the likeliest leaf, p (T,) probable.
+
+        None that took, in the undecided scans, what a best leaf or an older tree's took.
+        """
+        past, name = self.window.past, register.id
+        taken = np.isin(past, past[best]) & (past >= 0)
+        rows = np.flatnonzero((register.status == TENTATIVE) & ~np.isin(name, name[best]) & ~taken.any(axis=1))
+        rows = rows[np.lexsort((-p[rows], name[rows]))]
+        rows = rows[np.unique(name[rows], return_index=True)[1]]
+        past = past[rows]
+        _, first, place = np.unique(past, return_index=True, return_inverse=True)
+        owner = first[place.reshape(past.shape)] // past.shape[1]
+        return rows[((owner == np.arange(len(rows))[:, None]) | (past < 0)).all(axis=1)]
+
+    def _held(self) -> Floats:
+        """(T,) sum of the probabilities of the hypotheses that have each leaf."""
         p = np.repeat(np.exp(self.hypotheses.log_p), np.diff(self.hypotheses.start))
-        held: Floats = np.bincount(tree[self.hypotheses.leaf], p, len(name)).astype(float)
-        return held[tree]
+        held: Floats = np.bincount(self.hypotheses.leaf, p, len(self.window)).astype(float)
+        return held

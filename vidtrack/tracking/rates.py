@@ -55,14 +55,14 @@ class Rates:
     def detection_probability(self) -> float:
         """P_D now, the mean over the runs."""
         if self._detection is not None:
-            return float(np.mean(self._detection))
+            return _mean(self._detection)
         return min((self.hits + PRIOR * PRIOR_SCANS) / (self.trials + PRIOR_SCANS), HIGHEST)
 
     @property
     def clutter_density(self) -> float:
         """False measurements per scan and unit of the measurement space now, the mean over the runs."""
         if self._clutter is not None:
-            return float(np.mean(self._clutter))
+            return _mean(self._clutter)
         space = float((self.high - self.low).prod()) if self._space is None else self._space
         return (self.false + 1) / (self.scans + 1) / space
 
@@ -103,6 +103,10 @@ class Rates:
         found = known & (register.status != MERGED) & (register.history & 1 == 1)
         self.hits = forget * self.hits + int(found.sum())
         self.trials = forget * self.trials + float((_gap(register.history[found]) * inside[found]).sum())
+
+
+def _mean(rate: float | Floats) -> float:
+    return float(rate.mean() if isinstance(rate, np.ndarray) else rate)
 
 
 def _gap(history: Ints) -> Ints:

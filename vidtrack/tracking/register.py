@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from scipy.special import expit
 
+from vidtrack.compiled import CACHE
 from vidtrack.scan import TENTATIVE, Floats, Ints
 
 
@@ -60,6 +62,10 @@ class Register:
         """(T,) probability that each row is a target."""
         return expit(self.score)
 
+    def travel(self, xy: Floats) -> Floats:
+        """(T,) distances of positions (T, d) from where the rows began."""
+        return _distance(xy, self.start)
+
     def append(
         self, t: float, position: Floats, box: Floats, score: float, run: Ints, label: Ints | None = None
     ) -> Ints:
@@ -69,24 +75,25 @@ class Register:
         self.next_id += count
         new = {
             "id": ids,
-            "status": np.full(count, TENTATIVE, np.int8),
-            "born_s": np.full(count, t),
-            "updated_s": np.full(count, t),
-            "history": np.ones(count, np.int64),
+            "status": TENTATIVE,
+            "born_s": t,
+            "updated_s": t,
+            "history": 1,
             "start": position,
             "box": box,
-            "group": np.full(count, -1),
-            "group_since_s": np.full(count, np.nan),
-            "score": np.full(count, score),
-            "best": np.full(count, score),
+            "group": -1,
+            "score": score,
+            "best": score,
             "run": run,
-            "label": np.full(count, -1) if label is None else label,
-            "alone_s": np.zeros(count),
+            "label": -1 if label is None else label,
+            "alone_s": 0.0,
         }
         for name in self.columns:
             old = getattr(self, name)
-            values = new.get(name, np.full((count, *old.shape[1:]), np.nan))
-            setattr(self, name, np.concatenate([old, values]))
+            longer = np.empty((len(old) + count, *old.shape[1:]), old.dtype)
+            longer[: len(old)] = old
+            longer[len(old) :] = new.get(name, np.nan)
+            setattr(self, name, longer)
         return ids
 
     def rename(self, rows: np.ndarray) -> tuple[Ints, Ints]:
@@ -100,4 +107,16 @@ class Register:
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
         for name in self.columns:
-            setattr(self, name, getattr(self, name)[rows])
+            setattr(self, name, getattr(self, name).take(rows, axis=0))
+
+
+@njit(cache=CACHE, nogil=True)
+def _distance(a: Floats, b: Floats) -> Floats:
+    """(T,) distances between points a and b (T, d)."""
+    distance = np.empty(len(a))
+    for t in range(len(a)):
+        total = 0.0
+        for axis in range(a.shape[1]):
+            total += (a[t, axis] - b[t, axis]) ** 2
+        distance[t] = np.sqrt(total)
+    return distance

@@ -50,11 +50,11 @@ class Sharing:
         rows = np.flatnonzero(shared >= 0)
         if not len(rows):
             return
-        position, velocity = list(bank.model.position), list(bank.model.velocity)
-        box, on = register.box[rows], shared[rows]
-        predicted = absolute(box, bank.x[rows][:, position])
-        before = absolute(predicted, -dt * bank.x[rows][:, velocity])
-        var = np.diagonal(bank.P[rows], axis1=1, axis2=2)[:, position]
+        position, velocity = bank.model.position, bank.model.velocity
+        x, box, on = bank.x[rows], register.box[rows], shared[rows]
+        predicted = absolute(box, x.take(position, axis=1))
+        before = absolute(predicted, -dt * x.take(velocity, axis=1))
+        var = bank.P[rows][:, position, position]
         cut = self._border.sides(blobs)
         z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
 
@@ -66,7 +66,7 @@ class Sharing:
         register.updated_s[rows[own > 0]] = t
 
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
-        xy = bank.x[rows][:, position]
+        xy = bank.x[rows].take(position, axis=1)
         box = absolute(self._border.reaching(absolute(box, xy), self._border.sides(before) & cut[on]), -xy)
         alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
@@ -75,16 +75,17 @@ class Sharing:
     def passengers(self, register: Register, t: float) -> Mask:
         """(T,) members that were hardly ever seen alone and do not leave their group: parts of another member."""
         strange = (register.group >= 0) & (register.alone_s < self._groups.known_s)
-        for number in np.unique(register.group[strange]):
+        for number in np.unique(register.group[strange]) if strange.any() else ():
             members = np.flatnonzero(register.group == number)
             strange[members[register.alone_s[members].argmax()]] = False
         return strange & (t - register.group_since_s > self._groups.part_s)
 
     def regroup(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """A group keeps its number and its start for as long as any of its members stay together."""
-        blobs = np.flatnonzero(np.bincount(shared[shared >= 0]) > 1)
-        if not (len(blobs) or (register.group >= 0).any()):
+        on = shared[shared >= 0]
+        if not (len(on) or (register.group >= 0).any()):
             return
+        blobs = np.flatnonzero(np.bincount(on) > 1)
         group = np.full(len(shared), -1)
         for blob in blobs:
             members = np.flatnonzero(shared == blob)
@@ -96,8 +97,8 @@ class Sharing:
             joined = members[register.group[members] != number]
             register.group_since_s[joined] = t
             reason = f"tracks {', '.join(str(i) for i in register.id[members])} share one blob"
-            events.extend(Event(t, int(track), "merge", reason) for track in register.id[joined])
+            events.extend(Event.each(t, register.id[joined], "merge", reason))
         alone = np.flatnonzero((group < 0) & (register.group >= 0))
         register.group_since_s[alone] = np.nan
-        events.extend(Event(t, int(track), "split", "alone on its blob again") for track in register.id[alone])
+        events.extend(Event.each(t, register.id[alone], "split", "alone on its blob again"))
         register.group = group

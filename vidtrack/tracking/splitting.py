@@ -9,8 +9,8 @@ from scipy.special import chdtri
 
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Decision, Event, Floats, Ints
-from vidtrack.tracking.forest import Window, one_each
+from vidtrack.scan import Event, Floats, Ints
+from vidtrack.tracking.forest import Growth, Window, one_each
 from vidtrack.tracking.generation import NEVER, likeliest
 from vidtrack.tracking.register import Register
 
@@ -69,7 +69,7 @@ class BranchForest:
         """(T,) true: branches are no matter of doubt for others."""
         return np.ones(len(self.window), bool)
 
-    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> tuple[Decision, Mask]:
+    def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
         """Branch, drop what scores badly, merge what has become the same; what is in no gate starts a tree."""
         in_gate = np.zeros(problem.measurements, bool)
         in_gate[problem.pairs.measurement] = True
@@ -87,7 +87,7 @@ class BranchForest:
         events.extend(Event(problem.scan.t, int(track), "delete", reason) for track in gone)
         register.keep(parent)
         self._show(np.concatenate([register.id, -1 - np.arange(new)]))
-        return one_each(parent, taken), born
+        return Growth(problem.of(parent), one_each(parent, taken), born)
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
         """A branch that has nothing in common with its tree's likeliest becomes a tree of its own.

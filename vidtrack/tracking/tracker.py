@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -25,9 +24,10 @@ from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Scan, Tracks
 from vidtrack.tracking.association import Association, at_once, deferred
+from vidtrack.tracking.births import pieces
 from vidtrack.tracking.border import Border
-from vidtrack.tracking.boxes import absolute, area, best_cover, longer, widened
-from vidtrack.tracking.choices import choices, evidence, heaviest, innovations
+from vidtrack.tracking.boxes import absolute, follow, longer
+from vidtrack.tracking.choices import choices, evidence, heaviest
 from vidtrack.tracking.forest import Deferred, Forest
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import Life, LifeCycle
@@ -39,9 +39,6 @@ BELIEF = 20.0
 """Largest log-odds of a track's existence."""
 EXIT_S = 0.2
 """A track on its way over the border is given up after so long without evidence."""
-FRAGMENT, NEAR, SMALL = 0.6, 0.5, 0.3
-"""A leftover blob starts no track where a tracked vehicle, widened by NEAR of its longer side, covers FRAGMENT of
-it, if the blob is smaller than SMALL of the vehicle: it is a piece of it, or of its shadow."""
 
 Mask = np.ndarray
 
@@ -136,9 +133,8 @@ class Tracker:
         self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
             self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
-        nis = innovations(problem.pairs, taken)
         why = self._why(problem, decision, taken) if self.explain else None
-        self._believe(problem, decision, taken, shared, dt)
+        nis = self._believe(problem, decision, taken, shared, dt)
         kept = self._delete(scan.t, events)
         if self.sharing:
             self.sharing.regroup(shared[kept], self.register, scan.t, events)
@@ -225,14 +221,13 @@ class Tracker:
             problem = thresholded(problem, self.threshold)
         if self.shape is None or blobs is None:
             return problem
-        return replace(problem, pairs=self.shape.weigh(problem.pairs, self._boxes(), blobs))
+        return problem.having(self.shape.weigh(problem.pairs, self._boxes(), blobs))
 
     def _associated(self, problem: Problem, blobs: Floats | None, events: list[Event]) -> Association:
         """Who gets what, at once or with decisions that wait."""
-        confirmed = self.register.status != TENTATIVE
         if self.forest:
-            return deferred(problem, self.forest, self.trust, confirmed, self.births, self.register, events)
-        claim = None
+            return deferred(problem, self.forest, self.trust, self.births, self.register, events)
+        claim, confirmed = None, self.register.status != TENTATIVE
         if self.sharing and blobs is not None:
             claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, confirmed=confirmed, blobs=blobs)
         return at_once(problem, self.associate, self.trust, confirmed, claim)
@@ -245,20 +240,20 @@ class Tracker:
         self.bank.update(decision, scan, sensor)
         hit = decision.beta0 < 0.5
         rows = np.flatnonzero(hit)
-        register.alone_s[rows] += dt
+        sure = self.trust.sure(scan)[taken[rows]]
+        register.alone_s += dt * hit
+        register.updated_s[rows[sure]] = scan.t
+        hit[rows] &= sure | (register.status[rows] != TENTATIVE)  # only sure ones confirm
         register.history = (register.history << 1 | hit) & ((1 << 63) - 1)
-        register.updated_s[rows[self.trust.sure(scan)[taken[rows]]]] = scan.t
         if scan.label is not None:
             told = scan.label[taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
         if blobs is None or scan.box is None:
             return
-        old, new = register.box[rows], scan.box[taken[rows]]
-        follow = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / self.bank.hits[rows])
-        follow[np.isnan(old[:, 0]) | self.border.cut(blobs[taken[rows]])] = 1.0
-        register.box[rows] = np.where(follow[:, None] == 1.0, new, old + follow[:, None] * (new - old))
+        share = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / self.bank.hits)
+        follow(register.box, scan.box, taken, self.border.cut(blobs), share)
         if self.model.per_size:
-            self.bank.scale[rows] = longer(register.box[rows])
+            self.bank.scale[rows] = longer(register.box)[rows]
 
     def _why(self, problem: Problem, decision: Decision, taken: Ints) -> Choices:
         """What was decided for each track that is believed."""
@@ -272,37 +267,50 @@ class Tracker:
             believed[self.forest.shown[self.forest.shown < rows]] = True
         return believed
 
-    def _believe(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints, dt: float) -> None:
-        """What the tracks got, as evidence for their existence (Bayes' rule in log-odds) and for the rates."""
-        register, log_ratio = self.register, evidence(problem, decision, taken)
+    def _believe(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints, dt: float) -> Floats:
+        """What the tracks got, as evidence for their existence (Bayes' rule in log-odds) and for the rates.
+
+        Returns the normalised innovations squared (T,).
+        """
+        register = self.register
+        log_ratio, nis = evidence(problem, decision, taken)
         log_ratio[shared >= 0] = 0.0
-        register.score = np.clip(register.score + log_ratio, -BELIEF, BELIEF)
+        register.score = np.minimum(np.maximum(register.score + log_ratio, -BELIEF), BELIEF)
         higher = (register.status != TENTATIVE) & (register.score > register.best)
         register.best = np.where(higher, register.score, register.best)
         alone = self._believed(problem.rows) & (shared < 0)
         self.rates.learn(decision, register, alone, problem.inside, problem.measurements, dt)
+        return nis
 
     def _delete(self, t: float, events: list[Event]) -> Mask:
         """Drop the rows that are not believed any more; returns the mask of those kept."""
-        register = self.register
-        missed = register.history & 1 == 0
-        v = self.bank.x[:, self.model.velocity]
-        going = self.border.leaving(self._boxes(), v) & (t - register.updated_s > EXIT_S)
-        left = missed & (going | self.border.outside(self.bank.x[:, self.model.position]))
-        hopeless = self.life.hopeless(register) & ~left
-        parts = self.sharing.passengers(register, t) & ~left if self.sharing else np.zeros(len(register), bool)
+        left = self._left(t)
+        hopeless = self.life.hopeless(self.register) & ~left
+        parts = self.sharing.passengers(self.register, t) & ~left if self.sharing else np.zeros(len(left), bool)
         kept = ~(hopeless | left | parts)
         if not kept.all():
-            events.extend(_deaths(t, self._ends(~kept, hopeless), self.life.ends))
-            events.extend(_deaths(t, self._ends(~kept, left), "left the picture"))
-            events.extend(_deaths(t, self._ends(~kept, parts), "part of the vehicle that it never left"))
+            events.extend(Event.each(t, self._ends(~kept, hopeless), "delete", self.life.ends))
+            events.extend(Event.each(t, self._ends(~kept, left), "delete", "left the picture"))
+            events.extend(Event.each(t, self._ends(~kept, parts), "delete", "part of the vehicle that it never left"))
             self._keep(kept)
         return kept
+
+    def _left(self, t: float) -> Mask:
+        """(T,) tracks that this scan missed, and that are over the border or were last seen on their way there."""
+        register = self.register
+        left = register.history & 1 == 0
+        missed = np.flatnonzero(left)
+        if len(missed):
+            x = self.bank.x[missed]
+            xy, v = x.take(self.model.position, axis=1), x.take(self.model.velocity, axis=1)
+            going = self.border.leaving(absolute(register.box[missed], xy), v)
+            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > EXIT_S)
+        return left
 
     def _register(self, scan: Scan, sensor: Sensor, blobs: Floats | None, free: Mask, events: list[Event]) -> Ints:
         """Start tentative tracks from measurements that belong to nobody; returns their indices."""
         if blobs is not None and self.sharing and free.any():
-            free[free] = ~self._pieces(blobs[free])
+            free[free] = ~pieces(blobs[free], self._boxes()[self.register.status != TENTATIVE])
         born = np.flatnonzero(free & self.births)
         if not len(born):
             return born
@@ -313,37 +321,33 @@ class Tracker:
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
         label = None if scan.label is None else scan.label[born]
         ids = self.register.append(scan.t, position, box, self.life.birth, run, label)
-        for track, j in zip(ids, born, strict=True):
-            events.append(Event(scan.t, int(track), "birth", f"measurement {j} belongs to no track"))
+        for track, j in zip(ids.tolist(), born.tolist(), strict=True):
+            events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
         return born
-
-    def _pieces(self, blobs: Floats) -> Mask:
-        """(M,) blobs that are pieces of a vehicle already tracked."""
-        tracked = self._boxes()[self.register.status != TENTATIVE]
-        vehicle, share = best_cover(blobs, widened(tracked, NEAR))
-        piece = (vehicle >= 0) & (share >= FRAGMENT)
-        piece[piece] = area(blobs[piece]) < SMALL * area(tracked[vehicle[piece]])
-        return piece
 
     def _confirm(self, t: float, events: list[Event]) -> None:
         """Tentative tracks that earned it are confirmed; the others' status follows what was seen of them."""
         register = self.register
         size = np.fmax(longer(register.box), 0.0)  # none where there is no box
-        ready = self.life.confirmed(register, t, self.bank.x[:, self.model.position], size)
+        ready = self.life.confirmed(register, t, register.travel(self._xy()), size)
         if self.forest:
             self.forest.settle(register, t, events)
             ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)
             register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
         register.status[ready] = CONFIRMED
-        events.extend(Event(t, int(track), "confirmed", self.life.confirms) for track in register.id[ready])
+        events.extend(Event.each(t, register.id[ready], "confirmed", self.life.confirms))
         known = register.status != TENTATIVE
-        seen = register.history & 1 == 1
-        register.status[known] = np.where(seen[known], CONFIRMED, COASTING)
+        register.status[known] = COASTING
+        register.status[known & (register.history & 1 == 1)] = CONFIRMED
         register.status[register.group >= 0] = MERGED
+
+    def _xy(self) -> Floats:
+        """(T, d) the tracks' positions."""
+        return self.bank.x.take(self.model.position, axis=1)
 
     def _boxes(self) -> Floats:
         """(T, 4) the tracks' boxes in the picture."""
-        return absolute(self.register.box, self.bank.x[:, self.model.position])
+        return absolute(self.register.box, self._xy())
 
     def _ends(self, going: Mask, why: Mask | None = None) -> Ints:
         """Ids of the tracks that lose their last row when `going` (T,) go, and one row of which goes by `why` (T,)."""
@@ -367,18 +371,18 @@ class Tracker:
         nis: Floats,
         **more: Any,
     ) -> Tracks:
-        register = self.register
+        register, xy = self.register, x.take(self.model.position, axis=1)
         tracks = Tracks(
             t=t,
             id=register.id.copy(),
             status=register.status.copy(),
             x=x.copy(),
             P=P.copy(),
-            box=absolute(register.box, x[:, self.model.position]),
+            box=absolute(register.box, xy),
             group=register.group.copy(),
             group_since_s=register.group_since_s.copy(),
             age_s=t - register.born_s,
-            travel=np.linalg.norm(x[:, self.model.position] - register.start, axis=1),
+            travel=register.travel(xy),
             existence=register.existence,
             measurement=taken,
             nis=nis,
@@ -391,7 +395,3 @@ class Tracker:
             return tracks
         shown = self.forest.shown
         return tracks.only(shown[np.argsort(register.id[shown])])
-
-
-def _deaths(t: float, ids: Ints, reason: str) -> Iterable[Event]:
-    return (Event(t, int(track), "delete", reason) for track in ids)

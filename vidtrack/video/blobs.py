@@ -49,7 +49,7 @@ class Blobs:
         that look like the road come and go slowly.
         """
         R = self.settings.jitter_share**2 * self.cov
-        R[:, [0, 1], [0, 1]] += (self.settings.jitter_px * self.step) ** 2
+        R += (self.settings.jitter_px * self.step) ** 2 * np.eye(2)
         box = self.box.copy()
         box[:, :2] -= self.centroid
         return Scan(time_s, self.centroid, R, box=box, amplitude=self.amplitude)

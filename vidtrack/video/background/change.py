@@ -45,13 +45,15 @@ class Change:
         share, spread = _shares(mask, *_CELLS)
         changing = self._steady_s < self._time_s
         unseen = time_s - self._time_s > _UNSEEN_S
-        self._recent = np.append(self._recent[self._recent[:, 0] >= time_s - _SUDDEN_S], [[time_s, spread]], axis=0)
-        least = self._steady_spread if changing or unseen else float(self._recent[:, 1].min())
+        recent = self._recent[self._recent[:, 0] >= time_s - _SUDDEN_S]
+        self._recent = np.concatenate([recent, [[time_s, spread]]])
+        least_recent = float(self._recent[:, 1].min())
+        least = self._steady_spread if changing or unseen else least_recent
         self._time_s = time_s
         sudden = spread - least > _SUDDEN and time_s - self._start_s > _SETTLED_S
         if share > self._largest_share or sudden:
             return time_s - self._steady_s
-        self._steady_s, self._steady_spread = time_s, float(self._recent[:, 1].min())
+        self._steady_s, self._steady_spread = time_s, least_recent
         return 0.0
 
 
@@ -61,21 +63,16 @@ def _shares(mask, columns, rows):  # type: ignore[no-untyped-def]
     h, w = mask.shape
     columns, rows = min(columns, w), min(rows, h)
     total = touched = 0
+    count = np.empty(w, np.int32)  # in each column of pixels
     for j in range(rows):
         top, bottom = j * h // rows, (j + 1) * h // rows
+        count[:] = 0
+        for y in range(top, bottom):
+            for x in range(w):
+                count[x] += np.int32(mask[y, x] >> np.uint8(7))
         for i in range(columns):
             left, right = i * w // columns, (i + 1) * w // columns
-            count = 0
-            for y in range(top, bottom):
-                count += _count(mask[y, left:right])
-            total += count
-            touched += count > _TOUCHED * (bottom - top) * (right - left)
+            inside = count[left:right].sum()
+            total += inside
+            touched += inside > _TOUCHED * (bottom - top) * (right - left)
     return total / (h * w), touched / (columns * rows)
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _count(pixels):  # type: ignore[no-untyped-def]
-    count = np.uint32(0)
-    for x in range(len(pixels)):
-        count += np.uint32(pixels[x] >> np.uint8(7))
-    return count

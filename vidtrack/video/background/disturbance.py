@@ -37,6 +37,9 @@ class Disturbance:
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
         self._view = view
+        self._thresholds = tuple(
+            np.float32(level) for level in (settings.luma_threshold, settings.noise_factor, settings.chroma_threshold)
+        )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
         self._scene = nothing()
@@ -94,7 +97,7 @@ class Disturbance:
         strength = np.empty(picture.luma.shape, np.float32)
         hit = np.empty(picture.luma.shape, np.uint8)
         seen = picture if s.chroma else picture.grey()
-        floor, factor, chroma = np.array([s.luma_threshold, s.noise_factor, s.chroma_threshold], np.float32)
+        floor, factor, chroma = self._thresholds
         disturbance(seen, scene, floor, factor, chroma, strength, hit)
         if s.shadow:
             mark_shadow(seen, scene, np.float32(self._view.black), hit)

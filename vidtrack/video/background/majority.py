@@ -20,38 +20,18 @@ def majority(hit, window, mask):  # type: ignore[no-untyped-def]
     column = np.zeros(w + 2 * reach, np.uint8)
     inside = column[reach : reach + w]
     total = np.empty(w, np.uint8)
-    for y in range(min(reach, h)):
-        _add(hit[y], inside)
-    for y in range(h):
+    for y in range(-reach, h):
         if y + reach < h:
-            _add(hit[y + reach], inside)
-        if y - reach - 1 >= 0:
-            _subtract(hit[y - reach - 1], inside)
-        total[:] = 0
-        for shift in range(window):
-            _accumulate(column[shift : shift + w], total)
-        _more_than(total, need, mask[y])
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _add(hit, column):  # type: ignore[no-untyped-def]
-    for x in range(len(hit)):
-        column[x] = np.uint8(column[x] + np.uint8(hit[x] == 1))
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _subtract(hit, column):  # type: ignore[no-untyped-def]
-    for x in range(len(hit)):
-        column[x] = np.uint8(column[x] - np.uint8(hit[x] == 1))
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _accumulate(column, total):  # type: ignore[no-untyped-def]
-    for x in range(len(total)):
-        total[x] = np.uint8(total[x] + column[x])
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _more_than(total, need, mask):  # type: ignore[no-untyped-def]
-    for x in range(len(mask)):
-        mask[x] = np.uint8(255) if total[x] > need else np.uint8(0)
+            for x in range(w):
+                inside[x] += np.uint8(hit[y + reach, x] == 1)
+        if y - reach > 0:
+            for x in range(w):
+                inside[x] -= np.uint8(hit[y - reach - 1, x] == 1)
+        if y >= 0:
+            total[:] = 0
+            for shift in range(window):
+                shifted = column[shift:]
+                for x in range(w):
+                    total[x] += shifted[x]
+            for x in range(w):
+                mask[y, x] = np.uint8(255) if total[x] > need else np.uint8(0)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.errors import Error
+from vidtrack.video.background.filters import LARGEST_STEP, area_average, smoothed
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -32,7 +33,7 @@ class Picture(NamedTuple):
 class View:
     """How a detector sees a source; the first frame decides.
 
-    step   source pixels per processed pixel
+    step   source pixels per processed pixel; small pictures keep at least 2 x 2
     black  luminance of black
     """
 
@@ -57,7 +58,8 @@ class View:
         """The frame's planes as area averages of step x step pixels."""
         if self._shape is None:
             self._shape = frame.shape
-            self.step = reduction(frame.shape[0], self._scale)
+            step = reduction(frame.shape[0], self._scale)
+            self.step = max(1, min(step, min(frame.shape) // 2, LARGEST_STEP))
             self.black = 0 if frame.full_range else _VIDEO_BLACK
         return reduce(frame, self.step)
 
@@ -89,25 +91,20 @@ def reduce(frame: Frame, step: int) -> Picture:
     """The frame's planes as area averages of step x step pixels.
 
     Rows and columns that do not fill a window at the lower and right edge are left out; h and w are then even,
-    so that chroma still covers the picture.
+    so that chroma still covers the picture. The frame has at least 2 step rows and columns.
     """
     cb, cr = (np.empty((0, 0), np.uint8) if plane is None else plane for plane in (frame.u, frame.v))
     if step == 1:
         return Picture(frame.y, cb, cr)
-    h, w = (2 * max(1, size // (2 * step)) for size in frame.shape)
+    h, w = (2 * (size // (2 * step)) for size in frame.shape)
     half = (h // 2, w // 2)
-    cb, cr = (_area_average(plane, half, step) if plane.size else plane for plane in (cb, cr))
-    return Picture(_area_average(frame.y, (h, w), step), cb, cr)
+    cb, cr = (area_average(plane, half, step) if plane.size else plane for plane in (cb, cr))
+    return Picture(area_average(frame.y, (h, w), step), cb, cr)
 
 
 def smooth(picture: Picture) -> Picture:
     """Each plane weighted 1-2-1 in both directions, against sensor noise."""
-    return Picture(*(cv2.GaussianBlur(plane, (3, 3), 0) if plane.size else plane for plane in picture))
-
-
-def _area_average(plane: Image, shape: tuple[int, int], step: int) -> NDArray:
-    h, w = shape
-    return cv2.resize(plane[: h * step, : w * step], (w, h), interpolation=cv2.INTER_AREA)
+    return Picture(*(smoothed(plane) if plane.size else plane for plane in picture))
 
 
 def _enlarge(plane: NDArray, shape: tuple[int, int], step: int) -> Image:

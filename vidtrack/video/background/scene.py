@@ -15,6 +15,7 @@ from vidtrack.video.background.shadow import SHADOW
 FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
 NEVER = np.float32(-1000)  # like no luminance
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
+_NONE = np.float32(0)
 _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
 
 
@@ -54,16 +55,20 @@ def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
     """
     h, w = covered.shape
-    coloured = len(picture.cb) > 0
-    half = np.empty((w + 1) // 2, np.uint8)
     for y in range(h):
-        _learn_noise(picture.luma[y], scene.luma[y], scene.noise[y], covered[y], noise_weight)
-        _learn_mean(picture.luma[y], scene.luma[y], covered[y], weight)
-        _count(covered[y], scene.covered_s[y], dt)
-        if coloured and y % 2 == 0:
-            _every_second(covered[y], half)
-            _learn_mean(picture.cb[y // 2], scene.cb[y // 2], half, weight)
-            _learn_mean(picture.cr[y // 2], scene.cr[y // 2], half, weight)
+        for x in range(w):
+            free = covered[y, x] == 0
+            noise = scene.noise[y, x]
+            d = np.float32(picture.luma[y, x]) - scene.luma[y, x]
+            deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
+            scene.luma[y, x] += (weight if free else _NONE) * d
+            scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
+            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + dt
+        if len(picture.cb) > 0 and y % 2 == 0:
+            for x in range((w + 1) // 2):
+                share = weight if covered[y, 2 * x] == 0 else _NONE
+                scene.cb[y // 2, x] += share * (np.float32(picture.cb[y // 2, x]) - scene.cb[y // 2, x])
+                scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])
 
 
 @numba.njit(cache=CACHE, nogil=True)
@@ -104,31 +109,3 @@ def _adopt(picture, scene, y, x):  # type: ignore[no-untyped-def]
     if len(picture.cb) > 0:
         scene.cb[y // 2, x // 2] = picture.cb[y // 2, x // 2]
         scene.cr[y // 2, x // 2] = picture.cr[y // 2, x // 2]
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _learn_noise(luma, scene, noise, covered, weight):  # type: ignore[no-untyped-def]
-    for x in range(len(noise)):
-        v = noise[x]
-        deviation = min(abs(np.float32(luma[x]) - scene[x]), _SURPRISE * max(v, _QUIET))
-        w = weight if covered[x] == 0 else np.float32(0)
-        noise[x] = v + w * (deviation - v)
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _learn_mean(plane, scene, covered, weight):  # type: ignore[no-untyped-def]
-    for x in range(len(scene)):
-        w = weight if covered[x] == 0 else np.float32(0)
-        scene[x] += w * (np.float32(plane[x]) - scene[x])
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _count(covered, seconds, dt):  # type: ignore[no-untyped-def]
-    for x in range(len(seconds)):
-        seconds[x] = seconds[x] + dt if covered[x] != 0 else np.float32(0)
-
-
-@numba.njit(cache=CACHE, nogil=True)
-def _every_second(row, half):  # type: ignore[no-untyped-def]
-    for x in range(len(half)):
-        half[x] = row[2 * x]

@@ -1,0 +1,54 @@
+"""A grid over points, so that who is near whom need not be asked of every pair."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from vidtrack.compiled import CACHE
+from vidtrack.scan import Floats, Ints
+
+
+@njit(cache=CACHE, nogil=True, error_model="numpy")
+def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
+    """Points z (M, m), of which the first two axes count, by (run, row of cells, column); runs numbered from 0.
+
+    Returns order (M,), first, origin (2,), cell (2,), shape (2,): cell c, of sides `cell`, holds
+    order[first[c]..first[c + 1]]. Cells follow the mean gate, of half sides reach (T, 2), some four to a point at most.
+    """
+    axes = min(2, z.shape[1])
+    origin, extent = np.zeros(2), np.zeros(2)
+    for a in range(axes if len(z) else 0):
+        origin[a] = z[:, a].min()
+        extent[a] = z[:, a].max() - origin[a]
+    runs = 1 + (run.max() if len(run) else 0)
+    most = np.ceil(2 * np.sqrt(max(1, len(z)) / runs))
+    cell = np.maximum(np.maximum(_typical(reach), extent / most), 1e-9)
+    shape = (extent / cell).astype(np.int64) + 1
+
+    key, order = np.zeros(len(z), np.int64), np.empty(len(z), np.int64)
+    first = np.zeros(runs * shape[0] * shape[1] + 1, np.int64)
+    for j in range(len(z)):
+        key[j] = run[j]
+        for a in range(1, -1, -1):
+            at = np.int64((z[j, a] - origin[a]) / cell[a]) if a < axes else 0
+            key[j] = key[j] * shape[a] + min(at, shape[a] - 1)
+        first[key[j] + 1] += 1
+    first = np.cumsum(first)
+    place = first.copy()
+    for j in range(len(z)):
+        order[place[key[j]]] = j
+        place[key[j]] += 1
+    return order, first, origin, cell, shape
+
+
+@njit(cache=CACHE, nogil=True)
+def _typical(reach: Floats) -> Floats:
+    """(2,) mean of the finite half sides, one where there is none."""
+    total, count = np.zeros(2), 0
+    for t in range(len(reach)):
+        if np.isfinite(reach[t, 0]) and np.isfinite(reach[t, 1]):
+            total[0] += reach[t, 0]
+            total[1] += reach[t, 1]
+            count += 1
+    return total / count if count else np.ones(2)

@@ -1,0 +1,67 @@
+"""Filters of one 8-bit plane: the area average that reduces it, and the 1-2-1 weights against sensor noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import cv2
+import numba
+import numpy as np
+
+from vidtrack.compiled import CACHE, specialised
+from vidtrack.video.frame import Image
+
+LARGEST_STEP = 256  # a column of so many pixels still adds up in 16 bits
+
+
+def area_average(plane: Image, shape: tuple[int, int], step: int) -> Image:
+    """(h, w) means of step x step pixels from the upper left corner on, halves rounded up; step <= LARGEST_STEP."""
+    reduced = np.empty(shape, np.uint8)
+    _averaging(step)(plane, reduced)
+    return reduced
+
+
+def smoothed(plane: Image) -> Image:
+    """(h, w) the plane weighted 1-2-1 in both directions; it is mirrored at its edges, and halves are rounded up."""
+    smooth = np.empty(plane.shape, np.uint8)
+    _weigh(np.asarray(cv2.copyMakeBorder(plane, 1, 1, 1, 1, cv2.BORDER_REFLECT_101), np.uint8), smooth)
+    return smooth
+
+
+@cache
+def _averaging(step: int) -> Callable[..., Any]:
+    """The kernel for one step: only with a constant stride is it vectorised.
+
+    It reads a picture in the order of memory: cv2.resize does not, and waits for a picture that is in no cache.
+    """
+
+    def average(plane, reduced):  # type: ignore[no-untyped-def]
+        h, w = reduced.shape
+        column = np.empty(step * w, np.uint16)
+        for y in range(h):
+            for x in range(step * w):
+                total = np.uint16(0)
+                for j in range(step):
+                    total += np.uint16(plane[step * y + j, x])
+                column[x] = total
+            for x in range(w):
+                area = np.uint32(step * step // 2)
+                for i in range(step):
+                    area += column[step * x + i]
+                reduced[y, x] = area // np.uint32(step * step)
+
+    return specialised(average, step)
+
+
+@numba.njit(cache=CACHE, nogil=True)
+def _weigh(plane, smooth):  # type: ignore[no-untyped-def]
+    """smooth (h, w) from plane (h + 2, w + 2)."""
+    h, w = smooth.shape
+    column = np.empty(w + 2, np.uint16)
+    for y in range(h):
+        for x in range(w + 2):
+            column[x] = plane[y, x] + 2 * np.uint16(plane[y + 1, x]) + plane[y + 2, x]
+        for x in range(w):
+            smooth[y, x] = (column[x] + 2 * column[x + 1] + column[x + 2] + 8) >> 4
