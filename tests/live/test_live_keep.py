@@ -2,6 +2,7 @@
 
 import os
 import time
+from datetime import datetime
 
 import pytest
 
@@ -81,3 +82,24 @@ def test_parts_of_the_same_second_have_different_names(tmp_path):
     parts = [new_part(tmp_path) for _ in range(3)]
     assert len(set(parts)) == 3
     assert parts_of(tmp_path) == sorted(parts)
+
+
+def test_names_stay_in_order_when_the_clock_is_set_back(tmp_path, monkeypatch):
+    class Clock(datetime):
+        hour_now = 12
+
+        @classmethod
+        def now(cls, tz=None):
+            return datetime(2026, 1, 1, cls.hour_now, tzinfo=tz)
+
+    monkeypatch.setattr("vidtrack.live.keep.datetime", Clock)
+    made = [new_part(tmp_path)]
+    Clock.hour_now = 11
+    made += [new_part(tmp_path) for _ in range(11)]
+    Clock.hour_now = 13
+    made += [new_part(tmp_path)]
+    assert parts_of(tmp_path) == made
+    keep = Keep(1e9, None)
+    keep.roots.append(tmp_path)
+    keep.prune()
+    assert parts_of(tmp_path)[-1] == made[-1]

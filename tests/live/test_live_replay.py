@@ -139,6 +139,8 @@ def test_a_killed_run_never_gives_a_number_twice(camera, tmp_path):
     fresh = ids(tmp_path / "two") - ids(tmp_path / "one")
     assert fresh
     assert min(fresh) >= given
+    one, two = (read_tracks(tmp_path / name / "tracks.csv")["frame"].to_pylist() for name in ("one", "two"))
+    assert min(two) > max(one)
 
 
 def test_numbers_are_reserved_before_they_are_scarce(tmp_path):
@@ -147,6 +149,7 @@ def test_numbers_are_reserved_before_they_are_scarce(tmp_path):
 
     class Memory:
         tracker = type("Tracker", (), {"register": Register})
+        frame = 0
 
         def gather(self):
             return {"tracker.register.next_id": Register.next_id}

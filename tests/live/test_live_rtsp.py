@@ -13,7 +13,7 @@ from vidtrack.config import LiveSettings, Settings
 from vidtrack.errors import SourceError
 from vidtrack.live.run import LiveRun
 from vidtrack.video.live.address import parse_address
-from vidtrack.video.live.connection import Refused
+from vidtrack.video.live.connection import Connection, Refused
 from vidtrack.video.live.source import LiveSource
 
 pytestmark = needs_rtsp
@@ -94,6 +94,17 @@ def test_what_cannot_be_opened_says_why(camera, caplog, login, path, error, mess
     for text in (str(caught.value), caplog.text):
         assert "wr0ng" not in text
         assert "cret" not in text
+
+
+def test_frozen_when_it_is_opened():
+    with RtspCamera() as camera:
+        address = parse_address(camera.url(), 30.0)
+        other = Connection(address, 30.0)  # for as long as it stays, the server keeps its pipeline
+        next(other.packets())
+        camera.tell("freeze")
+        with within(20.0), pytest.raises(SourceError, match="no answer in 1 s"):
+            open_source(camera.url())
+        other.close()
 
 
 def test_nobody_there():

@@ -125,8 +125,38 @@ def test_the_disk_is_bounded(camera, tmp_path, monkeypatch):
     with LiveRun(camera.url(), chosen, tmp_path / "out", extras) as run:
         run_for(run, 4.0)
     total = sum(path.stat().st_size for path in tmp_path.rglob("*") if path.is_file())
-    assert total < 7_000_000
+    assert total < 8_000_000  # more comes between two looks
     assert len(parts_of(tmp_path / "tape")) >= 1
+
+
+def test_a_step_of_the_wall_clock_disturbs_nothing(camera, tmp_path, monkeypatch):
+    """NTP sets it back by an hour and later ahead by two: frames, tracks and files go on as they were."""
+    true, offset = time.time, [0.0]
+    monkeypatch.setattr(time, "time", lambda: true() + offset[0])
+    out, seen = tmp_path / "out", []
+    extras = Extras(state=tmp_path / "state", record=tmp_path / "tape")
+    with LiveRun(camera.url("video.ts"), settings("live.roll_s=1800", "live.keep_s=100_000"), out, extras) as run:
+        for step in run:
+            offset[0] = 3600.0 * (-1 if 1.0 < step.time_s < 2.0 else step.time_s >= 2.0)
+            seen.append((step.index, step.time_s, set(step.tracks.id[step.tracks.status > 0].tolist())))
+            if step.time_s > 3.0:
+                run.stop()
+        reading = run.board.now().reading
+        assert run.board.latency_ms()["max"] < 1500
+    indices, times, alive = zip(*seen, strict=True)
+    assert indices == tuple(range(len(seen)))
+    assert 0 < np.diff(times).min() <= np.diff(times).max() < 0.5
+    assert reading["reconnects"] == reading["stalls"] == 0
+    assert reading["fps_in"] == pytest.approx(camera.fps, rel=0.5)
+    for moment in (1.0, 2.0):
+        k = int(np.searchsorted(times, moment))
+        assert not alive[k - 3] or alive[k - 3] & alive[k + 3]  # tracks live through it
+    parts = parts_of(out)
+    assert len(parts) == 3
+    frames = np.concatenate([read_tracks(part / "tracks.csv")["frame"].to_numpy() for part in parts])
+    assert np.all(np.diff(frames) >= 0)
+    with Run(str(tmp_path / "tape"), settings(), tmp_path / "again") as replayed:
+        assert [step.index for step in replayed] == list(indices)
 
 
 class Disk:

@@ -3,14 +3,15 @@
 import logging
 import time
 
+import av
 import numpy as np
 import pytest
 from cameras import Picture, Script, grey, script_of, within
 
 from vidtrack.config import LiveSettings
 from vidtrack.errors import SourceError
-from vidtrack.video.live.address import Address
-from vidtrack.video.live.connection import Refused, Stalled
+from vidtrack.video.live.address import Address, parse_address
+from vidtrack.video.live.connection import Connection, Refused, Stalled
 from vidtrack.video.live.source import LiveSource
 
 ADDRESS = Address("rtsp://user:secret@cam/x", "rtsp://***@cam/x", "cam")
@@ -159,6 +160,15 @@ def test_three_failures_at_the_start_are_the_end():
 def test_a_refusal_at_the_start_is_the_end_at_once():
     with pytest.raises(Refused, match="no"):
         open_script(Refused("no"), Script(*pictures([10]), 5.0))
+
+
+def test_no_permission_for_the_device_says_what_to_do(monkeypatch):
+    def denied(*_, **__):
+        raise av.error.PermissionError(13, "Permission denied", "/dev/null")
+
+    monkeypatch.setattr(av, "open", denied)
+    with pytest.raises(Refused, match="/dev/null: permission denied; add your user to the group"):
+        Connection(parse_address("/dev/null", 1.0), 1.0)
 
 
 def test_a_refusal_later_is_not():

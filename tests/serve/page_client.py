@@ -51,6 +51,7 @@ class MadeUp:
         where = {"x_px": 310.5, "y_px": 180.25, "vx_px_s": 60.0, "vy_px_s": -80.0, "box_px": [290.0, 165.0, 41.0, 30.5]}
         return {
             "state": "running",
+            "restarts": 3,
             "reading": READING,
             "problems": [(now_s - 700, "no answer in 5 s"), (now_s - 60, 'the camera said "<b>stop</b>"')],
             "source": self.source,

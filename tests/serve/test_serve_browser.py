@@ -70,6 +70,7 @@ def test_the_page_says_everything(url, tmp_path):
         "dropped 120",
         "stalls 1",
         "reconnects 2",
+        "process restarts 3",
         "not written rerun 7",
         "north left 12",
         "7 confirmed 311 180 100",

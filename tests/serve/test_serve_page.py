@@ -5,7 +5,7 @@ import logging
 import urllib.request
 
 import pytest
-from page_client import MadeUp, get, get_json, page_over
+from page_client import MadeUp, connect, get, get_json, page_over
 from prometheus_client.parser import text_string_to_metric_families
 
 WAITING = {"state": "waiting", "frame_age_s": 73.0}
@@ -81,6 +81,7 @@ def test_metrics_are_what_prometheus_reads(url):
     gate = ("camera", "gate")
     assert found["vidtrack_frames_dropped_total", gate] == 120
     assert found["vidtrack_reconnects_total", gate] == 2
+    assert found["vidtrack_restarts_total", gate] == 3
     assert found["vidtrack_stalls_total", gate] == 1
     assert found["vidtrack_latency_seconds", gate, ("quantile", "0.99")] == 0.0885
     assert found["vidtrack_lost_total", gate, ("output", "rerun")] == 7
@@ -114,6 +115,21 @@ def test_nothing_without_the_token(path):
             assert code == 401
             assert headers["WWW-Authenticate"].startswith("Basic ")
             assert b"sesame" not in body
+
+
+@pytest.mark.parametrize("nonsense", [b"Basic \xff\xfe", b"Basic !", b"Basic", b"Bearer", b"\xe4"])
+def test_nonsense_is_no_token(nonsense):
+    with page_over({"gate": MadeUp()}, token="sesame") as url:
+        client = connect(url, b"GET /healthz HTTP/1.1\r\nHost: x\r\nAuthorization: " + nonsense + b"\r\n\r\n")
+        assert client.recv(100).startswith(b"HTTP/1.1 401 ")
+        client.close()
+
+
+def test_foreign_pages_cannot_show_the_picture(url):
+    for path in ("", "picture/0.jpg", "status"):
+        headers = get(url + path)[1]
+        assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+        assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
 
 
 def test_the_token_is_a_bearer_or_a_password():

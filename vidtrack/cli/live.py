@@ -80,22 +80,24 @@ def command(
     The folder of the results is printed; it holds what vidtrack track writes, with --roll in sub-folders named by
     the time in UTC. Times are seconds since the first picture. What --record keeps, vidtrack track repeats.
     """
-    from vidtrack.cli.hide import hide_arguments
-    from vidtrack.cli.live_many import are_many, track_many
     from vidtrack.cli.signals import Terminated
-    from vidtrack.compiled import first_run
-    from vidtrack.config import load
-    from vidtrack.live.outputs import Extras
-    from vidtrack.video.live.address import secrets
 
-    hide_arguments([*(text for source in sources for text in secrets(source)), *([http_token] if http_token else [])])
-    start_log(verbose, quiet)
-    given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
-    settings = load(config_file, given)
-    if first_run() and not quiet:
-        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
-    extras = Extras(rerun, video, save_masks, decisions, state, record)
     try:
+        from vidtrack.cli.hide import hide_arguments
+        from vidtrack.cli.live_many import are_many, track_many
+        from vidtrack.compiled import first_run
+        from vidtrack.config import load
+        from vidtrack.live.outputs import Extras
+        from vidtrack.video.live.address import secrets
+
+        hidden = [text for source in sources for text in secrets(source)]
+        hide_arguments([*hidden, *([http_token] if http_token else [])])
+        start_log(verbose, quiet)
+        given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
+        settings = load(config_file, given)
+        if first_run() and not quiet:
+            click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+        extras = Extras(rerun, video, save_masks, decisions, state, record)
         with _page(http, http_token) as page:
             if page is not None and not quiet:
                 click.echo(f"vidtrack: the page is at {page.url}", err=True)
@@ -104,7 +106,8 @@ def command(
                 return track_many(sources, output, extras, config_file, given, page, log, force=force, quiet=quiet)
             _track_one(sources[0], settings, output, extras, page, force=force, quiet=quiet)
     except (KeyboardInterrupt, Terminated):
-        click.echo("vidtrack: stopped before the first picture, or at once", err=True)
+        if not quiet:
+            click.echo("vidtrack: stopped before the end of the first picture, or at once", err=True)
     return 0
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vidtrack.serve.page import Page
 
 _TELL_S = 60.0
-_LOOK_S = 0.5
+_LOOK_S = 0.2
 
 
 def are_many(sources: Sequence[str]) -> bool:
@@ -99,10 +99,11 @@ def _print_table(many: Many) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls")
+    columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls", "restarts")
     summary = many.summary()
     table = Table("camera", *(name.replace("frames_", "") for name in columns), "end")
     for name, camera in summary["cameras"].items():
-        table.add_row(name, *(str(camera.get(column, "")) for column in columns), camera.get("error", "well"))
+        end = "by an error" if "error" in camera else "well"
+        table.add_row(name, *(str(camera.get(column, "")) for column in columns), end)
     table.add_row("all", *(str(summary[column]) for column in columns), "", style="bold")
     Console(stderr=True).print(table)

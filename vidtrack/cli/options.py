@@ -41,6 +41,7 @@ def start_log(verbose: int, quiet: bool, who: str = "") -> None:
     handler = logging.StreamHandler()
     about = f"{who}: " if who else ""
     handler.setFormatter(logging.Formatter(f"vidtrack: {about}%(levelname)s: %(message)s"))
+    logging.addLevelName(logging.ERROR, "error")
     logging.addLevelName(logging.WARNING, "warning")
     logging.addLevelName(logging.INFO, "info")
     logger = logging.getLogger("vidtrack")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import signal
+from _thread import interrupt_main
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from threading import Event, Thread
 from types import FrameType
 from typing import Any, TypeVar
 
 Item = TypeVar("Item")
 _WATCHED = (signal.SIGINT, signal.SIGTERM)
+_PATIENCE_S = 0.8  # that a frame may take to end by itself: the first one waits for the compiler
 
 
 class Terminated(BaseException):
@@ -45,19 +48,24 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
 
 @contextmanager
 def stopping(stop: Callable[[], None]) -> Iterator[None]:
-    """The first signal calls `stop`, a second one ends the program at once."""
-    stopped = False
+    """The first signal calls `stop`; a second one, or waiting in vain, is raised where the program stands."""
+    stopped, over = Event(), Event()
 
     def note(number: int, frame: FrameType | None) -> None:
-        nonlocal stopped
-        if stopped:
+        if stopped.is_set():
             raise KeyboardInterrupt
-        stopped = True
+        stopped.set()
         stop()
+        Thread(target=interrupt, name="patience", daemon=True).start()
+
+    def interrupt() -> None:
+        while not over.wait(_PATIENCE_S):  # again and again: compiled code that calls Python swallows it
+            interrupt_main()
 
     before = {number: signal.signal(number, note) for number in _WATCHED}
     try:
         yield
     finally:
+        over.set()
         for number, handler in before.items():
             signal.signal(number, handler)

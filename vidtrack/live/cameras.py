@@ -74,12 +74,15 @@ def settings_of(
 
 def extras_of(camera: Entry, extras: Extras) -> Extras:
     """Places for one camera: into folders goes one with its name, files get it before their ending."""
-    if extras.rerun is not None:
-        raise ConfigError("--rerun shows one camera; use --http for several")
+    if extras.rerun in ("spawn", "serve"):
+        raise ConfigError(
+            f"--rerun {extras.rerun} shows one camera; give FILE.rrd for a recording of each, or use --http"
+        )
     return replace(
         extras,
-        video=_file(extras.video, camera),
-        state=_file(extras.state, camera),
+        rerun=extras.rerun and str(_file(Path(extras.rerun), camera)),
+        video=extras.video and _file(extras.video, camera),
+        state=extras.state and _file(extras.state, camera),
         masks=extras.masks and extras.masks / camera.name,
         record=extras.record and extras.record / camera.name,
     )
@@ -107,5 +110,5 @@ def _as_folder(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name).strip("._") or "camera"
 
 
-def _file(path: Path | None, camera: Entry) -> Path | None:
-    return path and path.with_name(f"{path.stem}-{camera.name}{path.suffix}")
+def _file(path: Path, camera: Entry) -> Path:
+    return path.with_name(f"{path.stem}-{camera.name}{path.suffix}")

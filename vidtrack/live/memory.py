@@ -10,6 +10,7 @@ from time import monotonic
 
 from vidtrack.output.folder import usable
 from vidtrack.output.linefile import Every
+from vidtrack.output.sink import Step
 from vidtrack.state import State, gather, read_state, restore, write_state
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video.foreground import Background
@@ -18,8 +19,8 @@ from vidtrack.video.frame import Frame
 log = logging.getLogger(__name__)
 
 _SAVE_S = 10.0
-_BLOCK = 10_000  # ids reserved at a time: many times more than one picture can hold
-_NEXT_ID = "tracker.register.next_id"
+_BLOCK = 10_000  # ids reserved at a time, and numbers of frames: many times more than come between two saves
+_NEXT_ID, _FRAME = "tracker.register.next_id", "frame"
 
 
 class Memory:
@@ -41,9 +42,9 @@ class Memory:
         self.time_s = 0.0
         self.unix_s = time.time()
 
-    def note(self, frame: Frame) -> None:
-        """This frame is the last one now."""
-        self.frame, self.time_s, self.unix_s = frame.index, frame.time_s, time.time()
+    def note(self, step: Step) -> None:
+        """This step is the last one now."""
+        self.frame, self.time_s, self.unix_s = step.index, step.time_s, time.time()
 
     def gather(self) -> State:
         """A copy as plain data."""
@@ -63,12 +64,12 @@ class NoStateFile:
     def offer(self, memory: Memory) -> None:
         """It is not."""
 
-    def close(self, memory: Memory, until_s: float) -> None:
+    def close(self, memory: Memory | None, until_s: float) -> None:
         """Nothing is open."""
 
 
 class StateFile(NoStateFile):
-    """A memory on the disk, saved regularly. Ids are reserved there before they are used: none is issued twice.
+    """A memory on the disk, saved regularly. Numbers are reserved there before they are used: none is issued twice.
 
     found  what an earlier run left; None without one
     lost   times that it could not be saved
@@ -92,17 +93,21 @@ class StateFile(NoStateFile):
         if not (scarce or self._due()) or (self._writing is not None and self._writing.is_alive()):
             return
         self._reserved = next_id + _BLOCK
-        state = memory.gather() | {_NEXT_ID: self._reserved}
+        state = memory.gather() | {_NEXT_ID: self._reserved, _FRAME: memory.frame + _BLOCK}
         if self._writing is None:  # nothing is reserved yet
             self._write(state)
         self._writing = Thread(target=self._write, args=(state,), name="save-state", daemon=True)
         self._writing.start()
 
-    def close(self, memory: Memory, until_s: float) -> None:
-        """Save the end, waiting for the disk until a monotonic time; ids that were reserved in vain are free again."""
+    def close(self, memory: Memory | None, until_s: float) -> None:
+        """Save the end, waiting for the disk until a monotonic time; what was reserved in vain is free again.
+
+        memory  None: a frame was broken off, and what was saved before it holds
+        """
         if self._writing is not None:
             self._writing.join(max(0.0, until_s - monotonic()))
-        self._write(memory.gather())
+        if memory is not None:
+            self._write(memory.gather())
 
     def _write(self, state: State) -> None:
         try:

@@ -73,11 +73,8 @@ class Outputs:
         self._subject = subject
         self._settings = settings
         self._decisions = extras.decisions
-        parts = Parts(folder, self._part, roll_s, keep, subject.counter, self._summary)
-        tables = Beside("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
-        self._confirmed = Confirmed(tables, hold_s=LIVE_HOLD_S)
-        self._besides = [tables]
-        self._sinks: list[Sink] = [self._confirmed]
+        self._besides: list[Beside] = []
+        self._sinks: list[Sink] = []
         if extras.masks is not None:
             self._add("masks", MaskFolder(extras.masks))
         lines = subject.counter.lines if subject.counter else ()
@@ -89,6 +86,12 @@ class Outputs:
             from vidtrack.output.rerun import RerunSink
 
             self._add("rerun", RerunSink(extras.rerun, subject.shape, settings, lines))
+        # The last, so that what cannot be opened above leaves the folder empty.
+        parts = Parts(folder, self._part, roll_s, keep, subject.counter, self._summary)
+        tables = Beside("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
+        self._confirmed = Confirmed(tables, hold_s=LIVE_HOLD_S)
+        self._besides.append(tables)
+        self._sinks.append(self._confirmed)
 
     @property
     def lost(self) -> dict[str, int]:
@@ -102,10 +105,9 @@ class Outputs:
 
     def close(self, until_s: float) -> None:
         """Finish all by a monotonic time; what is not finished then stays as it is, and valid."""
-        for beside in self._besides[1:]:
-            beside.end()
-        self._confirmed.close()
-        for beside in self._besides:
+        for sink in self._sinks:
+            sink.close()
+        for beside in reversed(self._besides):  # the tables first
             beside.join(max(_LEAST_S, until_s - monotonic()))
 
     def _add(self, name: str, sink: Sink) -> None:

@@ -6,19 +6,16 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
-import pyarrow as pa
-
 from vidtrack.errors import StoppedEarly
 from vidtrack.output.counts import HEADER
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.linefile import LineFile, sort_rows
 from vidtrack.output.mot import MotFile
-from vidtrack.output.parquet import write_parquet
 from vidtrack.output.plot import TrajectoryPlot
-from vidtrack.output.repair import read_tracks
+from vidtrack.output.repair import add_parquet
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
-from vidtrack.output.tables import VIDEO, csv_text, schema, track_rows
+from vidtrack.output.tables import VIDEO, csv_text, track_rows
 from vidtrack.traffic.lines import LineCounter
 from vidtrack.video.frame import Image
 
@@ -80,14 +77,10 @@ class Part:
             self._summary.interrupted = False
             stack.callback(self._summary.close)
             stack.callback(self._plot.close)
-            stack.callback(self._add_parquet)
+            stack.callback(add_parquet, self.folder)
             if self._counts is not None:
                 stack.callback(sort_rows, self._counts.path, columns=1, header=True)
             stack.push(self._files)
-
-    def _add_parquet(self) -> None:
-        write_parquet(self.folder / "tracks.parquet", schema(VIDEO), [read_tracks(self._tracks.path)])
-        pa.default_memory_pool().release_unused()
 
 
 def count(summary: Summary, steps: Sequence[Step]) -> None:

@@ -17,6 +17,7 @@ from vidtrack.live.memory import Memory, NoStateFile, StateFile
 from vidtrack.live.outputs import Extras, Outputs, Subject
 from vidtrack.live.recorder import NoRecorder, Recorder
 from vidtrack.output.folder import open_run, usable
+from vidtrack.output.lock import alone
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
 from vidtrack.pipeline import build_detector, build_tracker, video_steps
@@ -29,7 +30,8 @@ from vidtrack.video.resources import keep_freed_memory, opencv_single_threaded
 from vidtrack.video.span import Span
 
 _HOUR_S = 3600.0
-_END_S = 1.5  # in which everything has to be finished after the last frame
+_END_S = 1.6  # from the word to stop until everything has to be finished
+_LEAST_S = 0.5  # that this gets, however long the last frame took
 
 
 class LiveRun:
@@ -60,10 +62,13 @@ class LiveRun:
         self.name = self._address.name
         roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
         keep = Keep(live.keep_s, live.keep_bytes)
-        self._state_file = NoStateFile() if extras.state is None else StateFile(extras.state)
-        self._recorder = NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, keep)
         self._outputs: Outputs | None = None
-        with ExitStack() as stack:  # whatever fails below, what is open by then is closed
+        self._until_s: float | None = None  # when everything has to be finished; None: nobody said stop
+        self._in_work = False  # a frame is, and the memory is of no use until it is done
+        with ExitStack() as locks, ExitStack() as stack:  # whatever fails below, what is open by then is closed
+            _lock(extras, locks)
+            self._state_file = NoStateFile() if extras.state is None else StateFile(extras.state)
+            self._recorder = NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, keep)
             stack.callback(self._recorder.close)
             self._source = source = stack.enter_context(self._open_source(connect))
             keep_freed_memory()
@@ -75,23 +80,26 @@ class LiveRun:
             lines = parse_lines(settings.output.lines, source.width, source.height)
             counter = LineCounter(lines) if lines else None
             shown, scene = self._address.shown, self._memory.detector.scene
-            self.folder = _folder(output, self.name, force, in_parts=roll_s is not None)
+            self.folder = _folder(output, self.name, force, roll_s is not None, locks)
             keep.roots.append(self.folder)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
             subject = Subject(shown, source.like.shape, source.fps, scene, self._reading, counter)
             self._outputs = Outputs(self.folder, subject, settings, extras, roll_s, keep)
-            self._open = stack.pop_all()
+            self._open, self._locks = stack.pop_all(), locks.pop_all()
 
     def __iter__(self) -> Iterator[Step]:
         assert self._outputs is not None
         memory = self._memory
         for step in video_steps(self._frames(), memory.detector, memory.tracker, self._settings):
+            memory.note(step)
+            self._in_work = False
             self._outputs.step(step)
             self.board.step(step)
             yield step
 
     def stop(self) -> None:
         """Let the iteration end after the frame in work; from any thread, or a signal handler."""
+        self._until_s = monotonic() + _END_S
         self._source.stop()
 
     def __enter__(self) -> LiveRun:
@@ -101,11 +109,13 @@ class LiveRun:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._outputs is not None
-        until_s = monotonic() + _END_S
-        self._open.close()
-        self.board.close()
-        self._outputs.close(until_s)
-        self._state_file.close(self._memory, until_s)
+        now_s = monotonic()
+        until_s = max(self._until_s or now_s + _END_S, now_s + _LEAST_S)
+        with self._locks:
+            self._open.close()
+            self.board.close()
+            self._outputs.close(until_s)
+            self._state_file.close(None if self._in_work else self._memory, until_s)
 
     def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
         """The camera; numbers and times go on from a saved state."""
@@ -143,8 +153,8 @@ class LiveRun:
             place = self._source.place
             recorder.log_frame(frame, place, memory.gather() if recorder.begins(place) else None)
             self._state_file.offer(memory)
+            self._in_work = True
             yield frame
-            memory.note(frame)
 
     def _reading(self) -> Mapping[str, Any]:
         """The run's own account, for the summary and the page."""
@@ -178,8 +188,20 @@ class LiveRun:
         return Account(stats.state, self._reading(), list(stats.problems))
 
 
-def _folder(output: Path | None, name: str, force: bool, in_parts: bool) -> Path:
-    """A new folder, or that of an earlier run in parts, which is continued."""
-    if output is not None and in_parts and parts_of(output):
-        return usable(output)
-    return open_run(output, name, force)
+def _lock(extras: Extras, locks: ExitStack) -> None:
+    """Keep other runs off the files that this one continues."""
+    if extras.state is not None:
+        usable(extras.state.parent)
+        locks.enter_context(alone(extras.state))
+    if extras.record is not None:
+        locks.enter_context(alone(usable(extras.record)))
+
+
+def _folder(output: Path | None, name: str, force: bool, in_parts: bool, locks: ExitStack) -> Path:
+    """A new folder, or that of an earlier run in parts, which is continued; other runs are kept out."""
+    if output is not None:
+        locks.enter_context(alone(usable(output)))  # before `force` deletes what another one writes
+        return output if in_parts and parts_of(output) else open_run(output, name, force)
+    folder = open_run(None, name, force)
+    locks.enter_context(alone(folder))
+    return folder

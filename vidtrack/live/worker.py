@@ -25,7 +25,7 @@ from vidtrack.video.live.address import redact
 
 log = logging.getLogger(__name__)
 
-STATUS, PICTURE, END = b"status", b"picture", b"end"
+STATUS, PICTURE, BEGUN, END = b"status", b"picture", b"begun", b"end"
 _SEND_S = 0.5  # for the last word, while another answer may be stuck
 
 
@@ -55,7 +55,7 @@ def work(job: Job, channel: Connection) -> None:
     try:
         with LiveRun(job.address, job.settings, job.folder, job.extras, force=job.force) as run:
             signal.signal(signal.SIGTERM, lambda *_: run.stop())
-            answers.board = run.board
+            answers.begin(run.board)
             for _ in run:
                 pass
     except _Told:
@@ -73,17 +73,19 @@ def _tell(number: int, frame: FrameType | None) -> None:
 
 
 class _Answers:
-    """Answers in a thread what the parent asks: `NUMBER status` or `NUMBER picture`, by `NUMBER content`.
-
-    board  of the run, once there is one
-    """
+    """Answers in a thread what the parent asks: `NUMBER status` or `NUMBER picture`, by `NUMBER content`."""
 
     def __init__(self, job: Job, channel: Connection) -> None:
-        self.board: StatusBoard | None = None
+        self._board: StatusBoard | None = None
         self._shown = redact(job.address)
         self._channel = channel
         self._sending = Lock()
         Thread(target=self._run, name="answers", daemon=True).start()
+
+    def begin(self, board: StatusBoard) -> None:
+        """There is a run, and its results are in its folder."""
+        self._board = board
+        self._send(BEGUN, b"")
 
     def end(self, error: str | None = None) -> None:
         """The last word: how it was at the end, and why it ended if it was not told to."""
@@ -108,12 +110,12 @@ class _Answers:
                 self._sending.release()
 
     def _picture(self) -> bytes:
-        return (self.board and self.board.picture()) or b""
+        return (self._board and self._board.picture()) or b""
 
     def _status(self) -> dict[str, Any]:
-        if self.board is None:
+        if self._board is None:
             return unknown(self._shown)
-        now = self.board.now()
+        now = self._board.now()
         return {field.name: getattr(now, field.name) for field in fields(now)}
 
 

@@ -84,10 +84,9 @@ def replacing(path: Path) -> Iterator[Path]:
         try:
             yield new
             os.replace(new, path)
-        except OSError:
+        finally:
             with suppress(OSError):
                 new.unlink(missing_ok=True)
-            raise
 
 
 def append(file: FileIO, block: bytes) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 
 from vidtrack.errors import ConfigError, OutputError
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
 
 
@@ -26,10 +26,9 @@ class MaskFolder:
         if step.frame is None or step.foreground is None:
             raise ConfigError("stored detections have no masks; leave --save-masks out")
         mask = step.foreground.full_size(step.frame.shape)
-        path = self._folder / f"{step.index:06d}.png"
-        with writing(path):
+        with replacing(self._folder / f"{step.index:06d}.png") as new:
             # Encoded here and written by Python: cv2.imwrite would not say why it failed.
-            path.write_bytes(cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_BILEVEL, 1])[1].tobytes())
+            new.write_bytes(cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_BILEVEL, 1])[1].tobytes())
 
     def close(self) -> None:
         """Nothing waits."""

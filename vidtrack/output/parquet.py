@@ -42,7 +42,7 @@ class ParquetParts:
         """Join all parts to one file."""
         parts = (pq.read_table(self._part(i)) for i in range(self._count))
         last = pa.concat_tables([self._schema.empty_table(), *self._waiting])
-        write_parquet(self._path, self._schema, _grouped(chain(parts, [last])))
+        write_parquet(self._path, self._schema, chain(parts, [last]))
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _close_part(self) -> None:
@@ -78,5 +78,5 @@ def parts_folder(path: Path) -> Path:
 def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
     """Write the tables one after the other; the file appears when it is complete."""
     with replacing(path) as new, pq.ParquetWriter(new, schema) as writer:
-        for table in tables:
+        for table in _grouped(tables):
             writer.write_table(table)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Pen, draw_lines
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Tracks
 from vidtrack.traffic.lines import Line
@@ -89,8 +89,8 @@ class TrajectoryPlot:
         zoom = self._zoom
         draw_lines(pen, [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines])
         self._number(pen)
-        with writing(self._path):
-            self._path.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
+        with replacing(self._path) as new:  # half a picture would look like one
+            new.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
     def _number(self, pen: Pen) -> None:
         """Each track's number at its end, or in the nearest free place above or below."""

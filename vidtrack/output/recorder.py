@@ -6,6 +6,7 @@ import logging
 import os
 import socket
 import sysconfig
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -179,6 +180,7 @@ def _open(target: str, layout: rrb.Blueprint) -> rr.RecordingStream:
             _log.info("serving on %s:%d; watch with: rerun --connect", host, port)
         else:
             recording.save(target, default_blueprint=layout)
+            recording.send_recording_name(Path(target).stem)  # to tell cameras apart in one viewer
     except (OSError, RuntimeError) as error:
         raise OutputError(f"cannot open the recording {target}: {error}; give --rerun another place") from None
     return recording

@@ -6,6 +6,7 @@ import csv
 import json
 import shutil
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pyarrow as pa
@@ -16,6 +17,8 @@ from vidtrack.errors import FormatError
 from vidtrack.output.linefile import drop_partial_line, replace_text, sort_rows
 from vidtrack.output.parquet import parts_folder, write_parquet
 from vidtrack.output.tables import layout, schema
+
+_BLOCK = 1 << 20  # bytes of text that are read at a time
 
 
 def repair(folder: Path) -> int:
@@ -28,31 +31,45 @@ def repair(folder: Path) -> int:
         if (folder / name).is_file():
             drop_partial_line(folder / name)
     table = read_tracks(folder / "tracks.csv")
-    parquet = folder / "tracks.parquet"
-    write_parquet(parquet, table.schema, [table])
-    shutil.rmtree(parts_folder(parquet), ignore_errors=True)
+    add_parquet(folder)
+    shutil.rmtree(parts_folder(folder / "tracks.parquet"), ignore_errors=True)
     if (folder / "counts.csv").is_file():
         sort_rows(folder / "counts.csv", columns=1, header=True)
     _repair_summary(folder, table)
     return len(table)
 
 
+def add_parquet(folder: Path) -> None:
+    """Make tracks.parquet of tracks.csv, a block at a time. Raises FormatError, and StoppedEarly on a full disk."""
+    wanted, blocks = _blocks(folder / "tracks.csv")
+    write_parquet(folder / "tracks.parquet", wanted, blocks)
+
+
 def read_tracks(path: Path) -> pa.Table:
     """The table in a tracks.csv, with units in its schema. Raises FormatError."""
+    wanted, blocks = _blocks(path)
+    return pa.concat_tables([wanted.empty_table(), *blocks])
+
+
+def _blocks(path: Path) -> tuple[pa.Schema, Iterator[pa.Table]]:
+    """What is in a tracks.csv, a block at a time. Raises FormatError, now or later."""
     try:
         with path.open() as file:
             wanted = schema(layout(file.readline().strip().split(",")))
-        table = pyarrow.csv.read_csv(
-            path,
-            convert_options=pyarrow.csv.ConvertOptions(
-                column_types=wanted, include_columns=wanted.names, strings_can_be_null=False
-            ),
-        )
     except FileNotFoundError:
         raise FormatError(f"{path.parent} is not a run: it has no {path.name}") from None
+    return wanted, _read_blocks(path, wanted)
+
+
+def _read_blocks(path: Path, wanted: pa.Schema) -> Iterator[pa.Table]:
+    convert = pyarrow.csv.ConvertOptions(column_types=wanted, include_columns=wanted.names, strings_can_be_null=False)
+    read = pyarrow.csv.ReadOptions(use_threads=False, block_size=_BLOCK)
+    try:
+        with pyarrow.csv.open_csv(path, read_options=read, convert_options=convert) as reader:
+            for batch in reader:
+                yield pa.Table.from_batches([batch]).cast(wanted)
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         raise FormatError(f"{path} is damaged: {error}") from None
-    return table.cast(wanted)
 
 
 def _repair_summary(folder: Path, table: pa.Table) -> None:

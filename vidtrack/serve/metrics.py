@@ -82,6 +82,7 @@ _METRICS: dict[str, tuple[str, str, Callable[[Status], Iterator[Sample]]]] = {
     "frames_dropped_total": ("counter", "Pictures dropped for newer ones.", _reading("frames_dropped")),
     "decode_errors_total": ("counter", "Pictures that could not be decoded.", _reading("decode_errors")),
     "reconnects_total": ("counter", "Connections made after the first.", _reading("reconnects")),
+    "restarts_total": ("counter", "Processes started in place of one that crashed.", _field("restarts")),
     "stalls_total": ("counter", "Times that the camera was connected and nothing came.", _reading("stalls")),
     "lost_total": ("counter", "Frames, packets and states that could not be written, by output.", _lost),
     "crossings_total": ("counter", "Tracks counted over a line, by direction.", _crossings),

@@ -37,6 +37,12 @@ def recorded_settings(path: str) -> dict[str, Any]:
     return settings
 
 
+def part_order(part: Path) -> tuple[str, int]:
+    """What parts are sorted by: the time in a name, and the number of those that have the same."""
+    time_utc, _, number = part.name.partition("Z")
+    return time_utc, int(number[1:]) if number[1:].isdecimal() else 1
+
+
 class Recording:
     """The frames of a recording that were tracked, with their numbers and times; iterate once.
 
@@ -97,7 +103,7 @@ def _decoded(coder: av.VideoCodecContext, packet: av.Packet) -> list[av.VideoFra
 
 
 def _parts(folder: Path) -> list[Path]:
-    candidates = [folder, *sorted(entry for entry in folder.iterdir() if entry.is_dir())]
+    candidates = [folder, *sorted((entry for entry in folder.iterdir() if entry.is_dir()), key=part_order)]
     return [part for part in candidates if (part / VIDEO).is_file() and (part / STATE).is_file()]
 
 

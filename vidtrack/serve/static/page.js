@@ -48,6 +48,7 @@ function numbers(camera) {
     ["decode errors", number(reading.decode_errors), reading.decode_errors > 0],
     ["stalls", number(reading.stalls), reading.stalls > 0],
     ["reconnects", number(reading.reconnects), reading.reconnects > 0],
+    ...(camera.restarts ? [["process restarts", number(camera.restarts), true]] : []),
     ["not written", lost.map(([output, count]) => `${output} ${count}`).join(", ") || "0", lost.length > 0],
     ["runs for", camera.now_unix_s ? span(camera.now_unix_s - camera.started_unix_s) : "–"],
   ].map(([name, value, bad]) => {

@@ -124,7 +124,7 @@ def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout
         )
     if isinstance(error, av.error.HTTPNotFoundError):
         return SourceError(f"{start} the camera knows no such path (404)")
-    if isinstance(error, PermissionError):
+    if isinstance(error, PermissionError) and address.is_device:  # a server that is silent may give it as well
         return Refused(f"{start} permission denied; add your user to the group of the device, mostly video")
     if address.is_device:
         return Refused(f"{start} it is no camera ({error.strerror})")
