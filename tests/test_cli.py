@@ -2,7 +2,6 @@
 
 import errno
 import json
-import logging
 import signal
 import subprocess
 import sys
@@ -22,8 +21,7 @@ CROSSING = SAMPLES / "crossing.avi"
 def vidtrack(tmp_path, monkeypatch, capfd):
     """Calls a command in this process, in an empty folder; gives its exit code, stdout and stderr."""
     monkeypatch.chdir(tmp_path)
-    logger = logging.getLogger("vidtrack")
-    before = logger.handlers, logger.level, logger.propagate, signal.getsignal(signal.SIGTERM)
+    before = signal.getsignal(signal.SIGTERM)
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["vidtrack", *map(str, arguments)])
@@ -34,8 +32,7 @@ def vidtrack(tmp_path, monkeypatch, capfd):
         return ended.value.code or 0, out, err
 
     yield call
-    logger.handlers, logger.level, logger.propagate = before[:3]
-    signal.signal(signal.SIGTERM, before[3])
+    signal.signal(signal.SIGTERM, before)
 
 
 def rows_of(folder):

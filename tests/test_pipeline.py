@@ -103,3 +103,9 @@ def test_settings_reach_the_tracker(method, distance):
     assert type(tracker.associate).__name__.lower() == method
     assert tracker.gate.distance == distance
     assert tracker.sharing is None
+
+
+def test_stored_detections_are_seen_with_a_probability_of_their_own():
+    settings = load(assignments=["tracker.detection_probability=0.7", "detections.detection_probability=0.6"])
+    assert build_tracker(settings.tracker).rates.detection_probability == 0.7
+    assert build_tracker(settings.tracker, whole=settings.detections).rates.detection_probability == 0.6

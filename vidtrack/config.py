@@ -36,8 +36,7 @@ class SourceSettings(_Group):
     @field_validator("end_s")
     @classmethod
     def _after_start(cls, end_s: float | None, given: ValidationInfo) -> float | None:
-        start_s = given.data.get("start_s", 0.0)
-        if end_s is not None and end_s < start_s:
+        if end_s is not None and end_s < (start_s := given.data.get("start_s", 0.0)):
             raise ValueError(f"must not be before source.start_s = {start_s:g}")
         return end_s
 
@@ -118,7 +117,7 @@ class BlobSettings(_Group):
     jitter_px: float = Field(0.5, gt=0)
     """pixels of the processed picture; standard deviation of a small blob's centroid"""
     jitter_share: float = Field(0.05, ge=0, le=1)
-    """standard deviation of the centroid per standard deviation of the blob's extent, in its direction"""
+    """standard deviation of the centroid per standard deviation of the blob's extent, in its direction; it lasts"""
 
 
 class DetectionSettings(_Group):
@@ -134,6 +133,8 @@ class DetectionSettings(_Group):
     """M: hits within the window that confirm a track, the first one counted; confirm_s and confirm_travel do not"""
     confirm_window: int = Field(6, ge=1, le=63)
     """N: scans of the window"""
+    detection_probability: float | None = Field(0.8, ge=0, le=1)
+    """probability that a frame shows an object, tracker.detection_probability for them; None: from the tracks so far"""
     box_s: float = Field(0.05, gt=0)
     """s; time constant with which a track's box follows its detections' boxes"""
 
@@ -175,8 +176,8 @@ class TrackerSettings(_Group):
     """false measurements per frame and px^2; None: from what the tracks leave. Radar has its own"""
     redundant: float | None = Field(None, gt=0, lt=1)
     """share of a target's own several plots or detections in a scan that are combined before association; None: none"""
-    confirm_s: float = Field(0.2, ge=0)
-    """s; no track of a video is confirmed before this age"""
+    confirm_s: float = Field(0.4, ge=0)
+    """s; no track of a video is confirmed before this age; most ghosts of the first frame's vehicles are gone then"""
     confirm_travel: float = Field(0.3, ge=0)
     """object sizes; nor before it has moved this far from where it began"""
     coast_s: float = Field(1.0, ge=0)
@@ -193,8 +194,7 @@ class TrackerSettings(_Group):
     @field_validator("confirm_window")
     @classmethod
     def _holds_the_hits(cls, window: int, given: ValidationInfo) -> int:
-        hits = given.data.get("confirm_hits", 1)
-        if window < hits:
+        if window < (hits := given.data.get("confirm_hits", 1)):
             raise ValueError(f"must not be less than tracker.confirm_hits = {hits}")
         return window
 

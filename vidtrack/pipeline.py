@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
@@ -88,7 +89,7 @@ def build_tracker(
         shape=Shape() if whole else None,
         trust=Trust(whole.sure_score) if whole and whole.sure_score is not None else None,
         bounds=bounds,
-        detection_probability=settings.detection_probability,
+        detection_probability=(whole or settings).detection_probability,
         clutter_density=settings.clutter_density,
         box_s=(whole or settings).box_s,
         explain=explain,
@@ -115,7 +116,8 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         clock.append(perf_counter())
         tracks = tracker.step(scan)
         clock.append(perf_counter())
-        seconds = dict(zip(("read", "detect", "blobs", "track"), np.diff(clock).tolist(), strict=True))
+        spans = (end - begin for begin, end in pairwise(clock))
+        seconds = dict(zip(("read", "detect", "blobs", "track"), spans, strict=True))
         yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds)
         ended = perf_counter()
 

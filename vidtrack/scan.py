@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
+from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -46,6 +48,7 @@ class Scan:
     box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre)
     amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class, -1 unknown:
                a track whose class is known takes no measurement of another
+    lasting    (M, m, m) the part of R by errors that stay from scan to scan; None: all are new in each scan
     run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form within equal runs only
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
@@ -62,6 +65,7 @@ class Scan:
     label: Ints | None = None
     run: Ints | None = None
     noise: Floats | None = None
+    lasting: Floats | None = None
 
     def __post_init__(self) -> None:
         z = np.ascontiguousarray(self.z, dtype=float)
@@ -75,11 +79,11 @@ class Scan:
             R = np.broadcast_to(R, (count, dim, dim))
         if R.shape != (count, dim, dim):
             raise ScanError(f"R must be ({count}, {dim}, {dim}) or ({dim}, {dim}) to match z, not {R.shape}")
-        if not np.isfinite(self.t):
+        if not isfinite(self.t):
             raise ScanError(f"the scan's time is {self.t}; it must be a finite number of seconds")
         _refuse_bad_measurements(z, R)
         if noise is None and count:
-            noise = R.mean(axis=0)
+            noise = R.sum(axis=0) / count
         if noise is not None and noise.shape != (dim, dim):
             raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
         if noise is not None and (self.noise is not None or not count):  # no measurement has vouched for it
@@ -94,6 +98,7 @@ class Scan:
             ("score", (count,), float),
             ("label", (count,), np.int64),
             ("run", (count,), np.int64),
+            ("lasting", (count, dim, dim), float),
         ):
             value = getattr(self, name)
             if value is None:
@@ -113,6 +118,14 @@ class Scan:
 
     def __len__(self) -> int:
         return len(self.z)
+
+    def weakened(self, inflation: float) -> Scan:
+        """What it tells a filter: the part of R that lasts so many times as large, for it was told before."""
+        if self.lasting is None:
+            return self
+        weak = copy(self)  # what was found valid stays so
+        object.__setattr__(weak, "R", self.R + (inflation - 1) * self.lasting)
+        return weak
 
 
 @njit(cache=CACHE, nogil=True)
@@ -200,7 +213,7 @@ class Decision:
 
     def without(self, rows: NDArray[np.bool_]) -> Decision:
         """The same decision with these rows (K,) missed, which tells nothing about them."""
-        if not rows.any():
+        if not np.count_nonzero(rows):
             return self
         stay = ~rows[self.row]
         beta0 = np.where(rows, 1.0, self.beta0)

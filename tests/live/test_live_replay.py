@@ -53,7 +53,7 @@ def test_a_recording_gives_the_same_tracks(camera, tmp_path, path):
 
 
 def test_parts_cut_from_one_connection_do_too(camera, tmp_path):
-    chosen = settings("live.roll_s=1")
+    chosen = settings("live.roll_s=1", "tracker.confirm_s=0.1")
     with LiveRun(camera.url("video.ts"), chosen, tmp_path / "out", Extras(record=tmp_path / "tape")) as run:
         run_for(run, 3.0)
     tapes = parts_of(tmp_path / "tape")
@@ -74,12 +74,12 @@ def test_a_raw_camera_is_recorded_without_loss(compiled, tmp_path):
     grey = [cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) for picture in PICTURES[:100]]
     acts = [act for picture in grey for act in (0.015, Picture(picture))]
     connect = script_of(Raw(*acts, 30.0))
-    device = "http://camera/"  # where the script pretends to be
-    with LiveRun(device, settings(), tmp_path / "out", Extras(record=tmp_path / "tape"), connect=connect) as run:
+    device, chosen = "http://camera/", settings("tracker.confirm_s=0.1")  # where the script pretends to be
+    with LiveRun(device, chosen, tmp_path / "out", Extras(record=tmp_path / "tape"), connect=connect) as run:
         run_for(run, 3.0)
     lived = (tmp_path / "out" / "tracks.csv").read_text()
     assert lived.count("\n") > 5
-    assert replay(tmp_path / "tape", tmp_path / "again", settings()) == lived
+    assert replay(tmp_path / "tape", tmp_path / "again", chosen) == lived
 
 
 def test_a_recording_that_was_cut_is_repeated_up_to_there(camera, tmp_path):

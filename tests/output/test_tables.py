@@ -81,6 +81,15 @@ def test_parts_are_readable_before_the_end_and_become_one_file(tmp_path, monkeyp
     assert not (tmp_path / "tracks.parquet.parts").exists()
 
 
+def test_the_first_rows_may_come_late(tmp_path, monkeypatch):
+    monkeypatch.setattr("vidtrack.output.parquet._PART_S", 0.0)
+    parts = ParquetParts(tmp_path / "tracks.parquet", schema(VIDEO))
+    for index in range(2):
+        parts.add(track_rows([make_step(index, [(1, "c", index, 0)])]))
+    parts.close()
+    assert pq.read_table(tmp_path / "tracks.parquet")["frame"].to_pylist() == [0, 1]
+
+
 def test_tentative_rows_appear_once_the_track_is_confirmed(tmp_path):
     run(
         Confirmed(TrackTable(tmp_path)),

@@ -184,7 +184,8 @@ def in_two_pieces(apart_s):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_piece_that_was_hardly_ever_alone_is_no_vehicle_of_its_own(seed):
-    seen = play(default_tracker(), in_two_pieces(0.36), 3.0, jitter=0.3, seed=seed)
+    assert len(confirmed_ids(play(default_tracker(), in_two_pieces(0.36), 3.0, jitter=0.3, seed=seed))) == 1
+    seen = play(default_tracker(confirm_s=0.2), in_two_pieces(0.36), 3.0, jitter=0.3, seed=seed)
     assert len(confirmed_ids(seen)) == 2
     assert len(seen[-1]) == 1
     (_, piece), *_ = events(seen, "delete")

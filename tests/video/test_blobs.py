@@ -82,6 +82,7 @@ def test_a_scan_has_centroids_relative_boxes_and_noise_along_the_extent():
     np.testing.assert_allclose(scan.z, [[29.5, 22.5]])
     np.testing.assert_allclose(scan.box, [[-19.5, -2.5, 40, 6]])
     np.testing.assert_allclose(scan.R, [np.diag([0.25 + 0.01 * 1600 / 12, 0.25 + 0.01 * 36 / 12])])
+    np.testing.assert_allclose(scan.lasting, [np.diag([0.01 * 1600 / 12, 0.01 * 36 / 12])])
     np.testing.assert_allclose(scan.amplitude, [1])
 
 

@@ -51,9 +51,9 @@ class Pairs:
 
     def only(self, mask: np.ndarray) -> Pairs:
         """The pairs of a mask (N,)."""
-        if mask.all():
+        pair = mask.nonzero()[0]
+        if len(pair) == len(mask):
             return self
-        pair = np.flatnonzero(mask)
         row = self.row.take(pair)
         return self._as(row, pair, self.limit, starts(row, len(self.limit)))
 
@@ -125,14 +125,10 @@ class Gate:
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
-        reach = _reach(cov, scan.R, limit, mode)
-        grid = cells(scan.z, runs, reach)
-        row, measurement, d2, nis, log_s = _gated(zhat.shape[1], mode, angles)(
-            zhat, cov, own, reach, limit, scan.z, scan.R, *grid
-        )
-        log_l = -0.5 * (nis + log_s + zhat.shape[1] * np.log(TURN))
+        gated = _gated(zhat.shape[1], mode, angles)
+        row, measurement, d2, nis, log_s, log_l, start = gated(zhat, cov, own, limit, scan.z, scan.R, runs)
         cost = d2 if mode == EUCLIDEAN else d2 + log_s
-        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, starts(row, len(zhat)))
+        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,19 +189,23 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 
 
 @lru_cache
-def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats]]:
+def _gated(
+    m: int, mode: int, angles: tuple[int, ...]
+) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
     """The kernel that finds the pairs inside the gate, cell row by cell row; its arguments are constants of it.
 
-    Each track's measurements come in ascending order.
+    It gives row, measurement, d2, nis, log_s, log_l and start of the pairs. Each track's measurements come in
+    ascending order.
     """
     wraps = tuple(a in angles for a in range(m))
     turns = 1 if any(a in angles for a in range(2)) else 0
 
     def gated(
-        zhat: Floats, cov: Floats, own: Ints, reach: Floats, limit: Floats,
-        z: Floats, R: Floats, order: Ints, first: Ints, origin: Floats, cell: Floats, shape: Ints,
-    ) -> tuple[Ints, Ints, Floats, Floats, Floats]:  # fmt: skip
+        zhat: Floats, cov: Floats, own: Ints, limit: Floats, z: Floats, R: Floats, run: Ints
+    ) -> tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]:
         rows = len(zhat)
+        reach = _reach(cov, R, limit, mode)
+        order, first, origin, cell, shape = cells(z, run, reach)
         runs = (len(first) - 1) // (shape[0] * shape[1])
         size = 4 * rows + 16
         row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
@@ -215,7 +215,6 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
         seen = np.full(len(z) if turns else 0, -1)
         for t in range(rows):
-            begin = n
             if limit[t] == 0.0 or own[t] >= runs:
                 continue
             for turn in range(-turns, turns + 1):
@@ -271,16 +270,31 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
                         row[n], measurement[n], d2[n] = t, j, distance
                         nis[n], log_s[n] = whitened, 2.0 * np.log(det)
                         n += 1
-            for k in range(begin + 1, n):  # the grid's order depends on the cell size; results must not
-                while k > begin and measurement[k - 1] > measurement[k]:
-                    measurement[k - 1], measurement[k] = measurement[k], measurement[k - 1]
-                    d2[k - 1], d2[k] = d2[k], d2[k - 1]
-                    nis[k - 1], nis[k] = nis[k], nis[k - 1]
-                    log_s[k - 1], log_s[k] = log_s[k], log_s[k - 1]
-                    k -= 1
-        return row[:n], measurement[:n], d2[:n], nis[:n], log_s[:n]
+        # the grid's order depends on the cell size; results must not
+        place = _ascending(row[:n], measurement[:n], rows, len(z))
+        nis, log_s = nis[place], log_s[place]
+        log_l = -0.5 * (nis + log_s + m * np.log(TURN))
+        return row[:n], measurement[place], d2[place], nis, log_s, log_l, starts(row[:n], rows)
 
     return specialised(gated, m, mode, *angles)
+
+
+@njit(cache=CACHE, nogil=True)
+def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
+    """(P,) the order by row, then measurement, of pairs that are ordered by row: two counting sorts."""
+    first, begin = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
+    for p in range(len(row)):
+        first[measurement[p] + 1] += 1
+        begin[row[p] + 1] += 1
+    first, begin = np.cumsum(first), np.cumsum(begin)
+    by_measurement, order = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
+    for p in range(len(row)):
+        by_measurement[first[measurement[p]]] = p
+        first[measurement[p]] += 1
+    for pair in by_measurement:
+        order[begin[row[pair]]] = pair
+        begin[row[pair]] += 1
+    return order
 
 
 @njit(cache=CACHE, nogil=True)

@@ -68,12 +68,12 @@ class GNN:
 
     def decide(self, problem: Problem) -> Decision:
         """Optimal assignment, cluster by cluster."""
-        pairs, measurements = problem.pairs, problem.measurements
-        if self.convention == "maximum-cardinality":
-            miss = np.full(problem.rows, _never(pairs.cost, problem.rows))
-        else:
-            miss = _edge(pairs.row, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, measurements)
-        return one_hot(assign(pairs.start, pairs.measurement, pairs.cost, miss, measurements))
+        pairs = problem.pairs
+        cardinal = self.convention == "maximum-cardinality"
+        taken = _assigned(
+            pairs.row, pairs.start, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, len(problem.scan), cardinal
+        )
+        return one_hot(taken)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +111,13 @@ HARD = (NN, GNN, GreedyGNN)
 
 def one_hot(taken: Ints) -> Decision:
     """Decision of a hard rule: taken (T,) measurement of each track, -1 for none."""
-    hit = taken >= 0
-    row = np.flatnonzero(hit)
-    return Decision(np.arange(len(taken)), row, taken.take(row), np.ones(len(row)), (~hit).astype(float))
+    return Decision(*_one_hot(taken))
+
+
+@njit(cache=CACHE, nogil=True)
+def _one_hot(taken: Ints) -> tuple[Ints, Ints, Ints, Floats, Floats]:
+    row = np.flatnonzero(taken >= 0)
+    return np.arange(len(taken)), row, taken[row], np.ones(len(row)), np.where(taken >= 0, 0.0, 1.0)
 
 
 @njit(cache=CACHE, nogil=True)
@@ -136,6 +140,19 @@ def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measuremen
             taken[row[k]] = measurement[k]
             free[measurement[k]] = False
     return taken
+
+
+@njit(cache=CACHE, nogil=True)
+def _assigned(
+    row: Ints, start: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats,
+    measurements: int, cardinal: bool,
+) -> Ints:  # fmt: skip
+    """(T,) what each row gets, -1 for none; `cardinal`: as many rows as possible shall get something."""
+    if cardinal:
+        miss = np.full(len(limit), _never(cost, len(limit)))
+    else:
+        miss = _edge(row, measurement, d2, cost, limit, measurements)
+    return assign(start, measurement, cost, miss, measurements)
 
 
 @njit(cache=CACHE, nogil=True)

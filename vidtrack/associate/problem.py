@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from vidtrack.associate.gate import Gate, Pairs
+from vidtrack.compiled import CACHE
 from vidtrack.scan import Floats, Ints, Scan
 
 VANISHING = 2000.0
@@ -70,7 +72,7 @@ class Problem:
         """M."""
         return len(self.scan)
 
-    @cached_property
+    @property
     def missed(self) -> Floats:
         """(T,) 1 - P_D P_G, the probability that a target gives no measurement in its gate."""
         return 1.0 - self.detection * self.inside
@@ -90,11 +92,9 @@ class Problem:
 
     @cached_property
     def _logs(self) -> tuple[Floats, Floats]:
-        least = -VANISHING - 4 * np.abs(self.pairs.log_l).max(initial=0.0)
         with np.errstate(divide="ignore"):
             missed, detection, clutter = np.log(self.missed), np.log(self.detection), np.log(self.clutter)
-        density = detection - np.maximum(clutter, least)
-        return np.maximum(missed, least), density[self.pairs.row] + self.pairs.log_l
+        return _bounded(missed, detection, clutter, self.pairs.row, self.pairs.log_l)
 
     def only(self, mask: np.ndarray) -> Problem:
         """The same with the pairs of a mask (N,)."""
@@ -116,3 +116,14 @@ class Problem:
             clutter=self.clutter[rows],
             inside=self.inside[rows],
         )
+
+
+@njit(cache=CACHE, nogil=True)
+def _bounded(missed: Floats, detection: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
+    """(T,) log_missed and (N,) log_ratio from the logarithms of the factors (T,); VANISHING for those of zero."""
+    most = 0.0
+    for k in range(len(log_l)):
+        most = max(most, abs(log_l[k]))
+    least = -VANISHING - 4 * most
+    density = detection - np.maximum(clutter, least)
+    return np.maximum(missed, least), density[row] + log_l

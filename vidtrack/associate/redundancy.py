@@ -23,7 +23,7 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
     a and b are of one target if (za - zb)' (Ra + Rb)^-1 (za - zb) is at most the chi-square quantile of
     `probability`, or if a chain of such pairs leads from one to the other. They become z = R sum(Ri^-1 zi) with
     R = (sum Ri^-1)^-1 (SPEC 001, redundancy elimination), in the box around their boxes, as strong and as sure as the
-    strongest and surest, with the label of the first. Measurements of different runs stay apart.
+    strongest and surest, with the label and the lasting errors of the first. Measurements of different runs stay apart.
 
     Raises ConfigError for a probability outside 0..1.
     """
@@ -50,6 +50,7 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
         score=strongest(scan.score),
         label=None if scan.label is None else scan.label[leader],
         run=None if scan.run is None else scan.run[leader],
+        lasting=None if scan.lasting is None else scan.lasting[leader],
     ), part
 
 

@@ -27,15 +27,16 @@ class Trust:
         """(M,) the scan's sure detections."""
         return np.ones(len(scan), bool) if scan.score is None else scan.score >= self.least
 
-    def decide(self, associate: Associator, problem: Problem, rows: Mask) -> Decision:
-        """The decision about rows (T,), in two rounds."""
+    def decide(self, associate: Associator, problem: Problem, rows: Mask, sure: Mask) -> Decision:
+        """The decision about rows (T,), in two rounds: measurements that are `sure` (M,) come first."""
         pairs = problem.pairs
-        asked, sure = rows[pairs.row], self.sure(problem.scan)[pairs.measurement]
-        first = associate.decide(problem.only(asked & sure))
-        if (sure | ~asked).all():
+        asked, first_round = rows[pairs.row], sure[pairs.measurement]
+        first = associate.decide(problem.only(asked & first_round))
+        second_round = asked & ~first_round
+        if not np.count_nonzero(second_round):
             return first
         missed = first.beta0 > 0.5
-        second = associate.decide(problem.only(asked & ~sure & missed[pairs.row]))
+        second = associate.decide(problem.only(second_round & missed[pairs.row]))
         return first.without(missed).joined(second)
 
 

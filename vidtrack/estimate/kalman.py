@@ -64,7 +64,7 @@ class KalmanBank:
         inflation = decision.inflation if known else np.zeros(rows)
         self.x, self.P = mixture_update(*H.shape[1:], sensor.angles)(
             self.x, self.P, H, excess, zhat, scan.z, scan.R,
-            decision.parent, decision.start, decision.measurement, decision.beta, decision.beta0,
+            decision.parent, decision.row, decision.measurement, decision.beta, decision.beta0,
             inflation, decision.spread, scan.noise if known else np.zeros((m, m)),
         )  # fmt: skip
         self.hits = self.hits[decision.parent] + (decision.beta0 < 0.5)

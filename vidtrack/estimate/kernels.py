@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from vidtrack.compiled import specialised
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, starts
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats, Floats], Floats]
@@ -85,9 +85,9 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
     """The moment-matched mixture of the missed branch (weight beta0) and one Kalman update per weight.
 
     The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m), zhat (T, m),
-    z (M, m), R (M, m, m), and of the decision parent (K,), the bounds start (K + 1,) of each successor's weights,
-    measurement (B,), beta (B,), beta0 (K,), inflation (K,) and spread; it gives x (K, n) and P (K, n, n). A single
-    weight of one is the Kalman update itself. `angles` are components whose innovation is taken the short way round.
+    z (M, m), R (M, m, m), and of the decision parent (K,), row (B,), measurement (B,), beta (B,), beta0 (K,),
+    inflation (K,) and spread; it gives x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
+    `angles` are components whose innovation is taken the short way round.
 
     S = H P H' + excess + R; the excess is what the linearisation H leaves out of the measurement's spread.
     K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance is Joseph's
@@ -98,10 +98,11 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
 
     def update(
         x: Floats, P: Floats, H: Floats, excess: Floats, zhat: Floats, z: Floats, R: Floats,
-        parent: Ints, start: Ints, measurement: Ints, beta: Floats, beta0: Floats,
+        parent: Ints, row: Ints, measurement: Ints, beta: Floats, beta0: Floats,
         inflation: Floats, spread: bool, noise: Floats,
     ) -> tuple[Floats, Floats]:  # fmt: skip
         rows = len(parent)
+        start = starts(row, rows)
         x1, P1 = np.empty((rows, n)), np.empty((rows, n, n))
         K, L, A, AH = np.empty((n, m)), np.empty((m, m)), np.empty((n, n)), np.empty((n, m))
         shift, mean, v = np.empty(n), np.empty(n), np.empty(m)

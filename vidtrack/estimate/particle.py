@@ -112,7 +112,7 @@ class ParticleBank:
         """Successor rows from the weights of a decision; x, P are those before the particles are chosen anew."""
         parent, rows = decision.parent, len(decision.parent)
         seen = self._seen(sensor)
-        start = np.searchsorted(decision.row, np.arange(rows + 1))
+        start = decision.start
         weight, log_weight = np.empty((rows, self.number)), np.empty((rows, self.number))
         x, P = _empty(rows, self.model.states)
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vidtrack.output.sink import Sink, Step
+from vidtrack.output.sink import Sink, Step, close_together
 from vidtrack.scan import TENTATIVE
 
 
@@ -55,11 +54,11 @@ class Confirmed:
 
     def close(self) -> None:
         """Pass on what waits, without the tracks that nobody confirmed."""
-        with ExitStack() as closing:
-            for sink in self._sinks:
-                closing.callback(sink.close)
+        try:
             while self._held:
                 self._release(self._held.popleft())
+        finally:
+            close_together(*self._sinks)
 
     def _release(self, held: _Held) -> None:
         tracks = held.step.tracks

@@ -13,8 +13,7 @@ import pyarrow.parquet as pq
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 
-_PART_ROWS = 2_000  # 0.3 MB: what waits in memory, and what a killed run lacks
-_GROUP_ROWS = 20_000  # rows that the one file keeps together
+_PART_ROWS = 20_000  # 3 MB: what waits in memory, and what the one file keeps together
 _PART_S = 60.0
 
 
@@ -33,10 +32,10 @@ class ParquetParts:
         self._due = Every(_PART_S)
 
     def add(self, rows: pa.Table) -> None:
-        """Take rows; close a part when it is large or old enough."""
-        self._waiting.append(rows)
-        if self._due() or sum(len(table) for table in self._waiting) >= _PART_ROWS:
+        """Take rows; close a part before them when it is large or old enough."""
+        if self._waiting and (self._due() or sum(len(table) for table in self._waiting) >= _PART_ROWS):
             self._close_part()
+        self._waiting.append(rows)
 
     def close(self) -> None:
         """Join all parts to one file."""
@@ -59,11 +58,11 @@ class ParquetParts:
 
 
 def _grouped(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
-    """The same rows in tables of at least _GROUP_ROWS, but for the last."""
+    """The same rows in tables of at least _PART_ROWS, but for the last."""
     group: list[pa.Table] = []
     for table in tables:
         group.append(table)
-        if sum(len(part) for part in group) >= _GROUP_ROWS:
+        if sum(len(part) for part in group) >= _PART_ROWS:
             yield pa.concat_tables(group)
             group.clear()
     if group:

@@ -6,8 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
+import numba
 import numpy as np
 
+from vidtrack.compiled import CACHE
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Pen, draw_lines
 from vidtrack.output.folder import replacing
@@ -80,11 +82,8 @@ class TrajectoryPlot:
         self._draw()
         size = (self._layer.shape[1], self._layer.shape[0])
         scene = self._scene() if self._scene and self._stepped else np.full((*self._shape, 3), 60, np.uint8)
-        picture = np.array(cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
-        drawn = self._layer[:, :, 3] > 0
-        ink = self._layer[drawn]
-        clear = 1.0 - ink[:, 3:] / np.float32(255)
-        picture[drawn] = (picture[drawn] * clear + ink[:, :3]).clip(0, 255)
+        picture = np.asarray(cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+        _lay_over(self._layer, picture)
         pen = Pen(picture)
         zoom = self._zoom
         draw_lines(pen, [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines])
@@ -105,3 +104,15 @@ class TrajectoryPlot:
                     free[y - height : y, x : x + width] = False
                     pen.label(str(track_id), x, y, colour(track_id))
                     break
+
+
+@numba.njit(cache=CACHE, nogil=True)
+def _lay_over(layer, picture):  # type: ignore[no-untyped-def]
+    """Blend a layer (h, w, 4), colours times opacity and the opacity, over the picture (h, w, 3); both uint8."""
+    white = np.float32(255)
+    for y in range(picture.shape[0]):
+        for x in range(picture.shape[1]):
+            clear = np.float32(1) - np.float32(layer[y, x, 3]) / white
+            if clear < 1:
+                for c in range(3):
+                    picture[y, x, c] = min(np.float32(picture[y, x, c]) * clear + np.float32(layer[y, x, c]), white)

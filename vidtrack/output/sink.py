@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -39,3 +41,15 @@ class Sink(Protocol):
 
     def close(self) -> None:
         """Write what is left; results stay valid if it is never called."""
+
+
+def close_together(*sinks: Sink) -> None:
+    """Close the sinks side by side, for most of it is encoding. All are closed, whatever one raises.
+
+    The last is closed in the calling thread: OpenCV loads its font anew for each thread that writes with it.
+    """
+    *others, last = sinks
+    with ExitStack() as closed, ThreadPoolExecutor() as pool:
+        for sink in others:
+            closed.callback(pool.submit(sink.close).result)
+        last.close()

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
 
 from vidtrack.config import OutputSettings
 from vidtrack.estimate.smoother import smoothed
-from vidtrack.output.sink import Sink, Step
+from vidtrack.output.sink import Sink, Step, close_together
 from vidtrack.scan import Tracks
 from vidtrack.tracking.boxes import absolute
 
@@ -38,10 +37,10 @@ class Smoothed:
 
     def close(self) -> None:
         """Pass on what waits."""
-        with ExitStack() as closing:
-            for sink in self._sinks:
-                closing.callback(sink.close)
+        try:
             self._release(len(self._waiting))
+        finally:
+            close_together(*self._sinks)
 
     def _release(self, count: int) -> None:
         """Pass on the oldest steps, smoothed by all that wait."""

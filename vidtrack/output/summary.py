@@ -6,6 +6,7 @@ import json
 import platform
 import time
 from collections.abc import Callable, Mapping
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -43,7 +44,7 @@ class Summary:
         self._path = path
         self._source = source
         self._settings = settings.model_dump(mode="json")
-        self._versions = {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES}
+        self._versions = _versions()
         self._reading = reading
         self._counter = counter
         self._unit = unit
@@ -90,3 +91,9 @@ class Summary:
 
     def _write(self, interrupted: bool) -> None:
         replace_text(self._path, json.dumps(self.as_dict(interrupted), indent=2) + "\n")
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Of what a run uses. Once per process: each one asked for costs the reading of a package's whole description."""
+    return {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES}

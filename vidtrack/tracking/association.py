@@ -51,14 +51,16 @@ def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, c
            blobs are not shared
     """
     pairs, rows, count = problem.pairs, problem.rows, problem.measurements
-    decision = trust.decide(rule, problem, confirmed)
-    shared, hides = np.full(rows, -1), np.ones(count, bool)
-    if claim is not None:
+    sure = trust.sure(problem.scan)
+    decision = trust.decide(rule, problem, confirmed, sure)
+    if claim is None:
+        shared, hides = np.full(rows, -1), np.ones(count, bool)
+    else:
         shared, hides = claim(heaviest(decision))
         decision = decision.without(shared >= 0)
-    free = hides & ~_claimed(decision, count) & trust.sure(problem.scan)
+    free = hides & ~_claimed(decision, count) & sure
     open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
-    if open_to_all.any():
+    if np.count_nonzero(open_to_all):
         second = _starter(rule).decide(problem.only(open_to_all))
         free &= ~_claimed(second, count)
         decision = decision.joined(second)

@@ -20,11 +20,10 @@ def distinct(scan: Scan, free: Mask) -> Mask:
     Measurements that cannot be told apart start one track: a heap of them at one place is one target until shown
     otherwise, and not thousands of tracks that all gate the next heap.
     """
-    candidates = np.flatnonzero(free)
-    first = np.zeros(len(scan), bool)
+    candidates = free.nonzero()[0]
     if len(candidates) < 2:
-        first[candidates] = True
-        return first
+        return free
+    first = np.zeros(len(scan), bool)
     sigma = np.sqrt(np.diagonal(scan.R[candidates], axis1=1, axis2=2).min(axis=0))
     cell = np.floor(scan.z[candidates] / sigma).T
     keys = tuple(cell) if scan.run is None else (*cell, scan.run[candidates])

@@ -29,21 +29,15 @@ class Border:
 
     def cut(self, box: Floats) -> Mask:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""
-        left, top, right, bottom = self.sides(box).T
-        return np.asarray(left | top | right | bottom)
+        return _cut(box, self.width, self.height)
 
     def outside(self, xy: Floats) -> Mask:
         """(N,) positions (N, d) beyond the border."""
-        if np.isinf(self.width):
-            return np.zeros(len(xy), bool)
-        x, y = xy[:, 0], xy[:, 1]
-        return (x < 0) | (y < 0) | (x > self.width) | (y > self.height)
+        return _outside(xy, self.width, self.height)
 
     def leaving(self, box: Floats, v: Floats) -> Mask:
         """(N,) boxes cut by the border they move towards with velocities v (N, 2)."""
-        sides = self.sides(box)
-        near, far = sides[:, :2] & (v[:, :2] < 0), sides[:, 2:] & (v[:, :2] > 0)
-        return np.asarray((near | far).any(axis=1))
+        return _leaving(box, v, self.width, self.height)
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) drawn out to the border on the given sides (N, 4)."""
@@ -61,6 +55,35 @@ def _sides(box: Floats, width: float, height: float) -> Mask:
         sides[i, 2] = box[i, 0] + box[i, 2] > width - REACH
         sides[i, 3] = box[i, 1] + box[i, 3] > height - REACH
     return sides
+
+
+@njit(cache=CACHE, nogil=True)
+def _cut(box: Floats, width: float, height: float) -> Mask:
+    cut, sides = np.zeros(len(box), np.bool_), _sides(box, width, height)
+    for i in range(len(box)):
+        cut[i] = sides[i].any()
+    return cut
+
+
+@njit(cache=CACHE, nogil=True)
+def _outside(xy: Floats, width: float, height: float) -> Mask:
+    outside = np.zeros(len(xy), np.bool_)
+    if np.isinf(width):
+        return outside
+    for i in range(len(xy)):
+        x, y = xy[i, 0], xy[i, 1]
+        outside[i] = x < 0 or y < 0 or x > width or y > height
+    return outside
+
+
+@njit(cache=CACHE, nogil=True)
+def _leaving(box: Floats, v: Floats, width: float, height: float) -> Mask:
+    leaving, sides = np.zeros(len(box), np.bool_), _sides(box, width, height)
+    for i in range(len(box)):
+        for axis in range(min(2, v.shape[1])):
+            near, far = sides[i, axis] and v[i, axis] < 0, sides[i, axis + 2] and v[i, axis] > 0
+            leaving[i] |= near or far
+    return leaving
 
 
 @njit(cache=CACHE, nogil=True)

@@ -17,7 +17,7 @@ from numba import njit
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
-from vidtrack.tracking.boxes import area, best_cover
+from vidtrack.tracking.boxes import best_cover
 
 ONE_SIDED = 4.0
 """Standard deviations an edge is off, while the opposite one is within one, when part of a vehicle is hidden."""
@@ -50,21 +50,16 @@ class Groups:
         if not 0 < self.cover <= 1:
             raise ConfigError(f"group cover is {self.cover}; it must lie in 0..1")
 
-    def blob_of(self, predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Floats) -> Ints:
-        """(T,) the blob each track shares with others or lies on without having got it; -1 for all others.
+    def share(
+        self, predicted: Floats, taken: Ints, confirmed: np.ndarray, whole: np.ndarray, blobs: Floats
+    ) -> tuple[Ints, np.ndarray]:
+        """(T,) the blob that each track leans on by its edges, -1: none; (M,) blobs that may hide somebody new.
 
-        predicted (T, 4) boxes, taken (T,) measurement of each track or -1, blobs (M, 4) boxes.
+        A track leans on a blob that it shares with others, that it lies on without having got it, or that is not
+        the vehicle it was. predicted (T, 4) boxes, taken (T,) measurement of each track or -1, confirmed (T,), whole
+        (T,) those whose box is believed and all in the picture, blobs (M, 4) boxes.
         """
-        return _blob_of(predicted, taken, confirmed, blobs, self.cover)
-
-    def changed(self, predicted: Floats, taken: Ints, blobs: Floats) -> np.ndarray:
-        """(T,) tracks whose blob has another size than the vehicle, or one edge where it was and the other far off."""
-        return _changed(predicted, taken, blobs, self.growth, self.edge)
-
-    def explained(self, predicted: Floats, shared: Ints, blobs: Floats) -> np.ndarray:
-        """(M,) blobs at least half of whose area the tracks on them account for; the others hide somebody new."""
-        on = shared >= 0
-        return np.bincount(shared[on], area(predicted)[on], minlength=len(blobs)) >= 0.5 * area(blobs)
+        return _share(predicted, taken, confirmed, whole, blobs, self.cover, self.growth, self.edge)
 
     def measure(
         self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, hides: np.ndarray
@@ -75,12 +70,28 @@ class Groups:
         blob (G,) index of each track's blob, blobs (M, 4), cut (M, 4) sides of blobs that are the picture's
         border and no edge of a vehicle, hides (M,) blobs that the tracks on them do not account for.
         """
-        gate = np.where(hides, self.gate / 2, self.gate)
-        return _from_edges(predicted, box, var, blob, blobs, cut, gate, self.edge)
+        return _from_edges(predicted, box, var, blob, blobs, cut, hides, self.gate, self.edge)
+
+
+@njit(cache=CACHE, nogil=True, error_model="numpy")
+def _share(
+    predicted: Floats, taken: Ints, confirmed: np.ndarray, whole: np.ndarray, blobs: Floats,
+    cover: float, growth: float, edge: float,
+) -> tuple[Ints, np.ndarray]:  # fmt: skip
+    shared = _blob_of(predicted, taken, confirmed, blobs, cover)
+    explained = np.zeros(len(blobs))
+    for t in range(len(shared)):
+        own = shared[t] < 0 and taken[t] >= 0
+        if own and confirmed[t] and whole[t] and _changed(predicted[t], blobs[taken[t]], growth, edge):
+            shared[t] = taken[t]
+        if shared[t] >= 0:
+            explained[shared[t]] += predicted[t, 2] * predicted[t, 3]
+    return shared, ~(explained >= 0.5 * blobs[:, 2] * blobs[:, 3])
 
 
 @njit(cache=CACHE, nogil=True)
 def _blob_of(predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Floats, cover: float) -> Ints:
+    """(T,) the blob each track shares with others or lies on without having got it; -1 for all others."""
     shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
     orphans = np.flatnonzero(confirmed & (taken < 0))
     blob, share = best_cover(predicted[orphans], blobs)
@@ -98,26 +109,23 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Float
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")
-def _changed(predicted: Floats, taken: Ints, blobs: Floats, growth: float, edge: float) -> np.ndarray:
-    changed = np.zeros(len(predicted), np.bool_)
-    for t in range(len(predicted)):
-        if taken[t] < 0:
-            continue
-        box, blob = predicted[t], blobs[taken[t]]
-        ratio = blob[2] * blob[3] / (box[2] * box[3])
-        changed[t] = ratio > growth or ratio < 1 / growth
-        for axis in range(2):
-            sigma = np.hypot(edge * box[2 + axis], 1.0)
-            near = abs(blob[axis] - box[axis]) / sigma
-            far = abs(blob[axis] + blob[2 + axis] - box[axis] - box[2 + axis]) / sigma
-            changed[t] |= min(near, far) < 1 and max(near, far) > ONE_SIDED
+def _changed(box: Floats, blob: Floats, growth: float, edge: float) -> bool:
+    """Whether a blob (4,) has another size than the vehicle's box (4,), or one edge where it was and the other not."""
+    ratio = blob[2] * blob[3] / (box[2] * box[3])
+    changed = ratio > growth or ratio < 1 / growth
+    for axis in range(2):
+        sigma = np.hypot(edge * box[2 + axis], 1.0)
+        near = abs(blob[axis] - box[axis]) / sigma
+        far = abs(blob[axis] + blob[2 + axis] - box[axis] - box[2 + axis]) / sigma
+        changed |= min(near, far) < 1 and max(near, far) > ONE_SIDED
     return changed
 
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")
 def _from_edges(
-    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, gate: Floats, edge: float
-) -> tuple[Floats, Floats, Ints]:
+    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, hides: np.ndarray,
+    gate: float, edge: float,
+) -> tuple[Floats, Floats, Ints]:  # fmt: skip
     """Each member's position from the four edges of its blob.
 
     A member stands at a known offset from the group's extreme edge (zero for the extreme member itself); the
@@ -143,7 +151,7 @@ def _from_edges(
                         rival = min(rival, sign * (other - mine))
                 seen = blobs[blob[i], axis] + far * blobs[blob[i], 2 + axis]
                 offset = mine - extreme
-                if abs(seen - extreme) > gate[blob[i]] * np.sqrt(noise + var[i, axis]):
+                if abs(seen - extreme) > (gate / 2 if hides[blob[i]] else gate) * np.sqrt(noise + var[i, axis]):
                     continue
                 variance = noise + offset * offset
                 total += (seen + offset - far * box[i, 2 + axis] - box[i, axis]) / variance

@@ -90,13 +90,13 @@ class LifeCycle:
 
     def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
         """(T,) tentative rows with enough hits, age and travel (T,); size (T,) of the objects."""
-        hits, _ = _seen(register.history, self.confirm_window)
-        return (hits >= self.confirm_hits) & grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
+        often = _often(register.history, self.confirm_window, self.confirm_hits)
+        return often & grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
-        _, misses = _seen(register.history, self.confirm_window)
-        return (register.status == TENTATIVE) & (misses > self.confirm_window - self.confirm_hits)
+        allowed = self.confirm_window - self.confirm_hits
+        return _hopeless(register.history, register.status, self.confirm_window, allowed)
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""
@@ -106,8 +106,7 @@ class LifeCycle:
 
 def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
     """(T,) tentative rows that are old enough and whose travel (T,) is at least so much (T,)."""
-    old = t - register.born_s >= age_s * (1 - 1e-9)
-    return (register.status == TENTATIVE) & old & (travel >= least)
+    return _grown(register.status, t - register.born_s, travel, age_s * (1 - 1e-9), least)
 
 
 def missed(register: Register, scans: int | None) -> Mask:
@@ -121,8 +120,7 @@ def unseen(register: Register, t: float, coast_s: float | None, hidden_s: float)
     """(T,) rows without evidence for coast_s, on shared blobs for hidden_s if that is longer; None: no limit."""
     if coast_s is None:
         return np.zeros(len(register), bool)
-    patience = np.where(register.status == MERGED, hidden_s, coast_s)
-    return t - register.updated_s > np.maximum(patience, coast_s)
+    return _unseen(register.status, t - register.updated_s, coast_s, max(hidden_s, coast_s))
 
 
 def refuse_immortal(coast_s: float | None, coast_scans: int | None) -> None:
@@ -150,15 +148,47 @@ def scans_to_false_deletion(misses: int, detection: float) -> float:
 
 
 @njit(cache=CACHE, nogil=True)
-def _seen(history: Ints, window: int) -> tuple[Ints, Ints]:
-    """Hits and misses (T,) among the last scans, so many; the birth of a row is the highest bit of its history (T,)."""
-    hits, misses = np.zeros(len(history), np.int64), np.zeros(len(history), np.int64)
+def _grown(status: np.ndarray, age: Floats, travel: Floats, old: float, least: Floats) -> Mask:
+    grown = np.zeros(len(status), np.bool_)
+    for t in range(len(status)):
+        grown[t] = status[t] == TENTATIVE and age[t] >= old and travel[t] >= least[t]
+    return grown
+
+
+@njit(cache=CACHE, nogil=True)
+def _unseen(status: np.ndarray, since: Floats, alone: float, hidden: float) -> Mask:
+    unseen = np.zeros(len(status), np.bool_)
+    for t in range(len(status)):
+        unseen[t] = since[t] > (hidden if status[t] == MERGED else alone)
+    return unseen
+
+
+@njit(cache=CACHE, nogil=True)
+def _often(history: Ints, window: int, least: int) -> Mask:
+    """(T,) rows with at least so many hits within the window."""
+    often = np.zeros(len(history), np.bool_)
     for t in range(len(history)):
-        rest = history[t]
-        for _ in range(window):
-            if rest == 0:
-                break
-            hits[t] += rest & 1
-            misses[t] += 1 - (rest & 1)
-            rest >>= 1
+        often[t] = _counts(history[t], window)[0] >= least
+    return often
+
+
+@njit(cache=CACHE, nogil=True)
+def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> Mask:
+    """(T,) tentative rows with more misses within the window than are allowed."""
+    hopeless = np.zeros(len(history), np.bool_)
+    for t in range(len(history)):
+        hopeless[t] = status[t] == TENTATIVE and _counts(history[t], window)[1] > allowed
+    return hopeless
+
+
+@njit(cache=CACHE, nogil=True)
+def _counts(history: int, window: int) -> tuple[int, int]:
+    """Hits and misses of a row in its last scans, so many; its birth is the highest bit of its history."""
+    hits, misses = 0, 0
+    for _ in range(window):
+        if history == 0:
+            break
+        hits += history & 1
+        misses += 1 - (history & 1)
+        history >>= 1
     return hits, misses

@@ -52,6 +52,11 @@ class Rates:
         self.high = np.empty(0)
 
     @property
+    def estimated(self) -> bool:
+        """Whether either is."""
+        return self._detection is None or self._clutter is None
+
+    @property
     def detection_probability(self) -> float:
         """P_D now, the mean over the runs."""
         if self._detection is not None:
@@ -92,8 +97,6 @@ class Rates:
 
         alone  (K,) rows of the register that count: those believed, on no shared blob; inside (K,) their P_G
         """
-        if self._detection is not None and self._clutter is not None:
-            return
         forget = float(np.exp(-dt / MEMORY_S))
         known = alone & (register.status != TENTATIVE)
         runs = 1 + int(register.run.max(initial=0))

@@ -7,7 +7,14 @@ from numba import njit
 from scipy.special import expit
 
 from vidtrack.compiled import CACHE
-from vidtrack.scan import TENTATIVE, Floats, Ints
+from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Floats, Ints
+
+BELIEF = 20.0
+"""Largest log-odds of a track's existence."""
+SCANS = (1 << 63) - 1
+"""The bits of a history that count: its 63 lowest."""
+
+Mask = np.ndarray
 
 
 class Register:
@@ -66,6 +73,21 @@ class Register:
         """(T,) distances of positions (T, d) from where the rows began."""
         return _distance(xy, self.start)
 
+    def see(self, hit: Mask, sure: Mask, t: float, dt: float) -> None:
+        """Note which rows (T,) the scan at t shows, dt seconds after the last, and which of them for sure.
+
+        Only sure ones keep a row alive, and confirm a tentative one.
+        """
+        _see(self.history, self.alone_s, self.updated_s, self.status, hit, sure, t, dt)
+
+    def believe(self, log_ratio: Floats) -> None:
+        """Take in evidence (T,) for the rows' existence: Bayes' rule in log-odds."""
+        _believe(self.score, self.best, self.status, log_ratio)
+
+    def settle(self) -> None:
+        """Give the rows that are confirmed the status that follows from what was seen of them."""
+        _settle(self.status, self.history, self.group)
+
     def append(
         self, t: float, position: Floats, box: Floats, score: float, run: Ints, label: Ints | None = None
     ) -> Ints:
@@ -108,6 +130,35 @@ class Register:
         """Drop all rows but these indices."""
         for name in self.columns:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
+
+
+@njit(cache=CACHE, nogil=True)
+def _see(
+    history: Ints, alone_s: Floats, updated_s: Floats, status: np.ndarray, hit: Mask, sure: Mask, t: float, dt: float
+) -> None:
+    for i in range(len(hit)):
+        alone_s[i] += dt * hit[i]
+        if hit[i] and sure[i]:
+            updated_s[i] = t
+        counts = hit[i] and (sure[i] or status[i] != TENTATIVE)
+        history[i] = (history[i] << 1 | counts) & SCANS
+
+
+@njit(cache=CACHE, nogil=True)
+def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats) -> None:
+    for i in range(len(score)):
+        score[i] = min(max(score[i] + log_ratio[i], -BELIEF), BELIEF)
+        if status[i] != TENTATIVE:
+            best[i] = max(best[i], score[i])
+
+
+@njit(cache=CACHE, nogil=True)
+def _settle(status: np.ndarray, history: Ints, group: Ints) -> None:
+    for i in range(len(status)):
+        if status[i] != TENTATIVE:
+            status[i] = CONFIRMED if history[i] & 1 else COASTING
+        if group[i] >= 0:
+            status[i] = MERGED
 
 
 @njit(cache=CACHE, nogil=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.lasting import inflation
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Decision, Event, Floats, Ints, Scan
 from vidtrack.tracking.border import Border
@@ -37,33 +38,31 @@ class Sharing:
         predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
         Returns (T,) the blob or -1, and (M,) blobs that may hide somebody new.
         """
-        shared = self._groups.blob_of(predicted, taken, confirmed, blobs)
-        whole = confirmed & (hits > ADULT) & (shared < 0) & ~self._border.cut(predicted)
-        changed = whole & self._groups.changed(predicted, taken, blobs)
-        shared[changed] = taken[changed]
-        return shared, ~self._groups.explained(predicted, shared, blobs)
+        whole = (hits > ADULT) & ~self._border.cut(predicted)
+        return self._groups.share(predicted, taken, confirmed, whole, blobs)
 
     def follow(
         self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
     ) -> None:
         """Update the tracks that lean on blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
-        rows = np.flatnonzero(shared >= 0)
+        leans = shared >= 0
+        rows = leans.nonzero()[0]
         if not len(rows):
             return
         position, velocity = bank.model.position, bank.model.velocity
         x, box, on = bank.x[rows], register.box[rows], shared[rows]
         predicted = absolute(box, x.take(position, axis=1))
         before = absolute(predicted, -dt * x.take(velocity, axis=1))
-        var = bank.P[rows][:, position, position]
+        var = bank.P.diagonal(axis1=1, axis2=2)[rows].take(position, axis=1)
         cut = self._border.sides(blobs)
         z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
 
-        beta0 = np.ones(len(shared))
-        beta0[rows] = 0.0
+        beta0 = (~leans).astype(float)
         edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
-        bank.update(edges, Scan(t, z, R[:, :, None] * np.eye(2)), POSITION)
-        register.history[rows[own > 0]] |= 1
-        register.updated_s[rows[own > 0]] = t
+        bank.update(edges, Scan(t, z, inflation(dt) * R[:, :, None] * np.eye(2)), POSITION)
+        told = rows[own > 0]
+        register.history[told] |= 1
+        register.updated_s[told] = t
 
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
         xy = bank.x[rows].take(position, axis=1)
@@ -75,7 +74,9 @@ class Sharing:
     def passengers(self, register: Register, t: float) -> Mask:
         """(T,) members that were hardly ever seen alone and do not leave their group: parts of another member."""
         strange = (register.group >= 0) & (register.alone_s < self._groups.known_s)
-        for number in np.unique(register.group[strange]) if strange.any() else ():
+        if not np.count_nonzero(strange):
+            return strange
+        for number in np.unique(register.group[strange]):
             members = np.flatnonzero(register.group == number)
             strange[members[register.alone_s[members].argmax()]] = False
         return strange & (t - register.group_since_s > self._groups.part_s)
@@ -83,22 +84,23 @@ class Sharing:
     def regroup(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """A group keeps its number and its start for as long as any of its members stay together."""
         on = shared[shared >= 0]
-        if not (len(on) or (register.group >= 0).any()):
+        if not (len(on) or np.count_nonzero(register.group >= 0)):
             return
-        blobs = np.flatnonzero(np.bincount(on) > 1)
         group = np.full(len(shared), -1)
-        for blob in blobs:
-            members = np.flatnonzero(shared == blob)
+        for blob in (np.bincount(on) > 1).nonzero()[0]:
+            members = (shared == blob).nonzero()[0]
             number = register.group[members].max()
-            if number < 0 or (group == number).any():
+            if number < 0 or np.count_nonzero(group == number):
                 number = self._made
                 self._made += 1
             group[members] = number
             joined = members[register.group[members] != number]
+            if not len(joined):
+                continue
             register.group_since_s[joined] = t
             reason = f"tracks {', '.join(str(i) for i in register.id[members])} share one blob"
             events.extend(Event.each(t, register.id[joined], "merge", reason))
-        alone = np.flatnonzero((group < 0) & (register.group >= 0))
+        alone = ((group < 0) & (register.group >= 0)).nonzero()[0]
         register.group_since_s[alone] = np.nan
         events.extend(Event.each(t, register.id[alone], "split", "alone on its blob again"))
         register.group = group

@@ -18,11 +18,12 @@ from vidtrack.detection.threshold import ThresholdController
 from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.estimate.lasting import inflation
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.estimate.smoother import smoothing_gain
-from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Scan, Tracks
+from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Scan, Tracks
 from vidtrack.tracking.association import Association, at_once, deferred
 from vidtrack.tracking.births import pieces
 from vidtrack.tracking.border import Border
@@ -32,11 +33,9 @@ from vidtrack.tracking.forest import Deferred, Forest
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import Life, LifeCycle
 from vidtrack.tracking.rates import Rate, Rates
-from vidtrack.tracking.register import Register
+from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.sharing import Sharing
 
-BELIEF = 20.0
-"""Largest log-odds of a track's existence."""
 EXIT_S = 0.2
 """A track on its way over the border is given up after so long without evidence."""
 
@@ -190,7 +189,7 @@ class Tracker:
         if self.smooth:
             self._remember(dt, x, P)
         lost = self.life.lost(self.register, t)
-        if lost.any():
+        if np.count_nonzero(lost):
             last = dict(zip(self.register.id[lost].tolist(), self.register.updated_s[lost].tolist(), strict=True))
             for track in self._ends(lost):
                 events.append(Event(t, int(track), "delete", f"no evidence since {last[int(track)]:.2f} s"))
@@ -237,14 +236,12 @@ class Tracker:
     ) -> None:
         """States by their measurements, boxes by theirs."""
         register = self.register
-        self.bank.update(decision, scan, sensor)
+        self.bank.update(decision, scan.weakened(inflation(dt)), sensor)
         hit = decision.beta0 < 0.5
-        rows = np.flatnonzero(hit)
-        sure = self.trust.sure(scan)[taken[rows]]
-        register.alone_s += dt * hit
-        register.updated_s[rows[sure]] = scan.t
-        hit[rows] &= sure | (register.status[rows] != TENTATIVE)  # only sure ones confirm
-        register.history = (register.history << 1 | hit) & ((1 << 63) - 1)
+        rows = hit.nonzero()[0]
+        sure = hit.copy()
+        sure[rows] = self.trust.sure(scan)[taken[rows]]
+        register.see(hit, sure, scan.t, dt)
         if scan.label is not None:
             told = scan.label[taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
@@ -275,23 +272,25 @@ class Tracker:
         register = self.register
         log_ratio, nis = evidence(problem, decision, taken)
         log_ratio[shared >= 0] = 0.0
-        register.score = np.minimum(np.maximum(register.score + log_ratio, -BELIEF), BELIEF)
-        higher = (register.status != TENTATIVE) & (register.score > register.best)
-        register.best = np.where(higher, register.score, register.best)
-        alone = self._believed(problem.rows) & (shared < 0)
-        self.rates.learn(decision, register, alone, problem.inside, problem.measurements, dt)
+        register.believe(log_ratio)
+        if self.rates.estimated:
+            alone = self._believed(problem.rows) & (shared < 0)
+            self.rates.learn(decision, register, alone, problem.inside, problem.measurements, dt)
         return nis
 
     def _delete(self, t: float, events: list[Event]) -> Mask:
         """Drop the rows that are not believed any more; returns the mask of those kept."""
         left = self._left(t)
-        hopeless = self.life.hopeless(self.register) & ~left
-        parts = self.sharing.passengers(self.register, t) & ~left if self.sharing else np.zeros(len(left), bool)
+        hopeless = self.life.hopeless(self.register)
+        parts = self.sharing.passengers(self.register, t) if self.sharing else np.zeros(len(left), bool)
         kept = ~(hopeless | left | parts)
-        if not kept.all():
-            events.extend(Event.each(t, self._ends(~kept, hopeless), "delete", self.life.ends))
-            events.extend(Event.each(t, self._ends(~kept, left), "delete", "left the picture"))
-            events.extend(Event.each(t, self._ends(~kept, parts), "delete", "part of the vehicle that it never left"))
+        if np.count_nonzero(kept) < len(kept):
+            for gone, why in (
+                (hopeless & ~left, self.life.ends),
+                (left, "left the picture"),
+                (parts & ~left, "part of the vehicle that it never left"),
+            ):
+                events.extend(Event.each(t, self._ends(~kept, gone), "delete", why))
             self._keep(kept)
         return kept
 
@@ -299,7 +298,7 @@ class Tracker:
         """(T,) tracks that this scan missed, and that are over the border or were last seen on their way there."""
         register = self.register
         left = register.history & 1 == 0
-        missed = np.flatnonzero(left)
+        missed = left.nonzero()[0]
         if len(missed):
             x = self.bank.x[missed]
             xy, v = x.take(self.model.position, axis=1), x.take(self.model.velocity, axis=1)
@@ -309,9 +308,9 @@ class Tracker:
 
     def _register(self, scan: Scan, sensor: Sensor, blobs: Floats | None, free: Mask, events: list[Event]) -> Ints:
         """Start tentative tracks from measurements that belong to nobody; returns their indices."""
-        if blobs is not None and self.sharing and free.any():
-            free[free] = ~pieces(blobs[free], self._boxes()[self.register.status != TENTATIVE])
-        born = np.flatnonzero(free & self.births)
+        born = (free & self.births).nonzero()[0]
+        if blobs is not None and self.sharing and len(born):
+            born = born[~pieces(blobs[born], self._boxes()[self.register.status != TENTATIVE])]
         if not len(born):
             return born
         box = np.full((len(born), 4), np.nan) if scan.box is None else scan.box[born]
@@ -328,18 +327,17 @@ class Tracker:
     def _confirm(self, t: float, events: list[Event]) -> None:
         """Tentative tracks that earned it are confirmed; the others' status follows what was seen of them."""
         register = self.register
-        size = np.fmax(longer(register.box), 0.0)  # none where there is no box
-        ready = self.life.confirmed(register, t, register.travel(self._xy()), size)
         if self.forest:
             self.forest.settle(register, t, events)
-            ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)
-            register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
-        register.status[ready] = CONFIRMED
-        events.extend(Event.each(t, register.id[ready], "confirmed", self.life.confirms))
-        known = register.status != TENTATIVE
-        register.status[known] = COASTING
-        register.status[known & (register.history & 1 == 1)] = CONFIRMED
-        register.status[register.group >= 0] = MERGED
+        if np.count_nonzero(register.status == TENTATIVE):
+            size = np.fmax(longer(register.box), 0.0)  # none where there is no box
+            ready = self.life.confirmed(register, t, register.travel(self._xy()), size)
+            if self.forest:
+                ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)
+                register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
+            register.status[ready] = CONFIRMED
+            events.extend(Event.each(t, register.id[ready], "confirmed", self.life.confirms))
+        register.settle()
 
     def _xy(self) -> Floats:
         """(T, d) the tracks' positions."""
@@ -358,7 +356,7 @@ class Tracker:
     def _keep(self, kept: Mask) -> None:
         if self.forest:
             self.forest.keep(kept)
-        rows = np.flatnonzero(kept)
+        rows = kept.nonzero()[0]
         self.bank.keep(rows)
         self.register.keep(rows)
 

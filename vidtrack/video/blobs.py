@@ -44,15 +44,15 @@ class Blobs:
         """The blobs as measurements: z the centroids, boxes relative to them.
 
         R = (jitter_px step)^2 I + jitter_share^2 cov: the border is uncertain by a part of a processed pixel, and
-        what is missed or added at an end moves the centroid along the extent. From frame to frame centroids of
-        vehicles jitter by 0.1 to 0.25 px at 240 to 360 rows; the defaults are above that, because shadow and parts
-        that look like the road come and go slowly.
+        what is missed or added at an end moves the centroid along the extent, and lasts. From frame to frame
+        centroids of vehicles jitter by 0.1 to 0.25 px at 240 to 360 rows; the defaults are above that, because
+        shadow and parts that look like the road come and go slowly.
         """
-        R = self.settings.jitter_share**2 * self.cov
-        R += (self.settings.jitter_px * self.step) ** 2 * np.eye(2)
+        lasting = self.settings.jitter_share**2 * self.cov
+        R = lasting + (self.settings.jitter_px * self.step) ** 2 * np.eye(2)
         box = self.box.copy()
         box[:, :2] -= self.centroid
-        return Scan(time_s, self.centroid, R, box=box, amplitude=self.amplitude)
+        return Scan(time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting)
 
 
 def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:

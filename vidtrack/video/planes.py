@@ -7,6 +7,7 @@ from dataclasses import replace
 import av
 import cv2
 import numpy as np
+from av.video.plane import VideoPlane
 
 from vidtrack.video.frame import Frame, Image
 
@@ -22,21 +23,22 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
     layouts) is converted: RGB to full-range BT.601, which `Frame.bgr` undoes; YUV keeps its range.
     """
     picture = planar(picture)
-    if _is_grey(picture):
-        return Frame(index, time_s, _plane(picture, 0), full_range=picture.color_range != _LIMITED)
+    y, *chroma = map(_view, picture.planes)
+    if not chroma:
+        return Frame(index, time_s, y, full_range=picture.color_range != _LIMITED)
     height, width = (picture.height + 1) // 2, (picture.width + 1) // 2
-    u, v = (_thinned(_plane(picture, channel), height, width) for channel in (1, 2))
+    u, v = (_thinned(plane, height, width) for plane in chroma)
     full_range = picture.color_range == _FULL or picture.format.name.startswith("yuvj")
-    return Frame(index, time_s, _plane(picture, 0), u, v, full_range)
+    return Frame(index, time_s, y, u, v, full_range)
 
 
 def planar(picture: av.VideoFrame) -> av.VideoFrame:
     """The picture in planes of 8 bits: itself where it is so already, otherwise converted."""
+    if picture.format.name in _YUV and all(plane.line_size > 0 for plane in picture.planes):
+        return picture
     if _is_grey(picture):
         return picture if picture.format.name == "gray" else picture.reformat(format="gray")
-    if picture.format.name not in _YUV or any(plane.line_size < 0 for plane in picture.planes):
-        return _converted(picture)
-    return picture
+    return _converted(picture)
 
 
 def _is_grey(picture: av.VideoFrame) -> bool:
@@ -50,10 +52,9 @@ def _converted(picture: av.VideoFrame) -> av.VideoFrame:
     return picture.reformat(format="yuv420p")
 
 
-def _plane(picture: av.VideoFrame, channel: int) -> Image:
+def _view(plane: VideoPlane) -> Image:
     """(h, w) view of one plane; it keeps the decoder's memory alive."""
-    plane = picture.planes[channel]
-    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
+    rows = np.ndarray((plane.height, plane.width), np.uint8, memoryview(plane), strides=(plane.line_size, 1))
     rows.flags.writeable = False  # the decoder predicts later pictures from this memory
     return rows
 

@@ -37,9 +37,8 @@ def _find_runs(words, rest, outside, w, row, start, stop):  # type: ignore[no-un
     first = -1  # of the run that is open
     before = _NONE  # mark of the pixel before the word
     while k <= len(words):
-        if before == outside >> _LAST and k + 8 <= len(words) and _all_zero(words, k):
-            k += 8
-            continue
+        if before == outside >> _LAST:
+            k = _after_zeros(words, k)
         marks = _not_zero(words[k] if k < len(words) else rest) ^ outside
         edges = marks ^ (marks << _BYTE | before)
         before = marks >> _LAST
@@ -85,6 +84,16 @@ def _lowest_byte(word):  # type: ignore[no-untyped-def]
     if word & np.uint64(0xFFFF) == 0:
         number, word = number + 2, word >> np.uint64(16)
     return number + 1 if word & np.uint64(0xFF) == 0 else number
+
+
+@numba.njit(cache=CACHE, nogil=True, inline="always")
+def _after_zeros(words, k):  # type: ignore[no-untyped-def]
+    """Number of the first word from k on that is not 0, or of words if there is none."""
+    while k + 8 <= len(words) and _all_zero(words, k):
+        k += 8
+    while k < len(words) and words[k] == 0:
+        k += 1
+    return k
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import av
@@ -45,12 +45,14 @@ class Watched:
 
 
 def watch(clip: Clip, detector: DetectorSettings | None = None) -> Watched:
-    """Draw a clip and detect in it, without hints from a tracker, so that all trackers get the same blobs."""
+    """Draw a clip and detect in it, without hints from a tracker, so that all trackers get the same blobs.
+
+    The paper's filter takes the errors of each frame for new, and so do those that follow these scans.
+    """
     settings = Settings(detector=detector or DetectorSettings())
     model = build_detector(settings)
-    scans = [
-        find_blobs(model.apply(frame, np.empty((0, 4))), settings.blobs).scan(frame.time_s) for frame in frames(clip)
-    ]
+    found = [(frame.time_s, find_blobs(model.apply(frame, np.empty((0, 4))), settings.blobs)) for frame in frames(clip)]
+    scans = [replace(blobs.scan(time_s), lasting=None) for time_s, blobs in found]
     truth = clip.truth
     shape = (len(clip), len(clip.scene.targets))
     centre, box = np.full((*shape, 2), np.nan), np.full((*shape, 4), np.nan)

@@ -17,7 +17,7 @@ from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, nothing, spare, start
-from vidtrack.video.background.shadow import SHADOW, mark_shadow
+from vidtrack.video.background.shadow import mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -113,16 +113,15 @@ class Disturbance:
     def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float) -> None:
         """Average what is neither foreground, nor close to it, nor shadow."""
         s = self._settings
-        covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask.copy()
-        covered |= hit & np.uint8(SHADOW)
+        covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask
         if not s.selective:
-            covered[:] = 0
+            covered = hit = np.zeros_like(mask)
         self._frames += 1
         weight = -math.expm1(-dt / s.learn_s)
         if self._time_s - self._start_s < _FIRST_S:
             weight = max(weight, 1 / self._frames)
         noise_weight, seen_s = -math.expm1(-dt / s.noise_s), min(dt, _GAP_S)
-        learn(picture, scene, covered, np.float32(weight), np.float32(noise_weight), np.float32(seen_s))
+        learn(picture, scene, covered, hit, np.float32(weight), np.float32(noise_weight), np.float32(seen_s))
 
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
         """Take for scene what has stood for absorb_s, and lasting shadow."""

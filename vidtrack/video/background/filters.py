@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import cv2
 import numba
 import numpy as np
 
@@ -26,7 +25,7 @@ def area_average(plane: Image, shape: tuple[int, int], step: int) -> Image:
 def smoothed(plane: Image) -> Image:
     """(h, w) the plane weighted 1-2-1 in both directions; it is mirrored at its edges, and halves are rounded up."""
     smooth = np.empty(plane.shape, np.uint8)
-    _weigh(np.asarray(cv2.copyMakeBorder(plane, 1, 1, 1, 1, cv2.BORDER_REFLECT_101), np.uint8), smooth)
+    _weigh(plane, smooth)
     return smooth
 
 
@@ -57,11 +56,15 @@ def _averaging(step: int) -> Callable[..., Any]:
 
 @numba.njit(cache=CACHE, nogil=True)
 def _weigh(plane, smooth):  # type: ignore[no-untyped-def]
-    """smooth (h, w) from plane (h + 2, w + 2)."""
-    h, w = smooth.shape
+    """Fill smooth (h, w) from plane (h, w)."""
+    h, w = plane.shape
     column = np.empty(w + 2, np.uint16)
+    inside = column[1:-1]
     for y in range(h):
-        for x in range(w + 2):
-            column[x] = plane[y, x] + 2 * np.uint16(plane[y + 1, x]) + plane[y + 2, x]
+        above = plane[y - 1 if y > 0 else min(1, h - 1)]
+        below = plane[y + 1 if y < h - 1 else max(h - 2, 0)]
+        for x in range(w):
+            inside[x] = above[x] + 2 * np.uint16(plane[y, x]) + below[x]
+        column[0], column[-1] = inside[min(1, w - 1)], inside[max(w - 2, 0)]
         for x in range(w):
             smooth[y, x] = (column[x] + 2 * column[x + 1] + column[x + 2] + 8) >> 4

@@ -49,15 +49,15 @@ def start(picture: Picture) -> Scene:
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no-untyped-def]
-    """One step of the running averages where covered (h, w) uint8 is 0; elsewhere the seconds are counted.
+def learn(picture, scene, covered, hit, weight, noise_weight, dt):  # type: ignore[no-untyped-def]
+    """One step of the running averages where covered (h, w) uint8 is 0 and hit no SHADOW; else the seconds are counted.
 
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
     """
     h, w = covered.shape
     for y in range(h):
         for x in range(w):
-            free = covered[y, x] == 0
+            free = covered[y, x] | hit[y, x] & SHADOW == 0
             noise = scene.noise[y, x]
             d = np.float32(picture.luma[y, x]) - scene.luma[y, x]
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
@@ -66,7 +66,7 @@ def learn(picture, scene, covered, weight, noise_weight, dt):  # type: ignore[no
             scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + dt
         if len(picture.cb) > 0 and y % 2 == 0:
             for x in range((w + 1) // 2):
-                share = weight if covered[y, 2 * x] == 0 else _NONE
+                share = weight if covered[y, 2 * x] | hit[y, 2 * x] & SHADOW == 0 else _NONE
                 scene.cb[y // 2, x] += share * (np.float32(picture.cb[y // 2, x]) - scene.cb[y // 2, x])
                 scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])
 

@@ -8,7 +8,7 @@ import numpy as np
 from vidtrack.compiled import CACHE
 from vidtrack.video.runs import find_runs
 
-SHADOW = 2  # value of a hit that is shadow
+SHADOW = np.uint8(2)  # value of a hit that is shadow
 _DARKEST, _LIGHTEST = np.float32(0.5), np.float32(0.97)  # share of the scene's light
 _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
 _TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light: soft edges
