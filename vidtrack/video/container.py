@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain
+from os import cpu_count
 from pathlib import Path
 
 import av
@@ -14,6 +15,7 @@ from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, n
 from vidtrack.video.header import avi_period_s, missing_bytes
 from vidtrack.video.stats import SourceStats
 
+_DECODERS = 4  # at least: pictures take unlike times, and with three of them on two cores one is idle more often
 _TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
 _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K video reaches the second bound first
 
@@ -31,6 +33,7 @@ class VideoFile:
         self._container = _open(path)
         self._stream = _video_stream(self._container, path)
         self._stream.thread_type = "AUTO"
+        self._stream.codec_context.thread_count = max(_DECODERS, cpu_count() or 1)
         # AVI stores no presentation times, only the order of decoding: FFmpeg's guess at them jumps to and fro.
         self._is_avi = self._container.format.name == "avi"
         self._packets = self._demuxed()
