@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN
-from vidtrack.errors import ScanError
+from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Scan, Status
 from vidtrack.tracking.groups import Groups
@@ -305,3 +305,9 @@ def test_nis_and_existence_mean_the_same_whatever_the_gate_compares(distance):
     assert [int(tracks.id[0]) for tracks in seen] == [1] * 400
     assert 1.5 < np.mean([tracks.nis[0] for tracks in seen[20:]]) < 2.5
     assert seen[-1].existence[0] > 0.99
+
+
+@pytest.mark.parametrize("rule", ["gnn", GNN])
+def test_a_rule_is_given_as_an_instance(rule):
+    with pytest.raises(ConfigError, match=r"such as GNN\(\)"):
+        Tracker(associate=rule)

@@ -64,7 +64,7 @@ class Tracker:
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
-    Raises ConfigError for numbers out of range.
+    Raises ConfigError for numbers out of range, or a rule given by its class or name.
     """
 
     STATE = ("t", "bank", "register", "sharing", "forest", "rates")
@@ -93,6 +93,8 @@ class Tracker:
         self.model: Motion = model or ConstantVelocity()
         self.associate: Associator = GNN()
         self.forest: Forest | None = None
+        if isinstance(associate, str | type):
+            raise ConfigError(f"associate is {associate!r}; give an instance, such as GNN()")
         if isinstance(associate, Deferred):
             self.forest = associate.forest()
         elif associate is not None:
