@@ -179,7 +179,7 @@ class TrackerSettings(_Group):
     confirm_s: float = Field(0.4, ge=0)
     """s; no track of a video is confirmed before this age; most ghosts of the first frame's vehicles are gone then"""
     confirm_travel: float = Field(0.3, ge=0)
-    """object sizes; nor before it has moved this far from where it began"""
+    """object sizes, at least 1/30 of the picture's; nor before it has moved this far from where it began"""
     coast_s: float = Field(1.0, ge=0)
     """s; a track is given up this long after its last evidence"""
     hidden_s: float = Field(2.0, ge=0)

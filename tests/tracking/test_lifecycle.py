@@ -137,6 +137,16 @@ def test_what_only_sways_is_never_confirmed():
     assert seen[-1].xy[seen[-1].status == Status.CONFIRMED][0, 1] == pytest.approx(160, abs=2)
 
 
+def test_small_things_must_travel_as_far_as_a_thirtieth_of_the_picture_asks():
+    """Leaves of 4 px that sway by 2 px are more than half their size on the way, but not in a picture of 320 px."""
+
+    def leaf(t):
+        return [centred(100 + 2 * np.sin(6 * t), 60, 4, 4)]
+
+    assert len(confirmed_ids(play(default_tracker(confirm_travel=0.3), leaf, 4.0))) == 0
+    assert len(confirmed_ids(play(default_tracker(confirm_travel=0.1), leaf, 4.0))) == 1
+
+
 def test_a_track_ends_where_the_picture_ends():
     seen = play(default_tracker(coast_s=30.0), lambda t: [centred(20 + 80 * t, 120, 30, 16)] if t < 3.9 else [], 6.0)
     (time, _), *more = events(seen, "delete")

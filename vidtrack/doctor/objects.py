@@ -19,6 +19,7 @@ from vidtrack.video.foreground import Foreground
 
 _SETTLE_S = 2.0  # in which what stood in the first picture comes out of the scene
 _OFTEN = 0.2  # share of the frames
+_ENOUGH_S = 3.0  # of frames to say so: in less, a vehicle that is not confirmed yet moves as often as a tree
 _SMALL = 10  # percentile
 _PIECE = 0.3  # share of a box that lies in another one, of which it is a piece
 _LASTING_S = 1.0  # that a small object has to be seen; noise is not
@@ -118,7 +119,7 @@ class ObjectMeter:
             sizes[track].append(px)
 
     def _restless_place(self) -> tuple[float, tuple[int, int, int, int] | None]:
-        if not self._frames:
+        if self._watched_s < _ENOUGH_S:
             return 0.0, None
         often = np.where(self._restless > _OFTEN * self._frames, np.uint8(255), np.uint8(0))
         places = find_blobs(Foreground(often, often.astype(np.float32), self._step), BlobSettings(min_area_share=0))

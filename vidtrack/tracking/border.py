@@ -12,6 +12,9 @@ from vidtrack.scan import Floats
 
 REACH = 2.0
 """px; a box this close to the border is cut by it."""
+SPECK = 1 / 30
+"""Share of the longer side of the picture; what is smaller must travel as far as if it were that large. The leaves of a
+swaying tree are small, and what passes for the travel of one is the way to the next."""
 
 Mask = np.ndarray
 
@@ -22,6 +25,11 @@ class Border:
 
     width: float = np.inf
     height: float = np.inf
+
+    @property
+    def speck(self) -> float:
+        """px; the size of what is small in this picture, zero without a border."""
+        return 0.0 if np.isinf(self.width) else SPECK * max(self.width, self.height)
 
     def sides(self, box: Floats) -> Mask:
         """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border cuts."""

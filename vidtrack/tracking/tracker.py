@@ -332,7 +332,7 @@ class Tracker:
         if self.forest:
             self.forest.settle(register, t, events)
         if np.count_nonzero(register.status == TENTATIVE):
-            size = np.fmax(longer(register.box), 0.0)  # none where there is no box
+            size = np.fmax(longer(register.box), self.border.speck)  # NaN where there is no box
             ready = self.life.confirmed(register, t, register.travel(self._xy()), size)
             if self.forest:
                 ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)
