@@ -177,7 +177,7 @@ def test_a_setting_that_does_not_exist_is_named(tmp_path):
 
 
 def test_interrupted_results_are_complete_and_valid(tmp_path):
-    rows = [f"{k},{k},{1000 + k},{a},5,0.1" for k in range(4000) for a in range(0, 360, 5)]
+    rows = [f"{k},{k},{1000 + k},{a},5,0.1" for k in range(15_000) for a in range(0, 360, 15)]
     write(tmp_path / "plots.csv", *rows)
     out = tmp_path / "out"
     process = start("radar", "plots.csv", "-o", "out", cwd=tmp_path)
@@ -192,7 +192,7 @@ def test_interrupted_results_are_complete_and_valid(tmp_path):
     assert process.returncode == 130
     summary = json.loads((out / "summary.json").read_text())
     assert summary["interrupted"] is True
-    assert 0 < summary["scans"] < 4000
+    assert 0 < summary["scans"] < 15_000
     assert len(formats.read(out)) == pq.read_table(out / "tracks.parquet").num_rows > 0
 
 
