@@ -35,6 +35,7 @@ FLOORS = (
     "scan",
     "explain",
     "config",
+    "toml_file",
     "state",
     "errors",
     "compiled",

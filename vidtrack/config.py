@@ -15,6 +15,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from vidtrack.errors import ConfigError
+from vidtrack.toml_file import read_toml
 
 
 class _Group(BaseModel):
@@ -36,7 +37,8 @@ class SourceSettings(_Group):
     @field_validator("end_s")
     @classmethod
     def _after_start(cls, end_s: float | None, given: ValidationInfo) -> float | None:
-        if end_s is not None and end_s < (start_s := given.data.get("start_s", 0.0)):
+        start_s = given.data.get("start_s", 0.0)
+        if end_s is not None and end_s < start_s:
             raise ValueError(f"must not be before source.start_s = {start_s:g}")
         return end_s
 
@@ -194,7 +196,8 @@ class TrackerSettings(_Group):
     @field_validator("confirm_window")
     @classmethod
     def _holds_the_hits(cls, window: int, given: ValidationInfo) -> int:
-        if window < (hits := given.data.get("confirm_hits", 1)):
+        hits = given.data.get("confirm_hits", 1)
+        if window < hits:
             raise ValueError(f"must not be less than tracker.confirm_hits = {hits}")
         return window
 
@@ -322,15 +325,7 @@ def load(
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest) or a bad value.
     """
-    tree: dict[str, Any] = {}
-    if path is not None:
-        try:
-            tree = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"cannot read settings {path}: {error.strerror or error}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ConfigError(f"{path} is not valid TOML: {error}") from None
-    tree = merged(base or {}, tree)
+    tree = merged(base or {}, {} if path is None else read_toml(path, "settings"))
     for assignment in assignments:
         name, value = _split(assignment) if isinstance(assignment, str) else assignment
         _assign(tree, name.split("."), value)

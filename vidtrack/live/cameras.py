@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
@@ -14,6 +13,7 @@ from urllib.parse import urlsplit
 from vidtrack.config import Settings, load, merged
 from vidtrack.errors import ConfigError
 from vidtrack.live.outputs import Extras
+from vidtrack.toml_file import read_toml
 from vidtrack.video.live.address import redact
 
 _CAMERAS, _ADDRESS = "camera", "address"
@@ -39,12 +39,7 @@ def listed(path: Path) -> tuple[list[Entry], dict[str, Any]]:
     Each table [camera.NAME] has an `address` and any settings; the rest of the file are settings for all cameras.
     Raises ConfigError for a file that cannot be read, or lists none.
     """
-    try:
-        tree = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read the list of cameras {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path} is not valid TOML: {error}") from None
+    tree = read_toml(path, "the list of cameras")
     tables = tree.pop(_CAMERAS, {})
     if not isinstance(tables, dict) or not tables:
         raise ConfigError(f"{path} lists no camera; give each a table [{_CAMERAS}.NAME] with its {_ADDRESS}")
