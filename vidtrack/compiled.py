@@ -1,13 +1,18 @@
-"""Where compiled kernels are kept between runs."""
+"""What all compiled kernels share: where they are kept between runs, and that a signal waits for the compiler."""
 
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable
 from pathlib import Path
+from threading import current_thread, main_thread
+from types import FrameType
 from typing import Any
 
 from numba import njit
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.event import Event, Listener, register
 from numba.misc.appdirs import AppDirs
 
 PACKAGE = Path(__file__).parent
@@ -41,3 +46,36 @@ def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., 
     name = "_".join([function.__name__, *map(str, constants)])
     function.__name__ = function.__qualname__ = name
     return njit(cache=CACHE, nogil=True, error_model="numpy")(function)
+
+
+class SignalsWait(Listener):
+    """Lets Ctrl-C and SIGTERM take effect when the kernel in work is compiled.
+
+    An exception that a signal handler raises inside the compiler is lost in a callback of LLVM, or comes out as
+    another one that says nothing to the user.
+    """
+
+    def __init__(self) -> None:
+        self._handlers: dict[int, Any] = {}  # those in force outside the compiler; none: it is not at work
+        self._caught: list[int] = []
+
+    def on_start(self, event: Event) -> None:
+        """The main thread enters the compiler, perhaps for a kernel that another one calls."""
+        if not self._handlers and current_thread() is main_thread():
+            self._handlers = {number: signal.signal(number, self._note) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def on_end(self, event: Event) -> None:
+        """It leaves the compiler; what was caught meanwhile comes now."""
+        if self._handlers and current_thread() is main_thread() and not global_compiler_lock.is_locked():
+            for number, handler in self._handlers.items():
+                signal.signal(number, handler)
+            self._handlers = {}
+            caught, self._caught = self._caught, []
+            for number in caught:
+                signal.raise_signal(number)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self._caught.append(number)
+
+
+register("numba:compiler_lock", SignalsWait())

@@ -59,7 +59,7 @@ def stopping(stop: Callable[[], None]) -> Iterator[None]:
         Thread(target=interrupt, name="patience", daemon=True).start()
 
     def interrupt() -> None:
-        while not over.wait(_PATIENCE_S):  # again and again: compiled code that calls Python swallows it
+        if not over.wait(_PATIENCE_S):
             interrupt_main()
 
     before = {number: signal.signal(number, note) for number in _WATCHED}

@@ -1,0 +1,78 @@
+"""Signals and the compiler: neither spoils the other."""
+
+import signal
+from contextlib import contextmanager
+from threading import Thread
+
+import pytest
+from numba import njit
+from numba.core.event import Listener, install_listener
+
+import vidtrack.compiled  # noqa: F401
+from vidtrack.cli.signals import Terminated, terminate
+
+
+def kernels():
+    """Two kernels that are not compiled yet, the one inside the other."""
+
+    @njit
+    def inner(x):
+        return x + 1
+
+    @njit
+    def outer(x):
+        return inner(x) * 2
+
+    return inner, outer
+
+
+class Sender(Listener):
+    """Sends a signal from inside the compiler, as soon as it is at work."""
+
+    def __init__(self, number):
+        self._number = number
+
+    def on_start(self, event):
+        signal.raise_signal(self._number)
+
+    def on_end(self, event):
+        pass
+
+
+@contextmanager
+def handled_by(handler, number):
+    before = signal.signal(number, handler)
+    yield
+    assert signal.signal(number, before) is handler
+
+
+@pytest.mark.parametrize(
+    ("number", "handler", "error"),
+    [
+        (signal.SIGINT, signal.default_int_handler, KeyboardInterrupt),
+        (signal.SIGTERM, terminate, Terminated),
+    ],
+)
+def test_a_signal_comes_when_the_kernel_is_compiled(number, handler, error):
+    inner, outer = kernels()
+    with handled_by(handler, number):
+        with install_listener("numba:compile", Sender(number)), pytest.raises(error):
+            outer(1)
+        assert inner.signatures
+        assert outer.signatures
+    assert outer(1) == 4
+
+
+def test_a_signal_that_is_ignored_stays_so():
+    _, outer = kernels()
+    with handled_by(signal.SIG_IGN, signal.SIGTERM), install_listener("numba:compile", Sender(signal.SIGTERM)):
+        assert outer(1) == 4
+
+
+def test_another_thread_compiles_without_touching_the_handlers():
+    _, outer = kernels()
+    found = []
+    thread = Thread(target=lambda: found.append(outer(1)))
+    thread.start()
+    thread.join()
+    assert found == [4]
