@@ -1,4 +1,4 @@
-"""Bring your own detections: any detector's points and boxes become tracks.
+"""Bring your own detections: points with errors become tracks. For boxes there are vt.box_tracker and vt.box_scan.
 
 python samples/02_bring_your_own_detections.py
 """

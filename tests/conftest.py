@@ -1,12 +1,34 @@
 """What all tests share."""
 
 import logging
+import os
+import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+WORKER = os.environ.get("PYTEST_XDIST_WORKER")
+if WORKER:  # kernels that two processes compile at the same moment would overwrite each other
+    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parent.parent / ".pytest_cache" / "kernels" / WORKER)
+
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell switches it off for what it starts in the background
+
+CLOCKED = ("tests/live/", "tests/serve/")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Workers take whole files; those that watch a camera or a page by the clock never run beside each other."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            return "clocked" if nodeid.startswith(CLOCKED) else super()._split_scope(nodeid)
+
+    return Scheduling(config, log)
 
 
 @pytest.fixture(autouse=True)

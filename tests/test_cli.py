@@ -8,6 +8,8 @@ import sys
 import time
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_line import ENVIRONMENT, SAMPLES, first_frames, loop_video, start
@@ -94,6 +96,7 @@ def test_track_prints_the_folder_and_nothing_else(vidtrack, tmp_path):
     assert code == 0
     assert out == "runs/crossing\n"
     assert "frames in" in err
+    assert "2 tracks; gate: 0 left, 0 right" in err
     summary = check_results(tmp_path / "runs" / "crossing")
     assert summary["interrupted"] is summary["truncated"] is False
     assert summary["frames"] == 46
@@ -187,13 +190,15 @@ def test_a_video_of_one_frame_has_no_tracks(vidtrack, tmp_path):
         (("--config", "wrong.toml"), ["tracker.gate_probability"]),
         (("--config", "missing.toml"), ["missing.toml"]),
         (("--line", "gate:1,2,3"), ["gate:1,2,3", "NAME:x1,y1,x2,y2"]),
-        (("--mask", "missing.png"), ["missing.png"]),
+        (("--mask", "missing.png"), ["missing.png", "No such file"]),
+        (("--mask", "black.png"), ["black.png", "black all over"]),
         (("--scale", "2"), ["source.scale", "2"]),
-        (("--start", "5", "--end", "2"), ["end_s", "5"]),
+        (("--start", "5", "--end", "2"), ["end_s = 2.0: must not be before source.start_s = 5"]),
         (("--method", "guess"), ["guess", "gnn"]),
         (("-o", "a_file"), ["a_file"]),
         (("-o", "a_file/below"), ["a_file"]),
         (("--video", "a_file/annotated.mp4"), ["a_file"]),
+        (("--video", "annotated.avi"), ["annotated.avi", "annotated.mp4"]),
         (("--save-masks", "a_file"), ["a_file"]),
         (("--rerun", "swpan"), ["swpan", "spawn", ".rrd"]),
     ],
@@ -201,10 +206,16 @@ def test_a_video_of_one_frame_has_no_tracks(vidtrack, tmp_path):
 def test_wrong_use_is_one_clear_message_and_2(vidtrack, tmp_path, options, words):
     (tmp_path / "a_file").write_text("")
     (tmp_path / "wrong.toml").write_text("[tracker]\ngate_prob = 0.99\n")
+    (tmp_path / "black.png").write_bytes(cv2.imencode(".png", np.zeros((4, 4), np.uint8))[1].tobytes())
     code, out, err = vidtrack("track", CROSSING, "--end", 0.3, *options)
     assert (code, out) == (2, "")
     for word in words:
         assert word in err
+
+
+@pytest.mark.parametrize("command", ["view", "repair"])
+def test_a_file_is_no_run(vidtrack, command):
+    assert vidtrack(command, CROSSING) == (3, "", f"vidtrack: {CROSSING} is not a run: it has no tracks.csv\n")
 
 
 def test_an_unknown_command_is_2(vidtrack):
@@ -352,13 +363,16 @@ def test_reports_and_copies_go_into_a_folder_on_request(vidtrack, tmp_path):
         code, out, err = vidtrack(*arguments, "-o", tmp_path / arguments[0], "--quiet")
         assert (code, out) == (0, ""), err
         assert (tmp_path / arguments[0] / file).stat().st_size > 0
+    assert vidtrack("eval", run, tmp_path / "sky" / "truth.csv", "-o", run, "--force", "--quiet")[0] == 0
+    assert vidtrack("repair", run, "-o", run, "--force")[0] == 2
+    assert (run / "scores.json").stat().st_size > 0
     assert (run / "summary.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("option", ["--video", "--save-masks", "--rerun"])
-def test_a_target_that_cannot_be_written_leaves_no_results_behind(vidtrack, tmp_path, option):
+@pytest.mark.parametrize(("option", "name"), [("--video", "a.mp4"), ("--save-masks", "a"), ("--rerun", "a.rrd")])
+def test_a_target_that_cannot_be_written_leaves_no_results_behind(vidtrack, tmp_path, option, name):
     """The corrected command may use the same folder."""
     (tmp_path / "file").touch()
-    code, _, err = vidtrack("track", CROSSING, "-o", "out", option, tmp_path / "file" / "deeper.rrd")
+    code, _, err = vidtrack("track", CROSSING, "-o", "out", option, tmp_path / "file" / name)
     assert code == 2, err
     assert not (tmp_path / "out").exists()

@@ -1,5 +1,6 @@
-"""Signals and the compiler: neither spoils the other."""
+"""What the compiler owes a user: it can be stopped, and what it keeps is never out of date."""
 
+import os
 import signal
 from contextlib import contextmanager
 from threading import Thread
@@ -8,8 +9,8 @@ import pytest
 from numba import njit
 from numba.core.event import Listener, install_listener
 
-import vidtrack.compiled  # noqa: F401
 from vidtrack.cli.signals import Terminated, terminate
+from vidtrack.compiled import forget_stale
 
 
 def kernels():
@@ -76,3 +77,27 @@ def test_another_thread_compiles_without_touching_the_handlers():
     thread.start()
     thread.join()
     assert found == [4]
+
+
+@pytest.mark.parametrize(("age_s", "left"), [(-10, 4), (10, 0)])
+def test_one_changed_source_makes_all_kernels_stale(tmp_path, age_s, left):
+    for folder, name in (("a", "gate"), ("b", "grid")):
+        kept = tmp_path / folder / "__pycache__"
+        kept.mkdir(parents=True)
+        (tmp_path / folder / f"{name}.py").touch()
+        for ending in ("nbi", "1.nbc"):
+            (kept / f"{name}.find-12.py311.{ending}").touch()
+    for source in tmp_path.rglob("*.py"):
+        os.utime(source, times=(0, 0))
+    now = (tmp_path / "a" / "__pycache__" / "gate.find-12.py311.nbi").stat().st_mtime
+    os.utime(tmp_path / "a" / "gate.py", times=(now + age_s, now + age_s))
+    forget_stale(tmp_path)
+    assert len(list(tmp_path.rglob("*.nb?"))) == left
+
+
+def test_kernels_of_a_source_that_is_gone_are_stale(tmp_path):
+    (tmp_path / "__pycache__").mkdir()
+    kernel = tmp_path / "__pycache__" / "gone.find-1.py311.nbi"
+    kernel.touch()
+    forget_stale(tmp_path)
+    assert not kernel.exists()

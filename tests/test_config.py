@@ -62,7 +62,7 @@ def test_printed_settings_load_as_the_same_settings(tmp_path, explain):
     for settings in (Settings(), changed):
         file = tmp_path / "settings.toml"
         file.write_text(as_toml(settings, explain=explain), encoding="utf-8")
-        assert load(file) == settings
+        assert load(file) == load(str(file)) == settings
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,10 @@ from command_line import SAMPLES
 from vidtrack import formats, score
 from vidtrack.config import Settings, TrackerSettings, load
 from vidtrack.errors import ConfigError, SourceError
-from vidtrack.pipeline import build_detector, build_tracker, has_driven, track, video_steps
+from vidtrack.pipeline import box_tracker, build_detector, build_tracker, has_driven, track, video_steps
 from vidtrack.run import Run
 from vidtrack.scan import Scan, Status
+from vidtrack.tracking.boxes import box_scan
 from vidtrack.video.source import open_source
 
 CROSSING = SAMPLES / "crossing.avi"
@@ -103,6 +104,17 @@ def test_settings_reach_the_tracker(method, distance):
     assert type(tracker.associate).__name__.lower() == method
     assert tracker.gate.distance == distance
     assert tracker.sharing is None
+
+
+def test_boxes_of_a_detector_become_tracks_with_identities():
+    tracker = box_tracker(bounds=(640, 360))
+    for k in range(30):
+        t = k / 25
+        tracks = tracker.step(box_scan(t, [[10 + 90 * t, 50, 40, 20], [300 - 60 * t, 80, 40, 20]] if k != 20 else []))
+    assert tracks.id.tolist() == [1, 2]
+    assert (tracks.status == Status.CONFIRMED).all()
+    np.testing.assert_allclose(tracks.box, [[114.4, 50, 40, 20], [230.4, 80, 40, 20]], atol=3)
+    np.testing.assert_allclose(tracks.v, [[90, 0], [-60, 0]], atol=5)
 
 
 def test_stored_detections_are_seen_with_a_probability_of_their_own():

@@ -2,6 +2,8 @@
 
 import json
 
+import cv2
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from command_line import SAMPLES
@@ -97,6 +99,32 @@ def test_what_cannot_begin_leaves_no_folder(tmp_path, monkeypatch, source, assig
     with pytest.raises(error):
         Run(source, load(assignments=[assignment]), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_span_without_a_frame_leaves_no_folder(tmp_path):
+    with (
+        pytest.raises(SourceError, match="no frame between 100 s"),
+        Run(CROSSING, load(assignments=["source.start_s=100"]), tmp_path / "out") as run,
+    ):
+        list(run)
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_read_is_not_written_over(tmp_path):
+    video, images = tmp_path / "road.mp4", tmp_path / "road"
+    video.write_bytes((SAMPLES / "crossing.avi").read_bytes())
+    images.mkdir()
+    cv2.imwrite(str(images / "000000.png"), np.zeros((48, 64), np.uint8))
+    for source, places in (
+        (video, {"video": video}),
+        (images, {"masks": images}),
+        (images / "*.png", {"masks": images}),
+        (images, {"output": images, "force": True}),
+    ):
+        with pytest.raises(OutputError, match="is what is to be read"):
+            Run(str(source), SHORT, **{"output": tmp_path / "out", **places})
+    assert video.read_bytes() == (SAMPLES / "crossing.avi").read_bytes()
+    assert [path.name for path in images.iterdir()] == ["000000.png"]
 
 
 def test_a_folder_that_is_taken_is_refused_before_anything_is_computed(tmp_path):

@@ -20,11 +20,25 @@ def test_one_covariance_is_taken_for_all(count, dim):
     assert scan.t == 1.0
     assert scan.R.shape == (count, dim, dim)
     np.testing.assert_array_equal(scan.R, np.tile(2 * np.eye(dim), (count, 1, 1)))
+    assert scan.R.flags.c_contiguous  # kernels are compiled anew for another layout, and for what is read only
+    assert scan.R.flags.writeable
 
 
 def test_empty_scan_is_a_scan():
     for R in (EYE, np.empty((0, 2, 2))):
         assert len(Scan(0.0, np.empty((0, 2)), R, box=np.empty((0, 4)))) == 0
+
+
+def test_an_empty_list_is_a_scan_without_measurements():
+    scan = Scan(0.0, [], EYE)
+    assert scan.z.shape == (0, 2)
+    assert scan.R.shape == (0, 2, 2)
+
+
+def test_boxes_of_negative_size_are_refused_by_measurement():
+    box = [[0, 0, 4, 2], [0, 0, 4, -2]]
+    with pytest.raises(ScanError, match=r"box of measurement 1 .*-2.*width"):
+        Scan(0.0, np.zeros((2, 2)), EYE, box=box)
 
 
 def test_lists_and_integers_become_arrays_of_floats():

@@ -7,7 +7,8 @@
 2. Fully coupled clusters, every measurement in every gate: exact JPDA, JPDA*, belief propagation, and, with
    --peers-in, the associators of Stone Soup on the same problems (in an environment that pip makes in DIR), with the
    largest difference of any weight from our exact ones.
-3. Belief propagation against exact weights over 1,000 random clusters of 2 to 8 tracks, 2 to 10 measurements.
+3. Belief propagation against exact weights over 1,000 random clusters of 2 to 8 tracks, 2 to 10 measurements, with some
+   clutter and with next to none.
 4. Coalescence: two targets side by side for 60 scans at distances of 1 to 4 sigma of the measurements, P_D 0.9,
    clutter 0.001 per square sigma; the share of runs that end with the estimates closer than half the true distance,
    and with the estimates the other way round.
@@ -56,11 +57,13 @@ def crowd(tracks: int, rng: np.random.Generator) -> tuple[Floats, Problem]:
     return zhat, Problem.gated(vt.Gate(GATE), zhat, cov, vt.Scan(0.0, z, np.eye(2)), 0.9, 0.01)
 
 
-def cluster(tracks: int, measurements: int, rng: np.random.Generator, gate: float = GATE) -> tuple[Floats, Problem]:
+def cluster(
+    tracks: int, measurements: int, rng: np.random.Generator, gate: float = GATE, clutter: float = 0.02
+) -> tuple[Floats, Problem]:
     """Predicted positions and the problem of one cluster: tracks and measurements about one place."""
     zhat, z = rng.normal(size=(tracks, 2)), rng.normal(size=(measurements, 2))
     cov = np.tile(3 * np.eye(2), (tracks, 1, 1))
-    return zhat, Problem.gated(vt.Gate(gate), zhat, cov, vt.Scan(0.0, z, np.eye(2)), 0.9, 0.02)
+    return zhat, Problem.gated(vt.Gate(gate), zhat, cov, vt.Scan(0.0, z, np.eye(2)), 0.9, clutter)
 
 
 def coupled(tracks: int, measurements: int, rng: np.random.Generator) -> tuple[Floats, Problem]:
@@ -143,16 +146,17 @@ def run_peer(name: str, zhat: Floats, problem: Problem, folder: Path) -> tuple[f
             return float(np.median(stored["seconds"])), stored["weights"]
 
 
-def belief_error(count: int = 1000) -> None:
-    """Print how far belief propagation is from the exact weights."""
+def belief_error(clutter: float, count: int = 1000) -> None:
+    """Print how far belief propagation is from the exact weights, with so much clutter [per unit of area]."""
     rng = np.random.default_rng(0)
     worst = np.empty(count)
     for k in range(count):
         tracks, measurements = rng.integers(2, (9, 11))
-        _, problem = cluster(int(tracks), int(measurements), rng, gate=rng.choice([0.9, 0.99, 0.999]))
+        _, problem = cluster(int(tracks), int(measurements), rng, rng.choice([0.9, 0.99, 0.999]), clutter)
         exact, close = (weights(problem, CLUSTER[name].decide(problem)) for name in ("exact", "belief"))
         worst[k] = np.abs(exact - close).max()
-    print(f"\nbelief propagation, {count} random clusters: largest error of a weight {worst.max():.3f}, ", end="")
+    print(f"\nbelief propagation, {count} random clusters, clutter {clutter:g}: ", end="")
+    print(f"largest error of a weight {worst.max():.3f}, ", end="")
     print(f"its median over clusters {np.median(worst):.4f}, 95 % of clusters below {np.quantile(worst, 0.95):.3f}")
 
 
@@ -201,7 +205,8 @@ def main() -> None:
     options = parser.parse_args()
     whole_scans(options.tracks)
     coupled_clusters(options.peers_in)
-    belief_error()
+    for clutter in (0.02, 1e-5):
+        belief_error(clutter)
     coalescence(options.runs)
 
 

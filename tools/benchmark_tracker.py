@@ -41,6 +41,7 @@ MOST = 10_000  # objects, ours only
 ENVIRONMENT = {
     "sort": "numpy2",
     "bytetrack": "numpy2",
+    "ocsort": "numpy2",
     "motpy": "numpy2",
     "similari": "numpy2",
     "stonesoup": "numpy2",

@@ -1,10 +1,15 @@
-"""Vehicle tracks from traffic video and radar plots, on a plain CPU, without a neural network."""
+"""Vehicle tracks from traffic video and radar plots, on a plain CPU, without a neural network.
+
+Names are imported when they are first used: `vidtrack --help` needs none of them. The block below is for type checkers
+and editors, `_HOME` for the interpreter.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vidtrack.associate.gate import Gate as Gate
+    from vidtrack.associate.gate import LikelihoodGate as LikelihoodGate
     from vidtrack.associate.generalized_nn import GeneralizedNN as GeneralizedNN
     from vidtrack.associate.hard import GNN as GNN
     from vidtrack.associate.hard import NN as NN
@@ -33,6 +38,7 @@ if TYPE_CHECKING:
     from vidtrack.estimate.particle import ParticleBank as ParticleBank
     from vidtrack.estimate.turn import CoordinatedTurn as CoordinatedTurn
     from vidtrack.estimate.unscented import UnscentedBank as UnscentedBank
+    from vidtrack.pipeline import box_tracker as box_tracker
     from vidtrack.pipeline import track as track
     from vidtrack.radar.sensors import PositionRangeRate as PositionRangeRate
     from vidtrack.radar.sensors import RangeAzimuth as RangeAzimuth
@@ -41,6 +47,7 @@ if TYPE_CHECKING:
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
+    from vidtrack.tracking.boxes import box_scan as box_scan
     from vidtrack.tracking.formation import Formation as Formation
     from vidtrack.tracking.formation import GroupTracker as GroupTracker
     from vidtrack.tracking.groups import Groups as Groups
@@ -69,6 +76,7 @@ _HOME = {
     "JPDA": "associate.jpda",
     "KalmanBank": "estimate.kalman",
     "LifeCycle": "tracking.lifecycle",
+    "LikelihoodGate": "associate.gate",
     "LogRatio": "tracking.log_ratio",
     "MHT": "tracking.mht",
     "NN": "associate.hard",
@@ -93,6 +101,8 @@ _HOME = {
     "Tracker": "tracking.tracker",
     "Tracks": "scan",
     "UnscentedBank": "estimate.unscented",
+    "box_scan": "tracking.boxes",
+    "box_tracker": "pipeline",
     "load_settings": "config",
     "track": "pipeline",
     "track_plots": "radar_pipeline",
@@ -100,8 +110,13 @@ _HOME = {
 __all__ = sorted(_HOME)
 
 
+def __dir__() -> list[str]:
+    """The public names, for completion."""
+    return __all__
+
+
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used: `vidtrack --help` needs none of them."""
+    """The public name, imported from its module in `_HOME`."""
     if name not in _HOME:
         raise AttributeError(f"module vidtrack has no attribute {name}")
     module = import_module(f"vidtrack.{_HOME[name]}")

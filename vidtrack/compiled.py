@@ -38,6 +38,22 @@ def first_run() -> bool:
     return IN_TREE and not os.environ.get("NUMBA_CACHE_DIR") and not any(PACKAGE.rglob("*.nbi"))
 
 
+def forget_stale(package: Path) -> None:
+    """Delete all kernels cached below a folder if a source was changed since one of its own was compiled.
+
+    numba compiles a function again when its own file changes, but not when another one does that it calls into.
+    """
+    kernels = list(package.rglob("*.nbi"))
+    if any(_older_than_source(kernel) for kernel in kernels):
+        for path in [*kernels, *package.rglob("*.nbc")]:
+            path.unlink(missing_ok=True)
+
+
+def _older_than_source(kernel: Path) -> bool:
+    source = kernel.parent.parent / f"{kernel.name.split('.')[0]}.py"
+    return not source.exists() or source.stat().st_mtime > kernel.stat().st_mtime
+
+
 def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., Any]:
     """A compiled closure over constants, under a name of its own.
 
@@ -79,3 +95,5 @@ class SignalsWait(Listener):
 
 
 register("numba:compiler_lock", SignalsWait())
+if IN_TREE:
+    forget_stale(PACKAGE)

@@ -57,9 +57,9 @@ class DisturbanceSettings(_Group):
     majority_px: int = Field(7, ge=1, le=15)
     """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
     shadow: bool = True
-    """the scene darker by one factor, in luminance, colour and texture, is shadow and not foreground"""
+    """what is the scene darkened by one factor, in luminance, colour and texture, is shadow, not foreground"""
     exposure: bool = True
-    """follow the camera's gain at once"""
+    """changes of the camera's gain are compensated at once"""
     learn_s: float = Field(2.0, gt=0)
     """s; time constant of the scene's average"""
     noise_s: float = Field(4.0, gt=0)
@@ -67,15 +67,15 @@ class DisturbanceSettings(_Group):
     selective: bool = True
     """foreground is not learnt; false: it is, and leaves a tail"""
     guard_px: int = Field(3, ge=0, le=30)
-    """nor is anything this close to foreground"""
+    """pixels of the processed picture; what is this close to foreground is not learnt either"""
     holes: bool = True
     """foreground that encloses background is filled"""
     ghosts: bool = True
-    """what was in the first frames, or stood long, and has left is recognised by the edges it left in the scene"""
+    """marks left in the scene by what was there in the first frames, or stood long, are found by their edges"""
     ghost_s: float = Field(1.0, ge=0)
-    """s; cover of a region before it can be called a ghost"""
+    """s; time that a region must be covered before it can be such a mark (ghost)"""
     absorb_s: float = Field(60.0, gt=0)
-    """s; what stands longer, and is not a tracked vehicle, becomes scene; its leaving is recognised all the same"""
+    """s; what stands longer and is no tracked vehicle becomes scene; its departure is recognised all the same"""
     relearn_share: float = Field(0.6, gt=0, le=1)
     """share of the picture; more foreground than that is no traffic but a change of light or view"""
     relearn_s: float = Field(1.0, ge=0)
@@ -126,13 +126,13 @@ class DetectionSettings(_Group):
     """Stored detections (MOT det.txt); object size is the longer side of a box."""
 
     sure_score: float | None = Field(None, ge=0, le=1)
-    """share of detections, the lowest scores, that may only continue tracks; None: from what is found again"""
+    """share of detections, those of lowest score, that may continue tracks but start none; None: from the file"""
     jitter: float | None = Field(None, gt=0)
-    """object sizes; standard deviation of a box's centre; None: from second differences of chains of boxes"""
+    """object sizes; standard deviation of a box's centre; None: from the file (differences along chains of boxes)"""
     accel: float | None = Field(None, gt=0)
     """object sizes/s^2; tracker.accel for them, and in proportion tracker.cross; None: as for jitter"""
     confirm_hits: int = Field(4, ge=1, le=63)
-    """M: hits within the window that confirm a track, the first one counted; confirm_s and confirm_travel do not"""
+    """M: hits within the window that confirm a track, the first one counted; confirm_s, confirm_travel do not apply"""
     confirm_window: int = Field(6, ge=1, le=63)
     """N: scans of the window"""
     detection_probability: float | None = Field(0.8, ge=0, le=1)
@@ -145,7 +145,7 @@ class TrackerSettings(_Group):
     """Object size is the longer side of a vehicle's box."""
 
     method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] = "gnn"
-    """association by one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), later (split, mht)"""
+    """association: one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), deferred (split, mht)"""
     n_scan: int = Field(3, ge=1, le=20)
     """scans after which split and mht decide"""
     distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"
@@ -177,11 +177,11 @@ class TrackerSettings(_Group):
     clutter_density: float | None = Field(1e-5, ge=0)
     """false measurements per frame and px^2; None: from what the tracks leave. Radar has its own"""
     redundant: float | None = Field(None, gt=0, lt=1)
-    """share of a target's own several plots or detections in a scan that are combined before association; None: none"""
+    """probability with which two measurements of one target in a scan are combined before association; None: never"""
     confirm_s: float = Field(0.4, ge=0)
     """s; no track of a video is confirmed before this age; most ghosts of the first frame's vehicles are gone then"""
     confirm_travel: float = Field(0.3, ge=0)
-    """object sizes, at least 1/30 of the picture's; nor before it has moved this far from where it began"""
+    """object sizes, at least 1/30 of the picture's; nor before it has moved this far from its start"""
     coast_s: float = Field(1.0, ge=0)
     """s; a track is given up this long after its last evidence"""
     hidden_s: float = Field(2.0, ge=0)
@@ -259,13 +259,13 @@ class RadarSettings(_Group):
     particles: int = Field(2000, ge=2)
     """samples of each track in the particle filter"""
     resampling: Literal["none", "multinomial", "residual", "stratified", "systematic", "error-signal"] = "systematic"
-    """how the particle filter chooses its samples anew; none: never; error-signal: near the plot (paper 003)"""
+    """how particles are resampled; none: never; error-signal: near the plot (paper 003)"""
     glint: float = Field(0.0, ge=0, lt=1)
     """share of a plot's errors that are five times as large, for the particle filter"""
     euclidean_radius_m: float = Field(2000.0, gt=0)
     """m; gate of the euclidean distance"""
     life: Literal["m-of-n", "llr"] = "llr"
-    """what confirms a track, as tracker.life; in clutter the score is better, which also ends what does not fit it"""
+    """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
     coast_scans: int = Field(5, ge=1, le=62)
     """a track is given up after this many scans without a plot"""
     trail_s: float = Field(60.0, ge=0)
@@ -284,9 +284,9 @@ class LiveSettings(_Group):
     roll_s: float | None = Field(None, gt=0)
     """s; by the clock, after which results go on in a new sub-folder; None: never, or hourly if live.keep_* is set"""
     keep_s: float | None = Field(None, gt=0)
-    """s; sub-folders that are older are deleted; None: none is"""
+    """s; sub-folders that are older are deleted; None: none are"""
     keep_bytes: float | None = Field(None, ge=1e6)
-    """bytes that results and recordings may take together, the oldest are deleted; None: any"""
+    """bytes that results and recordings may take together; the oldest are deleted; None: no limit"""
     every_frame: bool = False
     """every frame is tracked, and a tracker that is too slow falls behind; false: the newest one, others are dropped"""
     ffmpeg: tuple[str, ...] = ()
@@ -315,7 +315,7 @@ class Settings(_Group):
 
 
 def load(
-    path: Path | None = None,
+    path: str | Path | None = None,
     assignments: Iterable[str | tuple[str, Any]] = (),
     base: Mapping[str, Any] | None = None,
 ) -> Settings:
@@ -325,7 +325,7 @@ def load(
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest) or a bad value.
     """
-    tree = merged(base or {}, {} if path is None else read_toml(path, "settings"))
+    tree = merged(base or {}, {} if path is None else read_toml(Path(path), "settings"))
     for assignment in assignments:
         name, value = _split(assignment) if isinstance(assignment, str) else assignment
         _assign(tree, name.split("."), value)
@@ -383,7 +383,8 @@ def _complaint(detail: Any) -> str:
         return f"unknown setting {name}{hint}"
     if detail["type"] == "model_type":
         return f"setting {name} = {detail['input']!r}: this is a group; give one of its settings, {name}.NAME"
-    return f"setting {name} = {detail['input']!r}: {detail['msg'][0].lower()}{detail['msg'][1:]}"
+    message = detail["msg"].removeprefix("Value error, ")
+    return f"setting {name} = {detail['input']!r}: {message[0].lower()}{message[1:]}"
 
 
 def names(group: type[BaseModel] = Settings, prefix: str = "") -> Iterable[str]:

@@ -27,7 +27,7 @@ def _toml_group(group: BaseModel, path: str, explain: bool) -> list[str]:
             continue
         if explain:
             lines += ["", f"# {info.description}{_range(info)}"]
-        lines.append(f"# {name} =  (from the data)" if value is None else f"{name} = {_toml_value(value)}")
+        lines.append(f"# {name} =  (None)" if value is None else f"{name} = {_toml_value(value)}")
     return lines + below
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.errors import FormatError, SourceError
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -66,7 +66,7 @@ class Table:
     def __len__(self) -> int:
         return len(self.frame)
 
-    def select(self, rows: NDArray[np.bool_] | Ints) -> Table:
+    def select(self, rows: Mask | Ints) -> Table:
         """The given rows (a mask or indices) as a table of their own."""
         box, cov, nis = (None if column is None else column[rows] for column in (self.box, self.cov, self.nis))
         return Table(self.frame[rows], self.id[rows], self.xy[rows], box, self.conf[rows], cov, nis, self.unit)
@@ -266,7 +266,7 @@ def _whole(name: str, values: Floats, place: Place) -> Ints:
     return values.astype(np.int64)
 
 
-def _refuse(bad: NDArray[np.bool_], name: str, values: NDArray, rule: str, place: Place) -> None:
+def _refuse(bad: Mask, name: str, values: NDArray, rule: str, place: Place) -> None:
     """Raise FormatError for the first bad row."""
     if bad.any():
         i = int(np.argmax(bad))

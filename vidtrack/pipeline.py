@@ -1,4 +1,4 @@
-"""From pictures or detections to tracks: source, detector, tracker, one frame at a time. The second page to read."""
+"""The video pipeline: source, detector, tracker, one frame at a time. Read this file after `tracking/tracker.py`."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
 from vidtrack.associate.trust import Trust
 from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE, Tracks
+from vidtrack.scan import TENTATIVE, Mask, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.methods import life, rule
@@ -31,15 +29,29 @@ from vidtrack.video.source import open_source
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
     """Frames of a video (file, image folder or glob) with the tracks in each, lazily.
 
+    settings  such as load_settings(assignments=["tracker.coast_s=2"]); None: the defaults
+
     Raises SourceError when the input is missing or yields nothing.
     """
     settings = settings or Settings()
     with open_source(str(path), settings.source) as source:
-        model = build_detector(settings)
+        detector = build_detector(settings)
         tracker = build_tracker(settings.tracker, (source.width, source.height))
-        for step in video_steps(source, model, tracker, settings):
+        for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
             yield step.frame, step.tracks
+
+
+def box_tracker(settings: Settings | None = None, bounds: tuple[float, float] | None = None) -> Tracker:
+    """A tracker for `box_scan`, the boxes of your own detector, as `vidtrack track det.txt` has it.
+
+    bounds  (width, height) of the picture [px]: tracks that leave it end at once; None: they end when unseen for long
+
+    What the settings leave open (accelerations, scores that may not start a track) a file tells beforehand and a
+    stream cannot: `tracker.accel` holds then, and every box may start a track.
+    """
+    settings = settings or Settings()
+    return build_tracker(settings.tracker, bounds, whole=settings.detections)
 
 
 def build_detector(settings: Settings) -> Background:
@@ -59,8 +71,10 @@ def build_tracker(
 ) -> Tracker:
     """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height).
 
-    whole  each box is one whole object, from a detector that tells objects apart: boxes may overlap but are
-           never shared, their size and score are evidence, and M hits of N confirm a track without it having to travel
+    whole    settings for stored detections, where each box is one whole object: boxes may overlap but are never
+             shared, their size and score are evidence, and M hits of N confirm a track even if it does not move
+    explain  keep each scan's choices, for decisions.csv and rerun
+    smooth   keep what a smoother needs
     """
     accel = settings.accel if whole is None or whole.accel is None else whole.accel
     return Tracker(
@@ -100,8 +114,8 @@ def build_tracker(
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:
     """Each frame through detector and tracker.
 
-    What the tracker expects in a frame reaches the detector before the frame is looked at: fragments are
-    joined inside a predicted box, and vehicles that drove here are kept out of the scene.
+    The tracker's prediction reaches the detector before the frame is processed: fragments are joined inside a
+    predicted box, and vehicles that were seen driving are not absorbed into the scene.
     """
     ended = perf_counter()
     for frame in frames:
@@ -122,9 +136,9 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         ended = perf_counter()
 
 
-def has_driven(tracks: Tracks) -> np.ndarray:
-    """(T,) confirmed tracks that have come farther than three times their size.
+def has_driven(tracks: Tracks) -> Mask:
+    """(T,) confirmed tracks that have travelled farther than three times their size.
 
-    What a vehicle leaves behind in the scene never does, and is not to be protected from being forgotten.
+    A ghost, the mark that a departed vehicle leaves in the scene, never does, and must not be kept from being absorbed.
     """
     return (tracks.status != TENTATIVE) & (tracks.travel > 3 * longer(tracks.box))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
 from vidtrack.config import Settings
+from vidtrack.errors import SourceError
 from vidtrack.live.memory import Memory
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S, Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
-from vidtrack.output.folder import begun
+from vidtrack.output.folder import begun, spare, withdraw
 from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
@@ -24,22 +25,30 @@ from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
 from vidtrack.pipeline import build_detector, build_tracker, video_steps
 from vidtrack.steps import scan_steps
-from vidtrack.traffic.lines import LineCounter, parse_lines
+from vidtrack.traffic.lines import Line, LineCounter, parse_lines
 from vidtrack.video.detections import Detections, is_detections, open_detections
+from vidtrack.video.frame import Image
 from vidtrack.video.recording import Recording, is_recording
-from vidtrack.video.resources import keep_freed_memory, opencv_single_threaded
+from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import Source, open_source
 
 
 class Run:
-    """Iterates over the steps of a source while the results are written; use it with `with`.
+    """Tracks a source and writes the results while it is iterated; use it with `with`.
 
-    folder  where the results are
-    name, frames  of the source; frames may be None
+    source         video file, image folder or glob, MOT det.txt, or a recording of a live run
+    output         folder of the results; None: runs/NAME
+    force          replace the results of an earlier run in `output`
+    rerun          FILE.rrd, "spawn" or "serve"
+    video, masks   annotated video, folder of masks
+    decisions      write decisions.csv
 
-    Leaving the `with` block, whatever the reason, ends all results as complete and valid up to the
-    last whole step; `summary.json` says whether the run was interrupted.
-    Raises SourceError, ConfigError, OutputError at the start, StoppedEarly when results cannot be written on.
+    folder         where the results are
+    name, frames   of the source; frames may be None
+
+    However the `with` block is left, all results are complete and valid up to the last whole step;
+    `summary.json` says whether the run was interrupted.
+    Raises SourceError, ConfigError or OutputError at the start, StoppedEarly when results can no longer be written.
     """
 
     def __init__(
@@ -54,54 +63,37 @@ class Run:
         masks: Path | None = None,
         decisions: bool = False,
     ) -> None:
-        with ExitStack() as stack:  # whatever fails below, what is open by then is closed
+        self._settings = settings
+        with ExitStack() as stack:  # if a later step fails, what is already open is closed
             self._source = opened = _open(source, settings)
-            if not isinstance(opened, Detections):
-                stack.callback(opened.close)
-            shape = (opened.height, opened.width)
-            bounds = (opened.width, opened.height)
-            whole = opened.settings if isinstance(opened, Detections) else None
-            explain = decisions or rerun is not None
-            smooth = settings.output.smooth
-            self._tracker = tracker = build_tracker(
-                settings.tracker, bounds, whole=whole, explain=explain, smooth=smooth
+            stack.callback(opened.close)
+            spare(opened.place, output, masks, video)
+            self._tracker = build_tracker(
+                settings.tracker,
+                (opened.width, opened.height),
+                whole=opened.settings if isinstance(opened, Detections) else None,
+                explain=decisions or rerun is not None,
+                smooth=settings.output.smooth,
             )
-            detector = None
-            if not isinstance(opened, Detections):
-                keep_freed_memory()
-                if settings.detector.kind not in ("mog2", "knn"):  # they are OpenCV's, and long enough for its threads
-                    stack.enter_context(opencv_single_threaded())
-                detector = build_detector(settings)
-                if isinstance(opened, Recording):
-                    opened.remember = Memory(detector, tracker, opened.like).restore
-                self._steps = video_steps(opened, detector, tracker, settings)
-            else:
+            scene: Callable[[], Image] | None = None
+            if isinstance(opened, Detections):
                 scans = ((index, scan) for index, _, scan in opened)
-                self._steps = scan_steps(scans, tracker, settings.tracker.redundant)
+                self._steps = scan_steps(scans, self._tracker, settings.tracker.redundant)
+            else:
+                stack.enter_context(frame_by_frame(settings.detector.kind))
+                detector = build_detector(settings)
+                scene = detector.scene
+                if isinstance(opened, Recording):
+                    opened.remember = Memory(detector, self._tracker, opened.like).restore
+                self._steps = video_steps(opened, detector, self._tracker, settings)
             lines = parse_lines(settings.output.lines, opened.width, opened.height)
             self.name, self.frames = opened.name, opened.frames
             with begun(output, opened.name, force) as self.folder, ExitStack() as written:
                 counter = LineCounter(lines) if lines else None
                 summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
-                self._results = results = written.enter_context(Results(summary))
-                if counter is not None:
-                    results.add(CountsFile(self.folder / "counts.csv", counter))
-                plot = TrajectoryPlot(self.folder / "tracks.png", shape, detector.scene if detector else None, lines)
-                hold_s = LIVE_HOLD_S if isinstance(opened, Recording) else HOLD_S
-                sinks = smoothed_first(settings.output, TrackTable(self.folder), MotFile(self.folder / "mot.txt"), plot)
-                results.add(Confirmed(*sinks, hold_s=hold_s))
-                if decisions:
-                    results.add(DecisionLog(self.folder / "decisions.csv"))
-                if masks is not None:
-                    results.add(Threaded(MaskFolder(masks)))
-                if video is not None:
-                    from vidtrack.output.video import AnnotatedVideo
-
-                    results.add(Threaded(AnnotatedVideo(video, opened.fps, settings.output, lines)))
-                if rerun is not None:
-                    from vidtrack.output.rerun import RerunSink
-
-                    results.add(Threaded(RerunSink(rerun, shape, settings, lines)))
+                self._results = written.enter_context(Results(summary))
+                self._add_tables(lines, counter, scene, decisions)
+                self._add_pictures(lines, masks, video, rerun)
                 stack.push(written.pop_all())
             self._open = stack.pop_all()
 
@@ -115,6 +107,36 @@ class Run:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._open.__exit__(kind, error, trace)
+        if isinstance(error, SourceError) and not self._source.stats.frames_read:
+            withdraw(self.folder)  # the corrected command may use it
+
+    def _add_tables(
+        self, lines: list[Line], counter: LineCounter | None, scene: Callable[[], Image] | None, decisions: bool
+    ) -> None:
+        """The tables and tracks.png, with counts.csv and decisions.csv where they are asked for."""
+        folder, source, output = self.folder, self._source, self._settings.output
+        if counter is not None:
+            self._results.add(CountsFile(folder / "counts.csv", counter))
+        totals = counter.totals if counter else None
+        plot = TrajectoryPlot(folder / "tracks.png", (source.height, source.width), scene, lines, totals)
+        sinks = smoothed_first(output, TrackTable(folder), MotFile(folder / "mot.txt"), plot)
+        self._results.add(Confirmed(*sinks, hold_s=LIVE_HOLD_S if isinstance(source, Recording) else HOLD_S))
+        if decisions:
+            self._results.add(DecisionLog(folder / "decisions.csv"))
+
+    def _add_pictures(self, lines: list[Line], masks: Path | None, video: Path | None, rerun: str | None) -> None:
+        """Masks, the annotated video and rerun, each encoded in a thread of its own."""
+        source, settings = self._source, self._settings
+        if masks is not None:
+            self._results.add(Threaded(MaskFolder(masks)))
+        if video is not None:
+            from vidtrack.output.video import AnnotatedVideo
+
+            self._results.add(Threaded(AnnotatedVideo(video, source.fps, settings.output, lines)))
+        if rerun is not None:
+            from vidtrack.output.rerun import RerunSink
+
+            self._results.add(Threaded(RerunSink(rerun, (source.height, source.width), settings, lines)))
 
     def _reading(self) -> dict[str, object]:
         source, stats = self._source, self._source.stats

@@ -1,4 +1,4 @@
-"""The words all parts share: Scan (sensor to tracker), Decision (associator to estimator), Tracks (tracker to all)."""
+"""The data types that all parts share: Scan (sensor to tracker), Decision (associator to estimator), Tracks."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 class Status(IntEnum):
@@ -32,7 +33,7 @@ class Status(IntEnum):
 
 
 TENTATIVE, CONFIRMED, COASTING, MERGED = (int(status) for status in Status)
-"""The same as plain numbers: NumPy compares with them ten times as fast as with members of an enumeration."""
+"""The statuses as plain integers, with which NumPy compares ten times as fast as with members of an enumeration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,16 +44,17 @@ class Scan:
     z          (M, m) measurements, pixels or metres (radians for angles)
     R          (M, m, m) their covariances; (m, m) is taken for all of them
     sensor     the measurement model; None is "z is the position"
-    noise      (m, m) covariance that a measurement not made would have had: what a miss tells depends on it.
-               Taken from R where that is one for all, else the mean of R; None in an empty scan without either
-    box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre)
-    amplitude  (M,) signal strength in units of the noise, score (M,) detector confidence, label (M,) class, -1 unknown:
-               a track whose class is known takes no measurement of another
-    lasting    (M, m, m) the part of R by errors that stay from scan to scan; None: all are new in each scan
+    noise      (m, m) covariance that a missed measurement would have had; some updates after a miss depend on it.
+               None: R where one is given for all, else the mean of R, and nothing in an empty scan
+    box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre); see `box_scan`
+    amplitude  (M,) signal strength in units of the noise
+    score      (M,) detector confidence
+    label      (M,) class, -1 unknown; a track whose class is known takes no measurement of another
+    lasting    (M, m, m) the part of R due to errors that persist from scan to scan; None: all are independent
     run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form within equal runs only
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
-    definite, and runs below 0.
+    definite, boxes of negative size, and runs below 0.
     """
 
     t: float
@@ -68,15 +70,16 @@ class Scan:
     lasting: Floats | None = None
 
     def __post_init__(self) -> None:
-        z = np.ascontiguousarray(self.z, dtype=float)
+        z, R = np.asarray(self.z, dtype=float, order="C"), np.asarray(self.R, dtype=float, order="C")
+        if z.shape == (0,):  # an empty list does not say how many components its measurements have
+            z = z.reshape(0, *R.shape[-1:])
         if z.ndim != 2:
             raise ScanError(f"z must be (M, m), not {z.shape}; a single measurement is z[None]")
         count, dim = z.shape
-        R = np.asarray(self.R, dtype=float)
         noise = None if self.noise is None else np.ascontiguousarray(self.noise, dtype=float)
         if R.shape == (dim, dim):
             noise = R.copy() if noise is None else noise
-            R = np.broadcast_to(R, (count, dim, dim))
+            R = np.repeat(R[None], count, axis=0)
         if R.shape != (count, dim, dim):
             raise ScanError(f"R must be ({count}, {dim}, {dim}) or ({dim}, {dim}) to match z, not {R.shape}")
         if not isfinite(self.t):
@@ -86,12 +89,12 @@ class Scan:
             noise = R.sum(axis=0) / count
         if noise is not None and noise.shape != (dim, dim):
             raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
-        if noise is not None and (self.noise is not None or not count):  # no measurement has vouched for it
+        if noise is not None and (self.noise is not None or not count):  # not checked as part of R
             _refuse_no_covariance(noise[None], "R" if self.noise is None else "noise")
         object.__setattr__(self, "noise", noise)
         object.__setattr__(self, "t", float(self.t))
         object.__setattr__(self, "z", z)
-        object.__setattr__(self, "R", np.ascontiguousarray(R))
+        object.__setattr__(self, "R", R)
         for name, shape, kind in (
             ("box", (count, 4), float),
             ("amplitude", (count,), float),
@@ -112,6 +115,11 @@ class Scan:
                     f"{name} of measurement {i} is not finite: {value[i]}; leave {name} out where it is unknown"
                 )
             object.__setattr__(self, name, np.ascontiguousarray(value, dtype=kind))
+        if self.box is not None and self.box[:, 2:].min(initial=0) < 0:
+            i = int(np.argmin(self.box[:, 2:].min(axis=1)))
+            raise ScanError(
+                f"box of measurement {i} has a negative size: {self.box[i]}; it is left, top, width, height"
+            )
         if self.run is not None and self.run.min(initial=0) < 0:
             i = int(np.argmin(self.run))
             raise ScanError(f"run of measurement {i} is {self.run[i]}; runs are numbered from 0")
@@ -120,17 +128,17 @@ class Scan:
         return len(self.z)
 
     def weakened(self, inflation: float) -> Scan:
-        """What it tells a filter: the part of R that lasts so many times as large, for it was told before."""
+        """The scan with the lasting part of R multiplied by `inflation`, as a filter's update needs it."""
         if self.lasting is None:
             return self
-        weak = copy(self)  # what was found valid stays so
+        weak = copy(self)  # without validating it again
         object.__setattr__(weak, "R", self.R + (inflation - 1) * self.lasting)
         return weak
 
 
 @njit(cache=CACHE, nogil=True)
 def _surely_usable(z: Floats, R: Floats) -> bool:
-    """Whether all measurements in the plane are finite and their covariances positive definite."""
+    """Whether all measurements in the plane are finite and their covariances clearly positive definite."""
     for i in range(len(z)):
         xx, yy, xy = R[i, 0, 0], R[i, 1, 1], R[i, 0, 1]
         finite = np.isfinite(z[i, 0]) and np.isfinite(z[i, 1]) and np.isfinite(xx + yy + xy)
@@ -140,7 +148,7 @@ def _surely_usable(z: Floats, R: Floats) -> bool:
 
 
 def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
-    """Raise ScanError naming the first measurement that no filter could use."""
+    """Raise ScanError naming the first measurement that is not finite or has no valid covariance."""
     if z.shape[1] == 2 and _surely_usable(z, R):
         return
     finite = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
@@ -150,8 +158,17 @@ def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
     _refuse_no_covariance(R, "R of measurement {}")
 
 
+def check_states(x: Floats, P: Floats) -> None:
+    """Raise ScanError naming the first of the states x (B, n), P (B, n, n) that no filter could go on from."""
+    finite = np.isfinite(x).all(axis=1)
+    if not finite.all():
+        i = int(np.argmin(finite))
+        raise ScanError(f"state {i} is not finite: {x[i]}")
+    _refuse_no_covariance(P, "P of state {}")
+
+
 def _refuse_no_covariance(R: Floats, name: str) -> None:
-    """Raise ScanError for the first of (B, m, m) that is none; {} in its name stands for its number."""
+    """Raise ScanError for the first of R (B, m, m) that is not a covariance; {} in `name` becomes its index."""
     finite = np.isfinite(R).all(axis=(1, 2))
     if not finite.all():
         i = int(np.argmin(finite))
@@ -174,7 +191,7 @@ def _refuse_no_covariance(R: Floats, name: str) -> None:
 
 @njit(cache=CACHE, nogil=True)
 def starts(row: Ints, rows: int) -> Ints:
-    """(rows + 1,) where the entries of each row begin among `row` (B,), which is sorted; the last is their number."""
+    """(rows + 1,) index of each row's first entry in the sorted `row` (B,); the last element is B."""
     start = np.empty(rows + 1, np.int64)
     b = 0
     for t in range(rows + 1):
@@ -191,10 +208,10 @@ class Decision:
     parent     (K,) the row each successor continues; 0..T-1 for one-scan methods
     row, measurement, beta   (B,) sparse weights over (successor, measurement), sorted by row
     beta0      (K,) weight of "not detected"; with the betas of its row it sums to one
-    inflation  (K,) how much a miss widens the row: the missed branch has P + inflation K S K' (PDA, PSNF); None: not
+    inflation  (K,) how much a miss widens the row: the missed branch has P + inflation K S K' (PDA, PSNF); None: zero
     spread     whether the scatter of the weighted measurements widens the row; generalized nearest neighbour uses
                their mean as if it were one measurement
-    approximate  (K,) rows whose weights are approximate, their cluster being too large for exact ones; None: none
+    approximate  (K,) rows with approximate weights, because their cluster is too large for exact ones; None: no row
     """
 
     parent: Ints
@@ -204,15 +221,15 @@ class Decision:
     beta0: Floats
     inflation: Floats | None = None
     spread: bool = True
-    approximate: NDArray[np.bool_] | None = None
+    approximate: Mask | None = None
 
     @property
     def start(self) -> Ints:
         """(K + 1,) the weights of successor k are start[k]..start[k + 1]."""
         return starts(self.row, len(self.parent))
 
-    def without(self, rows: NDArray[np.bool_]) -> Decision:
-        """The same decision with these rows (K,) missed, which tells nothing about them."""
+    def without(self, rows: Mask) -> Decision:
+        """The same decision with a plain miss, without inflation, in these rows (K,)."""
         if not np.count_nonzero(rows):
             return self
         stay = ~rows[self.row]
@@ -238,7 +255,7 @@ class Decision:
 
 
 def _chosen(theirs: Ints, other: Any, own: Any) -> Any:
-    """Row by row the other's values, where the rows are theirs, or one's own, where a method gives any."""
+    """`own` with the values of `other` in the rows `theirs` (B,); None if the method has no such values."""
     if own is None:
         return None
     chosen = own.copy()
@@ -262,7 +279,11 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What was decided for each track of a scan, for `--decisions`. All (T,); -1 and NaN where there is none."""
+    """What was decided for each track of a scan, for `--decisions`. -1 and NaN where there is none.
+
+    track_id, measurement, weight, d2, gate, runner_up, runner_up_d2   (T,)
+    candidates, candidates_weight, candidates_d2   (T, C) what the gate admits, the C heaviest
+    """
 
     track_id: Ints
     measurement: Ints
@@ -271,9 +292,12 @@ class Choices:
     gate: Floats
     runner_up: Ints
     runner_up_d2: Floats
+    candidates: Ints
+    candidates_weight: Floats
+    candidates_d2: Floats
 
     def only(self, rows: NDArray[Any]) -> Choices:
-        """Those of a mask or of indices."""
+        """The rows of a mask or of indices."""
         return Choices(*(getattr(self, column.name)[rows] for column in fields(self)))
 
 
@@ -294,9 +318,11 @@ class Tracks:
     measurement    (T,) index of the heaviest measurement of this scan; -1 for none
     nis            (T,) normalised innovation squared of this update; NaN for none
     position, velocity   columns of x, one per axis
-    prior_x, prior_P, gain   (T, n), (T, n, n), (T, n, n) where a smoother was announced: moments before this scan, and
-                   P F' prior_P^-1 of the scan before (what an error of prior_x says about that scan's x); NaN for
-                   tracks that continue nothing of the snapshot before; n is zero where none was
+    run            (T,) Monte Carlo run
+    events         births, confirmations, merges, splits and deletions of this scan
+    choices        why each track took its measurement; None unless the tracker was told to explain
+    prior_x, prior_P, gain   (T, n), (T, n, n), (T, n, n) for smoothing, else None: the prediction for this scan, and
+                   the smoother's gain P F' prior_P^-1 from the snapshot before; NaN for tracks that are new in this one
     """
 
     t: float
@@ -330,7 +356,7 @@ class Tracks:
         return replace(self, **{name: value[rows] for name, value in columns.items() if isinstance(value, np.ndarray)})
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
+    def seen(self) -> Mask:
         """(T,) whether this scan shows the track, alone or in a blob it shares."""
         return np.asarray((self.measurement >= 0) | (self.status == MERGED))
 

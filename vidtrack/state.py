@@ -1,17 +1,20 @@
-"""What a pipeline remembers, as plain data: saved to a file and put back, so that it goes on as if it had not stopped.
+"""The state of a pipeline as plain data, saved to a file and restored so that a run continues as if never stopped.
 
-Whoever remembers something names it in `STATE`: attributes that are arrays, numbers, named tuples of arrays, or
-others with a STATE. Settings are not state; they come from the user each time.
+A class lists its state in `STATE`: names of attributes that are arrays, numbers, named tuples of arrays, or objects
+with a STATE of their own. Settings are not state; they come from the user each time.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import struct
 import zipfile
+import zlib
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -22,10 +25,15 @@ State = dict[str, Any]
 """Dotted names of attributes, with arrays or what JSON can hold as values."""
 
 _PLAIN = "plain"
+_DAMAGE = (
+    *(ValueError, KeyError, AttributeError, EOFError, RuntimeError, MemoryError),
+    *(zipfile.BadZipFile, zlib.error, struct.error, TokenError),
+)
+"""What NumPy and zipfile raise for bytes that are no saved state."""
 
 
 def gather(thing: Any, prefix: str = "") -> State:
-    """Copies of everything the thing remembers. Raises ConfigError for a part that cannot be saved."""
+    """Copies of everything in the object's state. Raises ConfigError for a part that cannot be saved."""
     found: State = {}
     for name in _names(thing):
         value = getattr(thing, name)
@@ -43,7 +51,7 @@ def gather(thing: Any, prefix: str = "") -> State:
 
 
 def restore(thing: Any, state: State, prefix: str = "") -> None:
-    """Put back what `gather` found in a thing made with the same settings. Raises FormatError if it does not fit."""
+    """Set the state that `gather` found in an object made with the same settings. Raises FormatError for a misfit."""
     for name in _names(thing):
         value = getattr(thing, name)
         if hasattr(value, "STATE"):
@@ -57,7 +65,7 @@ def restore(thing: Any, state: State, prefix: str = "") -> None:
 
 
 def write_state(path: Path, state: State) -> None:
-    """Write a state so that the file is the old one or the new one, whatever happens. Raises OSError."""
+    """Write a state atomically: the file is the old one or the new one, whatever happens. Raises OSError."""
     arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
     plain = {name: value for name, value in state.items() if name not in arrays}
     block = BytesIO()
@@ -84,19 +92,22 @@ def read_state(path: Path) -> State:
         return {**state, **plain}
     except OSError as error:
         raise FormatError(f"cannot read the state {path}: {error.strerror or error}") from None
-    except (ValueError, KeyError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        raise FormatError(f"{path} is not a saved state ({error}); remove it to start anew") from None
+    except _DAMAGE:
+        raise FormatError(f"{path} is not a saved state, or it is damaged; remove it to start anew") from None
 
 
 def _unpacked(name: str, value: tuple[Any, ...]) -> State:
-    """A named tuple of arrays field by field; any other as the list that JSON makes of it."""
+    """A named tuple of arrays field by field; any other tuple as a list, which JSON would make of it."""
     if not hasattr(value, "_fields"):
         return {name: list(value)}
     return {f"{name}.{field}": plane.copy() for field, plane in zip(value._fields, value, strict=True)}
 
 
 def _check(name: str, now: Any, found: Any) -> None:
-    """Compiled code would trust an array of another kind. There may be any number of rows, and 0 is no shape yet."""
+    """Raise FormatError unless `found` is an array of the same kind as `now`: compiled code would not check it.
+
+    The number of rows may differ, and another axis of length 0 is not known yet.
+    """
     if not isinstance(now, np.ndarray):
         return
     same_kind = isinstance(found, np.ndarray) and found.dtype == now.dtype and found.ndim == now.ndim

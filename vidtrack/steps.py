@@ -1,4 +1,4 @@
-"""Scans that are already there, through a tracker: stored detections and radar plots alike."""
+"""Ready-made scans through a tracker: stored detections and radar plots."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vidtrack.tracking.tracker import Tracker
 def scan_steps(scans: Iterable[tuple[int, Scan]], tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:
     """Each numbered scan with the tracks after it.
 
-    redundant  measurements of one target are combined first; share of them that are recognised; None: they are not
+    redundant  probability with which two measurements of one target are combined first; None: they are not combined
     """
     ended = perf_counter()
     for index, scan in scans:

@@ -17,7 +17,7 @@ FORBIDDEN = 1e6
 
 def sparse(cost, allowed):
     """Row starts, columns and costs of the allowed entries of a matrix."""
-    row, column = np.nonzero(allowed)
+    row, column = np.argwhere(allowed).T.copy()
     return np.searchsorted(row, np.arange(len(cost) + 1)), column, cost[row, column]
 
 
@@ -63,7 +63,7 @@ def test_a_thousand_rows_that_all_want_the_same_columns():
 def pairs(d2, limit, log_s=0.0):
     """Gated pairs of a matrix d2 (T, M); NaN is outside the gate."""
     d2 = np.asarray(d2, float)
-    row, measurement = np.nonzero(d2 <= limit)
+    row, measurement = np.argwhere(d2 <= limit).T.copy()
     start = np.searchsorted(row, np.arange(len(d2) + 1))
     spread = np.broadcast_to(log_s, d2.shape)[row, measurement]
     return Pairs(

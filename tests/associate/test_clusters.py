@@ -17,7 +17,7 @@ from vidtrack.associate.clusters import clusters
 )
 @settings(max_examples=200, deadline=None)
 def test_clusters_are_connected_components(seed, rows, count, density):
-    row, measurement = np.nonzero(np.random.default_rng(seed).random((rows, count)) < density)
+    row, measurement = np.argwhere(np.random.default_rng(seed).random((rows, count)) < density).T.copy()
     found = clusters(row, measurement, rows, count)
     graph = coo_array((np.ones(len(row)), (row, rows + measurement)), shape=(rows + count,) * 2)
     label = connected_components(graph, directed=False)[1][:rows]

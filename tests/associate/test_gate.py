@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
-from vidtrack.associate.gate import Gate
+from vidtrack.associate.gate import Gate, LikelihoodGate
 from vidtrack.associate.hard import GNN, NN
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
@@ -203,3 +203,24 @@ def test_correlated_region_refuses_what_the_axes_admit():
     assert Gate(0.99).limit(2) == pytest.approx(9.21034037197618, rel=1e-12)
     assert Gate(0.99).limit(2) == pytest.approx(chi2.ppf(0.99, 2))
     np.testing.assert_array_equal(Gate(0.99).pairs(np.zeros((1, 2)), cov, scan).measurement, [1, 3])
+
+
+def test_likelihood_gate_admits_what_is_likelier_than_a_miss_and_a_new_target():
+    """SPEC 001, `gates`: P_D = 0.9, 0.001 new targets per unit of area, S = [[4, 3], [3, 4]]."""
+    cov = np.array([[[3.5, 3.0], [3.0, 3.5]]])
+    scan = Scan(0.0, np.array([[3.0, -3.0], [4.5, 4.5], [5.5, 0.0], [2.0, 2.0]]), 0.5 * np.eye(2))
+    gate = LikelihoodGate(detection_probability=0.9, new_density=1e-3)
+    pairs = gate.pairs(np.zeros((1, 2)), cov, scan)
+    np.testing.assert_allclose(pairs.limit, [12.58829543076271], rtol=1e-12)
+    np.testing.assert_array_equal(pairs.measurement, [1, 3])
+    np.testing.assert_allclose(gate.inside(pairs.limit, 2), chi2.cdf(pairs.limit, 2))
+    hopeless = LikelihoodGate(detection_probability=0.1, new_density=1.0)
+    assert len(hopeless.pairs(np.zeros((1, 2)), cov, scan)) == 0
+
+
+@pytest.mark.parametrize(
+    "bad", [{"detection_probability": 0.0}, {"new_density": -1.0}, {"distance": "euclidean"}, {"probability": 2.0}]
+)
+def test_a_likelihood_gate_that_makes_no_sense_is_refused(bad):
+    with pytest.raises(ConfigError, match=str(next(iter(bad.values())))):
+        LikelihoodGate(**bad)

@@ -138,7 +138,7 @@ def test_psn_update(z, a, printed, p_true, x0, P00, P02):
 
 
 def test_psn_without_a_report_widens_the_prediction():
-    scan = Scan(0.0, np.empty((0, 2)), np.eye(2), amplitude=[])
+    scan = Scan(0.0, np.empty((0, 2)), np.eye(2))
     x1, P1, _ = updated(PSN(SNR), PSN_X, PSN_P, scan, P_D, 1e-3 / 0.1)
     np.testing.assert_allclose(x1, PSN_X)
     np.testing.assert_allclose(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 import time
 from collections import deque
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Event, Thread
@@ -22,6 +24,8 @@ from vidtrack.video.live.connection import Stalled
 
 SYSTEM_PYTHON = "/usr/bin/python3"
 SERVER = Path(__file__).with_name("rtsp_server.py")
+HANG_S = 60.0
+"""What takes longer hangs. Nothing is measured by it: a slow machine may take almost as long."""
 
 
 def gstreamer_is_installed():
@@ -43,13 +47,20 @@ needs_rtsp = pytest.mark.skipif(
 
 
 class RtspCamera:
-    """A server process on loopback; use it with `with`."""
+    """A server process on loopback; use it with `with`. Its port stays its own while it is down."""
 
-    def __init__(self, *options, port=0):
-        command = [SYSTEM_PYTHON, str(SERVER), "--port", str(port), *options]
+    def __init__(self, *options):
+        self._place = socket.socket()  # bound and not listening: nobody else gets the port, and the server may
+        self._place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self._place.bind(("127.0.0.1", 0))
+        self.port = self._place.getsockname()[1]
+        self.start(*options)
+
+    def start(self, *options):
+        command = [SYSTEM_PYTHON, str(SERVER), "--port", str(self.port), *options]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
-        self.port = int(self._process.stdout.readline())
+        assert int(self._process.stdout.readline()) == self.port
 
     def url(self, login="", path="cam"):
         return f"rtsp://{login}127.0.0.1:{self.port}/{path}"
@@ -67,6 +78,7 @@ class RtspCamera:
 
     def __exit__(self, *_):
         self.kill()
+        self._place.close()
 
 
 class _Site(BaseHTTPRequestHandler):
@@ -96,7 +108,7 @@ class _Site(BaseHTTPRequestHandler):
             self.wfile.write((SAMPLES / "crossing.avi").read_bytes())
         elif self.path == "/silent":
             self._start("multipart/x-mixed-replace; boundary=part")
-            server.closing.wait(10)
+            server.closing.wait(2 * HANG_S)
         else:
             self.send_error(404)
 
@@ -132,8 +144,8 @@ class HttpCamera(ThreadingHTTPServer):
         return f"http://{login}127.0.0.1:{self.server_port}/{path}"
 
     def parts(self):
-        jpegs = [cv2.imencode(".jpg", picture)[1].tobytes() for picture in self.pictures]
-        for jpeg in self._paced(jpegs):
+        for picture in self._paced(self.pictures):
+            jpeg = cv2.imencode(".jpg", picture)[1].tobytes()
             yield b"--part\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg) + jpeg + b"\r\n"
 
     def transport(self):
@@ -185,6 +197,7 @@ class Script:
     """A connection that plays a list: pictures, seconds to wait, or an error to raise; after its end it stalls."""
 
     fps, codec, is_raw = 25.0, "script", False
+    wait = staticmethod(time.sleep)
 
     def __init__(self, *acts):
         self._acts = acts
@@ -197,7 +210,7 @@ class Script:
             if isinstance(act, Picture):
                 yield act
             else:
-                time.sleep(act)
+                self.wait(act)
         raise Stalled("nothing came")
 
     def decode(self, packet):
@@ -231,6 +244,7 @@ def script_of(*connections):
     return connect
 
 
+@cache
 def crossing():
     """(K, 240, 320, 3) the sample's pictures."""
     with av.open(str(SAMPLES / "crossing.avi")) as film:
@@ -242,16 +256,25 @@ def grey(level, size=(48, 64)):
 
 
 @contextmanager
-def within(seconds):
-    """What happens inside takes less."""
+def within(seconds=HANG_S):
+    """What happens inside does not hang."""
     began = time.monotonic()
     yield
     assert time.monotonic() - began < seconds
 
 
-def wait_for(condition, seconds=10.0):
+def coming(source):
+    """The frames of a live source, without the pauses between them."""
+    until = time.monotonic() + HANG_S
+    for frame in source:
+        assert time.monotonic() < until, "waited in vain"
+        if frame is not None:
+            yield frame
+
+
+def wait_for(condition):
     """Wait until the condition holds."""
-    until = time.monotonic() + seconds
+    until = time.monotonic() + HANG_S
     while not condition():
         assert time.monotonic() < until, "waited in vain"
         time.sleep(0.01)

@@ -4,12 +4,11 @@ import errno
 import os
 import subprocess
 import sys
-from threading import Timer
 
 import pytest
 from command_line import ENVIRONMENT
+from live_runs import NEVER_ROLLS, frames, run_until, settings
 
-from vidtrack.config import load
 from vidtrack.errors import OutputError
 from vidtrack.live.outputs import Extras
 from vidtrack.live.run import LiveRun
@@ -18,27 +17,21 @@ from vidtrack.output.lock import alone
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX locks")
 
 
-def run_for(run, seconds):
-    Timer(seconds, run.stop).start()
-    for _ in run:
-        pass
-
-
 @pytest.mark.parametrize("shared", ["out", "state", "tape"])
 def test_what_another_run_writes_is_left_alone(camera, tmp_path, shared):
     place = tmp_path / shared
-    rolling = load(assignments=["live.timeout_s=2", "live.roll_s=100000"])
+    rolling = settings(NEVER_ROLLS)
     extras = {"out": Extras(), "state": Extras(state=place), "tape": Extras(record=place)}[shared]
     own = [place if shared == "out" else tmp_path / name for name in ("one", "two")]
     with LiveRun(camera.url(), rolling, own[0], extras) as first:
-        run_for(first, 0.5)
+        run_until(first, frames(2))
         before = {path for path in tmp_path.rglob("*") if path.name != "two"}
         with pytest.raises(OutputError, match=f"{place} is in use by another run") as caught:
             LiveRun(camera.url(), rolling, own[1], extras, force=True)
         assert caught.value.exit_code == 2
         assert before <= set(tmp_path.rglob("*"))
     with LiveRun(camera.url(), rolling, own[1], extras) as second:
-        run_for(second, 0.5)
+        run_until(second, frames(2))
 
 
 def test_the_system_takes_the_lock_from_a_killed_process(tmp_path):

@@ -6,17 +6,17 @@ import os
 import re
 import signal
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from cameras import HttpCamera, crossing, wait_for, within
+from cameras import HANG_S, HttpCamera, crossing, wait_for
 from click.testing import CliRunner
 from command_line import start
 
+import vidtrack.live.run
 from vidtrack.cli import cli
 from vidtrack.config import load
 from vidtrack.errors import ConfigError, OutputError
@@ -29,7 +29,8 @@ from vidtrack.output.lock import alone
 from vidtrack.output.repair import read_tracks
 
 SECRET = "u:pass%40word@"
-QUICK = ["live.timeout_s=1", "live.backoff_s=0.05"]
+NOBODY = "http://u:geheim@127.0.0.1:9/x"
+QUICK = ["live.backoff_s=0.05"]
 
 
 def rows(folder):
@@ -38,7 +39,9 @@ def rows(folder):
 
 
 def say_nothing(name):
+    """In the camera's process: no hurry at its end either."""
     logging.getLogger("vidtrack").setLevel(logging.CRITICAL)
+    vidtrack.live.run._END_S = HANG_S
 
 
 @pytest.fixture
@@ -47,11 +50,10 @@ def other(compiled):
         yield camera
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_one_camera_dies_and_the_other_goes_on(camera, other, tmp_path, number):
+def test_one_camera_dies_and_the_other_goes_on(camera, other, tmp_path):
     (tmp_path / "cameras.toml").write_text(
         f"""
-        live.timeout_s = 1.0
+        tracker.coast_s = 1.5
 
         [camera.north]
         address = "{camera.url(login=SECRET)}"
@@ -63,26 +65,25 @@ def test_one_camera_dies_and_the_other_goes_on(camera, other, tmp_path, number):
     )
     out = tmp_path / "out"
     process = start("live", "cameras.toml", "-o", "out", "--http", "0", cwd=tmp_path, start_new_session=True)
-    wait_for(lambda: rows(out / "north") > 5 and rows(out / "south") > 5, 60.0)
+    wait_for(lambda: rows(out / "north") > 5 and rows(out / "south") > 5)
     other.__exit__()
+    line = next(line for line in process.stderr if "south" in line)
+    assert "warning: lost" in line
     before = rows(out / "north")
-    wait_for(lambda: rows(out / "north") > before + 20, 60.0)
+    wait_for(lambda: rows(out / "north") > before + 5)
     shown = [path.read_bytes().decode() for path in process_arguments(process.pid)]
-    os.killpg(process.pid, number)  # as a terminal does, to all processes
-    told_s = time.monotonic()
-    with within(6.0):  # two seconds are promised on an idle machine
-        output, talk = process.communicate(timeout=20)
-    was_in_time = time.monotonic() - told_s < 1.5  # otherwise processes may have been killed
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, to all processes
+    output, talk = process.communicate(timeout=HANG_S)
     assert process.returncode == 0, talk
     assert output == "out\n"
-    assert re.search(r"south: warning: lost", talk)
     summary = json.loads((out / "summary.json").read_text())
     assert set(summary["cameras"]) == {"north", "south"}
     assert summary["frames"] == sum(camera["frames"] for camera in summary["cameras"].values())
     assert list(summary["cameras"]["north"]["counts"]) == ["gate"]
     assert not any("error" in camera for camera in summary["cameras"].values())
-    assert not any(camera["interrupted"] and was_in_time for camera in summary["cameras"].values())
-    texts = [*shown, output, talk] + [p.read_bytes().decode(errors="replace") for p in out.rglob("*") if p.is_file()]
+    texts = [*shown, output, line, talk] + [
+        p.read_bytes().decode(errors="replace") for p in out.rglob("*") if p.is_file()
+    ]
     assert not any("pass%40word" in text for text in texts)
 
 
@@ -98,12 +99,15 @@ def test_a_process_that_is_killed_is_started_again(camera, tmp_path, caplog):
     jobs = [replace(job("a", camera.url(), tmp_path), extras=extras), job("b", camera.url(), tmp_path)]
     with Many(jobs, tmp_path) as many:
         a, b = many.workers.values()
-        wait_for(lambda: rows(tmp_path / "a") > 5 and rows(tmp_path / "b") > 5, 60.0)
+        wait_for(lambda: rows(tmp_path / "a") > 5 and rows(tmp_path / "b") > 5)
+        assert a.status()["state"] == "running"
+        assert a.status()["reading"]["width"] == 320
+        assert cv2.imdecode(np.frombuffer(a.picture(), np.uint8), cv2.IMREAD_COLOR).shape == (240, 320, 3)
         a.kill()
         wait_for(lambda: not many.running(0.05) or a.status()["state"] == "waiting")
         assert a.error is None
         frame = b.status()["frame"]
-        wait_for(lambda: many.running(0.05) and rows(tmp_path / "a-2") > 5, 60.0)
+        wait_for(lambda: many.running(0.05) and rows(tmp_path / "a-2") > 5)
         assert b.status()["frame"] > frame
         assert [status["state"] for status in many.statuses()] == ["running", "running"]
         assert [status["restarts"] for status in many.statuses()] == [1, 0]
@@ -118,23 +122,23 @@ def test_a_process_that_is_killed_is_started_again(camera, tmp_path, caplog):
     assert summary["cameras"]["a"]["restarts"] == summary["restarts"] == 1
     assert summary["cameras"]["a"]["frames"] == one["frames"] + two["frames"]
     assert "error" not in summary["cameras"]["a"]
+    assert [summary["cameras"][name]["interrupted"] for name in "ab"] == [False, False]
+    assert (b.status()["state"], b.picture(), b.error) == ("ended", None, None)
     assert "a: its process ended with code -9" in caplog.text
 
 
 def test_a_process_that_said_why_it_ended_is_not(tmp_path):
     with Many([job("a", "/dev/video77", tmp_path)], tmp_path) as many:
-        wait_for(lambda: not many.running(0.05), 60.0)
+        wait_for(lambda: not many.running(0.05))
         assert "no such device" in many.workers["a"].error
         assert many.workers["a"].restarts == 0
 
 
-def test_it_is_tried_for_ever_once_it_crashed(camera, tmp_path):
-    with Many([job("a", camera.url(), tmp_path)], tmp_path) as many:
+def test_it_is_tried_for_ever_once_it_crashed(tmp_path):
+    with Many([job("a", NOBODY, tmp_path)], tmp_path) as many:
         worker = many.workers["a"]
-        wait_for(lambda: rows(tmp_path / "a") > 5, 60.0)
         worker.kill()
-        camera.__exit__()
-        wait_for(lambda: many.running(0.05) and worker.restarts > 1, 60.0)
+        wait_for(lambda: many.running(0.05) and worker.restarts > 1)
         assert any("connection refused" in what for _, what in worker.status()["problems"])
 
 
@@ -152,14 +156,22 @@ def test_a_crash_goes_on_in_the_same_parts(tmp_path):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
-def test_no_process_outlives_its_parent(camera, other, tmp_path):
-    process = start("live", camera.url(), other.url(), "-o", "out", cwd=tmp_path)
-    wait_for(lambda: sum(rows(folder) > 1 for folder in (tmp_path / "out").glob("*")) == 2, 60.0)
-    children = [path for path in process_arguments(process.pid)[1:] if b"spawn_main" in path.read_bytes()]
-    assert len(children) == 2
+def test_no_process_outlives_its_parent(camera, tmp_path):
+    (tmp_path / "cameras.toml").write_text(f'[camera.north]\naddress = "{camera.url()}"\n')
+    process = start("live", "cameras.toml", "-o", "out", cwd=tmp_path)
+    wait_for(lambda: rows(tmp_path / "out" / "north") > 1)
+    (child,) = (path for path in process_arguments(process.pid)[1:] if b"spawn_main" in path.read_bytes())
     process.kill()
     process.communicate()
-    wait_for(lambda: not any(path.exists() for path in children))
+    wait_for(lambda: not is_alive(child))
+
+
+def is_alive(arguments):
+    """Of a process that somebody else may have to bury: a dead one has no arguments."""
+    try:
+        return bool(arguments.read_bytes())
+    except OSError:
+        return False
 
 
 def test_a_second_run_into_the_folder_is_refused(tmp_path):
@@ -167,36 +179,22 @@ def test_a_second_run_into_the_folder_is_refused(tmp_path):
         Many([], tmp_path)
 
 
-def test_a_parent_can_show_status_and_picture(camera, tmp_path):
-    with Many([job("a", camera.url(), tmp_path)], tmp_path) as many:
-        worker = many.workers["a"]
-        assert worker.picture() is None or worker.status()["frame"] >= 0
-        wait_for(lambda: worker.status().get("frame", -1) > 3, 60.0)
-        status = worker.status()
-        assert status["state"] == "running"
-        assert status["reading"]["width"] == 320
-        picture = cv2.imdecode(np.frombuffer(worker.picture(), np.uint8), cv2.IMREAD_COLOR)
-        assert picture.shape == (240, 320, 3)
-    assert worker.status()["state"] == "ended"
-    assert worker.picture() is None
-    assert worker.error is None
-
-
 def job(name, address, root):
     return Job(name, address, load(assignments=QUICK), root / name, Extras(), False, say_nothing)
 
 
-def test_cameras_that_all_fail_end_the_run(tmp_path):
-    nobody = "http://u:geheim@127.0.0.1:9/x"
+def test_cameras_that_all_fail_end_the_run(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
     sets = [part for assignment in QUICK for part in ("--set", assignment)]
-    process = start("live", nobody, nobody, "/dev/video77", "-o", "out", *sets, cwd=tmp_path)
-    _, talk = process.communicate(timeout=60)
-    assert process.returncode == 3, talk
+    arguments = ["live", NOBODY, "/dev/video77", "-o", "out", *sets]
+    result = CliRunner().invoke(cli, arguments, standalone_mode=False)
+    assert (result.exception, result.return_value) == (None, 3)
+    talk = result.output + "".join(capfd.readouterr())
     assert "geheim" not in talk
     assert "Traceback" not in talk
     cameras = json.loads((tmp_path / "out" / "summary.json").read_text())["cameras"]
-    assert set(cameras) == {"127.0.0.1_9", "127.0.0.1_9-2", "video77"}
-    assert "connection refused" in cameras["127.0.0.1_9-2"]["error"]
+    assert set(cameras) == {"127.0.0.1_9", "video77"}
+    assert "connection refused" in cameras["127.0.0.1_9"]["error"]
     assert "no such device" in cameras["video77"]["error"]
 
 

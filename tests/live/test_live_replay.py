@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 from cameras import Picture, Script, crossing, script_of
-from test_live_run import run_for, settings
+from live_runs import frames, play, rows, run_until, settings
 
 from vidtrack.config import load
-from vidtrack.errors import FormatError, SourceError
+from vidtrack.errors import FormatError, OutputError, SourceError
 from vidtrack.live.keep import parts_of
 from vidtrack.live.memory import StateFile
 from vidtrack.live.outputs import Extras
@@ -34,37 +34,37 @@ def test_a_recording_gives_the_same_tracks(camera, tmp_path, path):
     chosen = settings("tracker.confirm_s=0.1")
     extras = Extras(record=tmp_path / "tape")
     with LiveRun(camera.url(path), chosen, tmp_path / "out", extras) as run:
-        began, size = time.monotonic(), 0
-        for _ in run:
-            now = time.monotonic() - began
-            if now > 1.5 and not size:
-                size = camera.pictures = [cv2.resize(picture, (480, 360)) for picture in PICTURES]
-                camera.connection += 1
-            if now > 3.5:
-                run.stop()
+
+        def story(seen):
+            yield rows(10)
+            camera.pictures = [cv2.resize(picture, (480, 360)) for picture in PICTURES]
+            camera.connection += 1  # hangs up
+            yield lambda seen: len(parts_of(tmp_path / "tape")) == 2
+            since = len(seen)
+            yield lambda seen: rows(20)(seen[since:])
+
+        play(run, story)
     assert len(parts_of(tmp_path / "tape")) == 2  # one for each connection
     assert is_recording(str(tmp_path / "tape"))
     assert load(base=recorded_settings(str(tmp_path / "tape"))) == chosen
     lived = (tmp_path / "out" / "tracks.csv").read_text()
     assert lived.count("\n") > 20
-    rows = read_tracks(tmp_path / "out" / "tracks.csv")
-    assert max(rows["x_px"].to_pylist()) < 330  # pixels of the first picture, before and after
+    table = read_tracks(tmp_path / "out" / "tracks.csv")
+    assert max(table["x_px"].to_pylist()) < 330  # pixels of the first picture, before and after
     assert replay(tmp_path / "tape", tmp_path / "again", chosen) == lived
 
 
 def test_parts_cut_from_one_connection_do_too(camera, tmp_path):
-    chosen = settings("live.roll_s=1", "tracker.confirm_s=0.1")
-    with LiveRun(camera.url("video.ts"), chosen, tmp_path / "out", Extras(record=tmp_path / "tape")) as run:
-        run_for(run, 3.0)
-    tapes = parts_of(tmp_path / "tape")
-    assert len(tapes) >= 3
+    chosen = settings("live.roll_s=0.5", "tracker.confirm_s=0.1")
+    tape = tmp_path / "tape"
+    with LiveRun(camera.url("video.ts"), chosen, tmp_path / "out", Extras(record=tape)) as run:
+        run_until(run, lambda seen: len(parts_of(tape)) >= 3 and rows(20)(seen))
     lived = [(part / "tracks.csv").read_text().splitlines() for part in parts_of(tmp_path / "out")]
-    rows = [row for part in lived for row in part[1:]]
-    assert replay(tmp_path / "tape", tmp_path / "again", chosen).splitlines()[1:] == rows
-
-    last = replay(tapes[-1], tmp_path / "last", chosen).splitlines()[1:]  # a part alone begins where it began
-    assert last
-    assert set(last) <= set(rows)
+    whole = [row for part in lived for row in part[1:]]
+    assert replay(tape, tmp_path / "again", chosen).splitlines()[1:] == whole
+    alone = [replay(part, tmp_path / part.name, chosen).splitlines()[1:] for part in parts_of(tape)]
+    assert any(alone)
+    assert set().union(*alone) <= set(whole)  # a part alone begins where it began
 
 
 def test_a_raw_camera_is_recorded_without_loss(compiled, tmp_path):
@@ -72,11 +72,12 @@ def test_a_raw_camera_is_recorded_without_loss(compiled, tmp_path):
         is_raw = True
 
     grey = [cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) for picture in PICTURES[:100]]
-    acts = [act for picture in grey for act in (0.015, Picture(picture))]
-    connect = script_of(Raw(*acts, 30.0))
-    device, chosen = "http://camera/", settings("tracker.confirm_s=0.1")  # where the script pretends to be
+    acts = [act for k, picture in enumerate(grey) for act in (0.005, Picture(picture, stamp_s=k / 60))]
+    connect = script_of(Raw(*acts))
+    device = "http://camera/"  # where the script pretends to be
+    chosen = settings("live.every_frame=true", "tracker.confirm_s=0.1")
     with LiveRun(device, chosen, tmp_path / "out", Extras(record=tmp_path / "tape"), connect=connect) as run:
-        run_for(run, 3.0)
+        run_until(run, frames(100))
     lived = (tmp_path / "out" / "tracks.csv").read_text()
     assert lived.count("\n") > 5
     assert replay(tmp_path / "tape", tmp_path / "again", chosen) == lived
@@ -84,13 +85,13 @@ def test_a_raw_camera_is_recorded_without_loss(compiled, tmp_path):
 
 def test_a_recording_that_was_cut_is_repeated_up_to_there(camera, tmp_path):
     with LiveRun(camera.url("video.ts"), settings(), tmp_path / "out", Extras(record=tmp_path / "tape")) as run:
-        run_for(run, 1.5)
+        lived = run_until(run, frames(60))
     (part,) = parts_of(tmp_path / "tape")
     for name in ("video.mkv", "frames.csv"):
         content = (part / name).read_bytes()
         (part / name).write_bytes(content[: len(content) * 2 // 3])
     with Run(str(tmp_path / "tape"), settings(), tmp_path / "again") as run:
-        assert 5 < sum(1 for _ in run) < 100
+        assert 5 < sum(1 for _ in run) < len(lived)
 
 
 def test_an_empty_recording_says_so(tmp_path):
@@ -109,33 +110,31 @@ def ids(folder):
 def test_a_restart_goes_on_with_scene_tracks_and_numbers(camera, tmp_path):
     extras = Extras(state=tmp_path / "state")
     with LiveRun(camera.url(), settings(), tmp_path / "one", extras) as run:
-        first = run_for(run, 2.0)
-        before = run.board.now()
+        first = run_until(run, rows(10))
     saved = read_state(extras.state)
-    assert saved["frame"] == first[-1]
+    assert saved["frame"] == first[-1].index
+    pause_s = time.time() - saved["unix_s"]
     with LiveRun(camera.url(), settings(), tmp_path / "two", extras) as run:
-        second = run_for(run, 2.0)
-        after = run.board.now()
-    assert second[0] == first[-1] + 1
-    assert after.time_s > before.time_s + 2.0
+        second = run_until(run, rows(10))
+    assert second[0].index == first[-1].index + 1
+    assert second[0].time_s > first[-1].time_s + pause_s
     assert saved["tracker.register.next_id"] <= read_state(extras.state)["tracker.register.next_id"]
     old, new = ids(tmp_path / "one"), ids(tmp_path / "two")
     assert old
     assert max(new - old, default=0) < saved["tracker.register.next_id"] + 1000  # nothing was lost in between
-    known = {row["track_id"] for row in before.tracks}
-    assert (new & old) <= known
+    assert (new & old) <= first[-1].tracks
 
 
 def test_a_killed_run_never_gives_a_number_twice(camera, tmp_path):
     path = tmp_path / "state"
     with LiveRun(camera.url(), settings(), tmp_path / "one", Extras(state=path)) as run:
-        run_for(run, 2.0)
+        run_until(run, rows(5))
         killed = path.read_bytes()  # what is on the disk while it runs
         given = run._memory.tracker.register.next_id
     assert read_state(path)["tracker.register.next_id"] == given
     path.write_bytes(killed)
     with LiveRun(camera.url(), settings(), tmp_path / "two", Extras(state=path)) as run:
-        run_for(run, 2.0)
+        run_until(run, rows(5))
     fresh = ids(tmp_path / "two") - ids(tmp_path / "one")
     assert fresh
     assert min(fresh) >= given
@@ -169,28 +168,31 @@ def test_a_foreign_state_is_refused(camera, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_state_that_cannot_be_saved_is_counted(camera, tmp_path, monkeypatch, caplog):
-    def full(*_):
-        raise OSError(28, "No space left on device")
+def full(*_):
+    raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("vidtrack.live.memory.write_state", full)
+
+def test_a_state_that_cannot_be_saved_is_counted(camera, tmp_path, monkeypatch, caplog):
     with LiveRun(camera.url(), settings(), tmp_path / "out", Extras(state=tmp_path / "state")) as run:
-        assert len(run_for(run, 1.0)) > 5
-        assert run.board.now().reading["lost"]["state"] > 0
+        run_until(run, frames(1))
+        monkeypatch.setattr("vidtrack.live.memory.write_state", full)
+    assert run.board.now().reading["lost"]["state"] > 0
     assert "cannot save the state" in caplog.text
+
+
+def test_no_number_is_used_before_it_is_reserved(camera, tmp_path, monkeypatch):
+    monkeypatch.setattr("vidtrack.live.memory.write_state", full)
+    with (
+        LiveRun(camera.url(), settings(), tmp_path / "out", Extras(state=tmp_path / "state")) as run,
+        pytest.raises(OutputError, match=r"cannot save the state .*No space left"),
+    ):
+        next(iter(run))
 
 
 def test_pictures_lie_in_a_line_of_time(camera, tmp_path):
     extras = Extras(record=tmp_path / "tape")
     with LiveRun(camera.url("video.ts"), settings(), tmp_path / "out", extras) as run:
-        lived = [(step.index, step.time_s) for step in _first(run, 40)]
+        lived = [(each.index, each.time_s) for each in run_until(run, frames(30))]
     with Run(str(tmp_path / "tape"), settings(), tmp_path / "again") as run:
         assert [(step.index, step.time_s) for step in run] == lived
     assert np.all(np.diff([time_s for _, time_s in lived]) > 0)
-
-
-def _first(run, count):
-    for k, step in enumerate(run, 1):
-        yield step
-        if k >= count:
-            run.stop()

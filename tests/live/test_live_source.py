@@ -2,11 +2,12 @@
 
 import logging
 import time
+from itertools import islice
 
 import av
 import numpy as np
 import pytest
-from cameras import Picture, Script, grey, script_of, within
+from cameras import HANG_S, Picture, Script, coming, grey, script_of, wait_for, within
 
 from vidtrack.config import LiveSettings
 from vidtrack.errors import SourceError
@@ -15,9 +16,16 @@ from vidtrack.video.live.connection import Connection, Refused, Stalled
 from vidtrack.video.live.source import LiveSource
 
 ADDRESS = Address("rtsp://user:secret@cam/x", "rtsp://***@cam/x", "cam")
-FAST = LiveSettings(timeout_s=0.3, backoff_s=0.01, backoff_longest_s=0.05)
+FAST = LiveSettings(timeout_s=HANG_S, backoff_s=0.01, backoff_longest_s=0.05)
 EVERY = FAST.model_copy(update={"every_frame": True})
 LIVE = 0.005  # after which a picture has certainly been waited for
+SILENT = 2 * HANG_S
+
+
+@pytest.fixture(autouse=True)
+def unhurried(monkeypatch):
+    """Nobody waits for threads that sleep in a script."""
+    monkeypatch.setattr("vidtrack.video.live.source._END_S", 0.01)
 
 
 def pictures(levels, every_s=0.02):
@@ -29,14 +37,9 @@ def levels(frames):
     return [int(frame.y[0, 0]) for frame in frames]
 
 
-def take(source, count, seconds=5.0):
-    """The next `count` frames."""
-    frames = []
-    until = time.monotonic() + seconds
-    while len(frames) < count and time.monotonic() < until:
-        if (frame := next(source)) is not None:
-            frames.append(frame)
-    return frames
+def take(source, number):
+    """The next frames."""
+    return list(islice(coming(source), number))
 
 
 def open_script(*connections, settings=FAST, **options):
@@ -44,7 +47,7 @@ def open_script(*connections, settings=FAST, **options):
 
 
 def test_frames_come_numbered_with_times_from_zero():
-    with open_script(Script(*pictures([10, 20, 30]), 5.0)) as source:
+    with open_script(Script(*pictures([10, 20, 30]), SILENT)) as source:
         frames = take(source, 3)
         assert (source.width, source.height, source.fps) == (64, 48, 25.0)
     assert levels(frames) == [10, 20, 30]
@@ -55,28 +58,26 @@ def test_frames_come_numbered_with_times_from_zero():
 
 
 def test_a_slow_tracker_gets_the_newest_frames_and_is_never_late():
-    with open_script(Script(*pictures(range(10, 210), 0.01), 5.0)) as source:
-        lateness = []
-        for frame in source:
-            if frame is None:
-                break
-            time.sleep(0.05)  # five times slower than the camera
-            lateness.append(source.latency_s(frame.time_s))
+    with open_script(Script(*pictures(range(100), LIVE), SILENT)) as source:
         stats = source.stats
-    half = len(lateness) // 2
-    assert np.median(lateness[half:]) < np.median(lateness[:half]) + 0.1  # it would be seconds
-    assert stats.frames_dropped > 100
-    assert stats.frames_read + stats.frames_dropped == stats.received == 200
+        while stats.received < 100:
+            before = stats.received
+            wait_for(lambda before=before: stats.received >= min(before + 10, 100))  # slower than the camera
+            there = stats.received
+            (frame,) = take(source, 1)
+            assert there - levels([frame])[0] <= 3 or frame.index == 0  # two wait, and one may be coming
+        while levels(take(source, 1)) != [99]:
+            pass
+    assert stats.frames_read + stats.frames_dropped == 100
+    assert stats.frames_dropped > 50
 
 
 def test_every_frame_waits_instead_and_drops_none():
-    with open_script(Script(*pictures(range(10, 60), 0.004), 5.0), settings=EVERY) as source:
+    with open_script(Script(*pictures(range(10, 60), 0.004), SILENT), settings=EVERY) as source:
         seen = []
-        for frame in source:
-            if frame is None:
-                break
-            time.sleep(0.01)
-            seen.append(int(frame.y[0, 0]))
+        for frame in islice(coming(source), 50):
+            time.sleep(0.006)
+            seen += levels([frame])
     assert seen == list(range(10, 60))
     assert source.stats.frames_dropped == 0
 
@@ -84,27 +85,40 @@ def test_every_frame_waits_instead_and_drops_none():
 def test_every_frame_tells_when_it_falls_behind(caplog, monkeypatch):
     monkeypatch.setattr("vidtrack.video.live.source._LATE_S", 0.1)
     acts = [act for k in range(30) for act in (LIVE, Picture(grey(k), stamp_s=k * LIVE))]
-    with open_script(Script(*acts, 5.0), settings=EVERY) as source:
-        for frame in source:
-            if frame is None:
-                break
-            time.sleep(0.03)
+    with open_script(Script(*acts, SILENT), settings=EVERY) as source:
+        for _ in islice(coming(source), 30):
+            time.sleep(0.01)
     assert caplog.text.count("behind; use a smaller --scale") == 1
 
 
-def test_what_was_gathered_while_connecting_is_not_live():
+def test_what_was_gathered_while_connecting_is_not_live(monkeypatch):
+    clock = Clock()
+    for module in ("reader", "source"):
+        monkeypatch.setattr(f"vidtrack.video.live.{module}.monotonic", lambda: clock.now_s)
+
+    class Timed(Script):
+        wait = clock.wait
+
     gathered = [Picture(grey(level)) for level in (1, 2, 3)]
-    with open_script(Script(*gathered, *pictures([10, 20]), 5.0)) as source:
+    with open_script(Timed(*gathered, *pictures([10, 20]), 0.0)) as source:
         assert levels(take(source, 2)) == [10, 20]
 
 
+class Clock:
+    """Stands until somebody waits: what is quick takes no time on any machine."""
+
+    now_s = 1000.0
+
+    def wait(self, seconds):
+        self.now_s += seconds
+
+
 def test_it_reconnects_and_the_gap_is_true(caplog):
-    lost = SourceError("lost it")
-    with open_script(Script(*pictures([10]), lost), SourceError("off"), lost, Script(*pictures([20]), 5.0)) as source:
-        frames = take(source, 1)
-        began = time.monotonic()
-        frames += take(source, 1)
-        assert frames[1].time_s == pytest.approx(time.monotonic() - began, abs=0.1)
+    lost, back = SourceError("lost it"), Script(*pictures([20], 0.2), SILENT)
+    with open_script(Script(*pictures([10]), lost), SourceError("off"), lost, back) as source:
+        frames = take(source, 2)
+        assert frames[1].time_s > 0.2
+        assert source.latency_s(frames[1].time_s) > 0
         assert source.stats.reconnects == 1
         assert source.stats.state == "running"
         assert len(source.stats.problems) == 3
@@ -114,18 +128,22 @@ def test_it_reconnects_and_the_gap_is_true(caplog):
 
 
 def test_a_silent_connection_is_a_stall():
-    with open_script(Script(*pictures([10])), Script(*pictures([20]), 5.0)) as source:
+    with open_script(Script(*pictures([10])), Script(*pictures([20]), SILENT)) as source:
         take(source, 2)
         assert (source.stats.stalls, source.stats.reconnects) == (1, 1)
 
 
-def test_packets_without_any_picture_are_a_stall_too():
+def test_packets_without_any_picture_are_a_stall_too(monkeypatch):
+    monkeypatch.setattr("vidtrack.video.live.source._STUCK", 1000)  # on a slow machine this is one more
+    brief = LiveSettings(timeout_s=0.1, backoff_s=0.01)
+
     class Deaf(Script):
         def decode(self, packet):
             return []
 
+    deaf = Deaf(*pictures([1] * 40))
     with open_script(
-        Script(*pictures([10]), SourceError("lost")), Deaf(*pictures([1] * 40)), Script(*pictures([20]), 5.0)
+        Script(*pictures([10]), SourceError("lost")), deaf, Script(*pictures([20]), SILENT), settings=brief
     ) as source:
         assert levels(take(source, 2)) == [10, 20]
         assert source.stats.stalls == 1
@@ -134,8 +152,8 @@ def test_packets_without_any_picture_are_a_stall_too():
 def test_a_hundred_reconnects_end_nothing():
     once = [Script(*pictures([k + 1], LIVE), SourceError("lost")) for k in range(100)]
     quick = LiveSettings(backoff_s=1e-4, backoff_longest_s=1e-3, every_frame=True)
-    with open_script(*once, Script(*pictures([200]), 5.0), settings=quick) as source:
-        frames = take(source, 101, 20.0)
+    with open_script(*once, Script(*pictures([200]), SILENT), settings=quick) as source:
+        frames = take(source, 101)
         assert source.stats.reconnects == 100
         assert len(source.stats.problems) == 20
     assert np.all(np.diff([frame.time_s for frame in frames]) > 0)
@@ -145,7 +163,7 @@ def test_a_hundred_reconnects_end_nothing():
 def test_another_size_and_colour_are_brought_to_the_first():
     with open_script(
         Script(*pictures([10]), SourceError("lost")),
-        Script(LIVE, Picture(grey(20, (96, 128))), 5.0),
+        Script(LIVE, Picture(grey(20, (96, 128))), SILENT),
     ) as source:
         frames = take(source, 2)
         assert [frame.shape for frame in frames] == [(48, 64), (48, 64)]
@@ -153,13 +171,13 @@ def test_another_size_and_colour_are_brought_to_the_first():
 
 
 def test_three_failures_at_the_start_are_the_end():
-    with within(2.0), pytest.raises(SourceError, match="nobody answers"):
+    with within(), pytest.raises(SourceError, match="nobody answers"):
         open_script()
 
 
 def test_a_refusal_at_the_start_is_the_end_at_once():
     with pytest.raises(Refused, match="no"):
-        open_script(Refused("no"), Script(*pictures([10]), 5.0))
+        open_script(Refused("no"), Script(*pictures([10]), SILENT))
 
 
 def test_no_permission_for_the_device_says_what_to_do(monkeypatch):
@@ -173,28 +191,29 @@ def test_no_permission_for_the_device_says_what_to_do(monkeypatch):
 
 def test_a_refusal_later_is_not():
     with open_script(
-        Script(*pictures([10]), SourceError("lost")), Refused("no"), Script(*pictures([20]), 5.0)
+        Script(*pictures([10]), SourceError("lost")), Refused("no"), Script(*pictures([20]), SILENT)
     ) as source:
         assert levels(take(source, 2)) == [10, 20]
 
 
 def test_two_failures_at_the_start_are_forgiven():
-    with open_script(SourceError("a"), Stalled("b"), Script(*pictures([10]), 5.0)) as source:
+    with open_script(SourceError("a"), Stalled("b"), Script(*pictures([10]), SILENT)) as source:
         assert levels(take(source, 1)) == [10]
         assert source.stats.stalls == 1
 
 
 def test_numbers_and_times_go_on_after_another_run():
     origin_s = time.monotonic() - 100.0
-    with open_script(Script(*pictures([10, 20]), 5.0), first=77, origin_s=origin_s) as source:
+    with open_script(Script(*pictures([10, 20]), SILENT), first=77, origin_s=origin_s) as source:
         frames = take(source, 2)
+        assert source.latency_s(frames[1].time_s) > 0
     assert [frame.index for frame in frames] == [77, 78]
-    assert frames[0].time_s == pytest.approx(100.0, abs=0.5)
+    assert frames[0].time_s > 100.0
 
 
 def test_it_stops_at_once():
-    with within(1.0):
-        source = open_script(Script(*pictures([10]), 30.0))
+    with within():
+        source = open_script(Script(*pictures([10]), SILENT))
         source.stop()
         assert list(source) == []
         source.close()
@@ -202,26 +221,32 @@ def test_it_stops_at_once():
 
 def test_a_reader_that_hangs_in_a_driver_is_replaced(caplog):
     brief = LiveSettings(timeout_s=0.1, backoff_s=0.01)
-    with open_script(Script(*pictures([10]), 3.0), Script(*pictures([20]), 5.0), settings=brief) as source:
+    others = [Script(*pictures([20]), SILENT) for _ in range(1000)]  # on a slow machine these seem to hang as well
+    with open_script(Script(*pictures([10]), SILENT), *others, settings=brief) as source:
         assert levels(take(source, 2)) == [10, 20]
     assert "hangs" in caplog.text
 
 
-def test_a_decoder_that_is_too_slow_goes_on_with_key_pictures():
+def test_a_decoder_that_is_too_slow_goes_on_with_key_pictures(monkeypatch):
+    monkeypatch.setattr("vidtrack.video.live.reader._BEHIND_S", 0.2)
+
     class Slow(Script):
         def decode(self, packet):
             time.sleep(0.05)
             return super().decode(packet)
 
-    sent = [Picture(grey(k), is_keyframe=k % 20 == 0) for k in range(200)]  # no packet has to be waited for
-    with open_script(Slow(*sent, 5.0), settings=LiveSettings(timeout_s=3.0)) as source:
-        got = levels(take(source, 8))
-    assert got[-4:] == [k for k in got[-4:] if k % 20 == 0]
-    assert source.stats.frames_dropped > 100
+    sent = [Picture(grey(k % 200), is_keyframe=k % 20 == 0) for k in range(4000)]  # none has to be waited for
+    with open_script(Slow(*sent), settings=LiveSettings(timeout_s=HANG_S)) as source:
+        got = []
+        for frame in coming(source):
+            got += levels([frame])
+            if len(got) >= 4 and not any(level % 20 for level in got[-4:]):
+                break
+    assert source.stats.frames_dropped >= 3 * 19
 
 
 def test_nothing_is_said_with_a_password(caplog):
     caplog.set_level(logging.DEBUG)
-    with open_script(Script(*pictures([10]), SourceError("lost")), Script(*pictures([20]), 5.0)) as source:
+    with open_script(Script(*pictures([10]), SourceError("lost")), Script(*pictures([20]), SILENT)) as source:
         take(source, 2)
     assert "secret" not in caplog.text + repr(source.stats)

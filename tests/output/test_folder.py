@@ -18,10 +18,11 @@ from vidtrack.config import Settings
 from vidtrack.errors import FormatError, OutputError, StoppedEarly
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
-from vidtrack.output.folder import open_run, replacing
+from vidtrack.output.folder import open_folder, open_run, replacing
 from vidtrack.output.linefile import LineFile
 from vidtrack.output.mot import MotFile
 from vidtrack.output.repair import repair
+from vidtrack.output.results import Results
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.traffic.lines import LineCounter, parse_line
@@ -52,6 +53,15 @@ def test_a_folder_in_use_needs_force_which_replaces_results_only(tmp_path):
     assert refusal.value.exit_code == 2
     assert open_run(tmp_path, "x", force=True) == tmp_path
     assert [p.name for p in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_what_is_no_run_leaves_the_results_beside_it(tmp_path):
+    """`vidtrack eval RUN TRUTH -o RUN --force` adds its scores to the run."""
+    (tmp_path / "tracks.csv").write_text("old")
+    with pytest.raises(OutputError, match="not empty"):
+        open_folder(tmp_path, "eval", force=False)
+    assert open_folder(tmp_path, "eval", force=True) == tmp_path
+    assert (tmp_path / "tracks.csv").read_text() == "old"
 
 
 def test_an_unusable_folder_is_refused_by_name(tmp_path):
@@ -147,6 +157,23 @@ def test_a_stopped_run_says_so(tmp_path):
     assert json.loads((tmp_path / "summary.json").read_text())["interrupted"] is True
 
 
+class Full:
+    """A sink whose last block does not fit on the disk."""
+
+    def step(self, step):
+        pass
+
+    def close(self):
+        raise StoppedEarly("cannot write tracks.csv: No space left on device")
+
+
+def test_a_run_whose_tables_cannot_be_ended_is_not_called_finished(tmp_path):
+    summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING)
+    with pytest.raises(StoppedEarly, match="No space"), Results(summary) as results:
+        results.add(Full())
+    assert json.loads((tmp_path / "summary.json").read_text())["interrupted"] is True
+
+
 def test_counts_are_in_order_of_time_with_their_evidence(tmp_path):
     sink = CountsFile(tmp_path / "counts.csv", LineCounter([parse_line("gate:100,0,100,200")]))
     for index, x in enumerate([80, 95, 104, 120, 140, 150]):
@@ -177,12 +204,16 @@ def killed_run(folder):
         time.sleep(0.002)
 
 
+def line_count(path):
+    return path.read_bytes().count(b"\n") if path.is_file() else 0
+
+
 def test_a_killed_process_leaves_readable_files_that_repair_makes_whole(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
     process = subprocess.Popen([sys.executable, __file__, str(tmp_path)], env=environment)
     try:
         deadline = time.monotonic() + 60
-        while not (tmp_path / "mot.txt").is_file() or (tmp_path / "mot.txt").stat().st_size < 20_000:
+        while min(map(line_count, (tmp_path / "mot.txt", tmp_path / "tracks.csv"))) < 600:
             assert process.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.05)

@@ -52,6 +52,11 @@ def test_equal_times_do_not_stop_the_encoder(tmp_path):
     assert len(decoded(tmp_path / "a.mp4")) == 3
 
 
+def test_a_run_without_a_frame_leaves_no_video_that_nothing_plays(tmp_path):
+    film(tmp_path / "a.mp4", [])
+    assert not (tmp_path / "a.mp4").exists()
+
+
 def test_a_video_that_was_never_closed_can_be_read(tmp_path):
     sink = AnnotatedVideo(tmp_path / "a.mp4", 25.0, OutputSettings())
     for index in range(200):
@@ -155,6 +160,17 @@ def test_trajectories_are_drawn_over_the_scene(tmp_path):
     assert (picture[600:, :] == 128).all()
 
 
+def test_the_plot_tells_the_counts_and_no_number_covers_them(tmp_path):
+    rows = [[(1, "c", 2, 98)]]
+    options = {"lines": [parse_line("gate:0,100,239,100")], "totals": lambda: {"gate": {"down": 0, "up": 12}}}
+    plain = plot(tmp_path / "a.png", [], (180, 240), **options)
+    numbered = plot(tmp_path / "b.png", rows, (180, 240), **options)
+    label = (slice(388, 398), slice(0, 60))
+    assert (plain[label] == numbered[label]).all()
+    assert (plain != numbered).any()
+    assert (plot(tmp_path / "c.png", [], (180, 240), lines=options["lines"])[label] != plain[label]).any()
+
+
 def test_the_plot_bridges_a_gap_but_does_not_follow_a_lost_track(tmp_path):
     gap = dict(zip(range(20, 220, 10), "cccccccoooooocccccccc", strict=False))
     frames = [[(1, letter, x, 40), (2, "c" if x < 100 else "o", x, 120)] for x, letter in gap.items()]
@@ -193,6 +209,9 @@ def test_decisions_tell_choice_runner_up_and_reason(tmp_path):
         gate=np.array([9.21, 9.21]),
         runner_up=np.array([7, -1]),
         runner_up_d2=np.array([3.25, np.nan]),
+        candidates=np.array([[4, 7], [-1, -1]]),
+        candidates_weight=np.array([[0.75, 0.125], [np.nan, np.nan]]),
+        candidates_d2=np.array([[0.51234567, 3.25], [np.nan, np.nan]]),
     )
     events = (Event(0.04, 2, "delete", 'left the picture, "exit"'),)
     sink = DecisionLog(tmp_path / "decisions.csv")
@@ -203,9 +222,9 @@ def test_decisions_tell_choice_runner_up_and_reason(tmp_path):
         rows = list(csv.reader(file))
     assert rows == [
         ["frame", *HEADER.strip().split(",")],
-        ["1", "0.040000", "1", "update", "4", "1", "0.5123", "9.21", "7", "3.25", ""],
-        ["1", "0.040000", "2", "miss", "", "", "", "9.21", "", "", ""],
-        ["1", "0.040000", "2", "delete", "", "", "", "", "", "", "left the picture, 'exit'"],
+        ["1", "0.040000", "1", "update", "4", "1", "0.5123", "9.21", "7", "3.25", "4:0.75:0.5123;7:0.125:3.25", ""],
+        ["1", "0.040000", "2", "miss", "", "", "", "9.21", "", "", "", ""],
+        ["1", "0.040000", "2", "delete", "", "", "", "", "", "", "", "left the picture, 'exit'"],
     ]
 
 

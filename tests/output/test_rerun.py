@@ -127,3 +127,12 @@ def test_repair_command_reports_the_rows(tmp_path):
     result = CliRunner().invoke(command, [str(tmp_path)], catch_exceptions=False)
     assert result.exit_code == 0
     assert "12 rows" in result.output
+
+
+def test_a_viewer_without_a_display_is_refused_at_once(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr("vidtrack.output.recorder._ADDRESS", ("127.0.0.1", 1))  # nobody listens there
+    with pytest.raises(OutputError, match=r"display.*FILE\.rrd"):
+        RerunSink("spawn", SHAPE, Settings())

@@ -1,8 +1,10 @@
 """Boxes that are placed in the picture and that follow what was seen of them."""
 
 import numpy as np
+import pytest
 
-from vidtrack.tracking.boxes import absolute, follow
+from vidtrack.errors import ScanError
+from vidtrack.tracking.boxes import absolute, box_scan, follow
 
 NOBODY = np.zeros(2, bool)
 
@@ -25,3 +27,21 @@ def test_a_first_box_and_one_to_be_taken_at_once_are_taken_whole():
     seen = np.array([[1.0, 2.0, 8.0, 4.0], [3.0, 4.0, 5.0, 6.0]])
     follow(box, seen, np.array([0, 1]), np.array([False, True]), np.array([0.25, 0.25]))
     np.testing.assert_array_equal(box, seen)
+
+
+def test_a_box_scan_measures_the_centres_of_its_boxes():
+    scan = box_scan(2, [[10, 20, 40, 20], [0, 0, 2, 4]], score=[1, 0])
+    np.testing.assert_array_equal(scan.z, [[30, 30], [1, 2]])
+    np.testing.assert_array_equal(absolute(scan.box, scan.z), [[10, 20, 40, 20], [0, 0, 2, 4]])
+    np.testing.assert_allclose(np.sqrt(scan.R[:, 0, 0]), [0.05 * 40, 0.5])
+    assert scan.score.tolist() == [1.0, 0.0]
+
+
+def test_an_empty_list_of_boxes_is_a_scan():
+    assert box_scan(0.0, []).box.shape == (0, 4)
+
+
+@pytest.mark.parametrize("boxes", [[1, 2, 3, 4], [[1, 2, 3]], [[30, 30, -20, 5]], [[0, 0, np.nan, 5]]])
+def test_what_is_no_box_is_refused(boxes):
+    with pytest.raises(ScanError, match=r"box|measurement 0 is not finite"):
+        box_scan(0.0, boxes)

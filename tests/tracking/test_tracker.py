@@ -219,6 +219,20 @@ def test_known_states_can_be_put_in():
     np.testing.assert_allclose(tracks.xy, [[6.0, 7.0]], atol=0.1)
 
 
+@pytest.mark.parametrize(
+    ("x", "P", "words"),
+    [
+        (np.full((1, 4), np.nan), np.eye(4)[None], "state 0 is not finite"),
+        (np.zeros((1, 4)), np.full((1, 4, 4), np.inf), "P of state 0 is not finite"),
+        (np.zeros((1, 4)), np.triu(np.ones((4, 4)))[None], "P of state 0 is not symmetric"),
+        (np.zeros((1, 4)), -np.eye(4)[None], "P of state 0 is not positive definite"),
+    ],
+)
+def test_a_state_that_is_none_is_not_added(x, P, words):
+    with pytest.raises(ScanError, match=words):
+        Tracker().add(0.0, x, P)
+
+
 def test_an_id_that_was_given_is_not_given_again():
     tracker = Tracker()
     tracker.add(0.0, np.zeros((1, 4)), np.eye(4)[None], ids=np.array([7]))
@@ -236,6 +250,9 @@ def test_choices_tell_who_was_taken_and_who_came_second():
     assert choices.runner_up_d2[0] == pytest.approx(9 * choices.d2[0])
     assert choices.gate[0] == pytest.approx(Gate().limit(2))
     assert choices.weight.tolist() == [1.0]
+    assert choices.candidates[0, :3].tolist() == [1, 0, -1]
+    assert choices.candidates_weight[0, :2].tolist() == [1.0, 0.0]
+    assert choices.candidates_d2[0, :2].tolist() == [choices.d2[0], choices.runner_up_d2[0]]
 
 
 def test_round_noise_makes_the_confidence_region_the_plain_distance():

@@ -100,7 +100,8 @@ def test_start_and_end(det):
         return [index for index, _, _ in open_detections(str(det), settings)]
 
     assert indices(start_s=0.1, end_s=0.2) == [1, 2]
-    assert indices(start_s=9) == []
+    with pytest.raises(SourceError, match=r"between 9 s and its end; the last one is at 0\.\d s"):
+        indices(start_s=9)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import threading
 from pathlib import Path
 
@@ -140,8 +141,9 @@ def test_header_rate_1000_is_not_believed(avi):
     assert times(frames) == pytest.approx(np.arange(10) / 10)
 
 
-def test_a_rate_stated_nowhere_is_assumed_with_a_warning_or_given(avi):
-    patched(patched(avi, *RATE, 1000), *PERIOD_US, 1000)
+@pytest.mark.parametrize(("rate", "period_us"), [(1000, 1000), (0, 0)])
+def test_a_rate_stated_nowhere_is_assumed_with_a_warning_or_given(avi, rate, period_us):
+    patched(patched(avi, *RATE, rate), *PERIOD_US, period_us)
     frames, source = read(avi)
     assert times(frames) == pytest.approx(np.arange(10) / 25)
     assert "--fps" in source.stats.warnings[0]
@@ -174,6 +176,28 @@ def test_start_and_end_are_media_seconds_and_the_index_keeps_counting(avi):
 def test_a_span_behind_the_end_is_an_error_that_names_the_last_time(avi):
     with open_source(str(avi), SourceSettings(start_s=60)) as source, pytest.raises(SourceError, match=r"0\.9 s"):
         next(source)
+
+
+ONE = 1 << 16  # 1 in the matrix of an MP4 track, which says how its pictures are to be turned
+UPRIGHT, HALF = (ONE, 0, 0, 0, ONE), (-ONE, 0, 0, 0, -ONE)
+CLOCKWISE, COUNTERCLOCKWISE = (0, ONE, 0, -ONE, 0), (0, -ONE, 0, ONE, 0)
+
+
+@pytest.mark.parametrize("pixels", ["yuv420p", "gray"])
+@pytest.mark.parametrize(("matrix", "turns"), [(UPRIGHT, 0), (COUNTERCLOCKWISE, 1), (HALF, 2), (CLOCKWISE, 3)])
+def test_a_turned_video_comes_upright(tmp_path, pixels, matrix, turns):
+    path = write_clip(tmp_path / "phone.mp4", 1, "libx264", pixels, (66, 49) if pixels == "gray" else (66, 50))
+    (before,), _ = read(path)
+    data = bytearray(path.read_bytes())
+    start = data.index(b"tkhd") + 44
+    data[start : start + 20] = struct.pack(">5i", *matrix)
+    path.write_bytes(data)
+    (after,), source = read(path)
+    assert (source.height, source.width) == after.shape
+    for name in ("y", "u", "v"):
+        plane = getattr(before, name)
+        if plane is not None:
+            np.testing.assert_array_equal(getattr(after, name), np.rot90(plane, turns))
 
 
 def test_one_frame_video(tmp_path):

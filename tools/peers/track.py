@@ -200,6 +200,7 @@ class StoneSoup:
 PEERS: dict[str, Callable[[float], Peer]] = {
     "sort": lambda fps: Roboflow("SORTTracker", fps),
     "bytetrack": lambda fps: Roboflow("ByteTrackTracker", fps),
+    "ocsort": lambda fps: Roboflow("OCSORTTracker", fps),
     "motpy": lambda fps: Motpy(fps),
     "similari": lambda fps: Similari(),
     "stonesoup": lambda fps: StoneSoup(fps),

@@ -1,4 +1,4 @@
-"""A detection threshold of each track's own, set scan by scan from its innovation covariance (paper 000)."""
+"""Detection thresholds set for each track and scan from the innovation covariance (paper 000)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vidtrack.errors import ScanError
 
 
 def thresholded(problem: Problem, controller: ThresholdController) -> Problem:
-    """What the problem is when each track sees only what exceeds its own threshold.
+    """The problem with each track limited to the measurements that exceed its own threshold.
 
     The controller sets P_F (T,) from S; P_D and clutter density (T,) become those of that threshold, P_F / V_c. The
     scan holds what exceeded the controller's p_fa_max, with amplitudes in units of the noise.

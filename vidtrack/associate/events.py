@@ -50,7 +50,7 @@ class Frontier(NamedTuple):
 
 @njit(cache=CACHE, nogil=True)
 def frontier(start: Ints) -> Frontier:
-    """Nobody met yet, of the members with the edges start[i]..start[i + 1]."""
+    """The frontier before the first step, for members with the edges start[i]..start[i + 1]."""
     return Frontier(np.diff(start), np.full(len(start) - 1, -1), np.full(len(start) - 1, -1))
 
 

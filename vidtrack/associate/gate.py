@@ -15,7 +15,7 @@ from vidtrack.associate.grid import cells
 from vidtrack.compiled import CACHE, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.scan import Floats, Ints, Scan, starts
+from vidtrack.scan import Floats, Ints, Mask, Scan, starts
 
 Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
 FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)
@@ -49,7 +49,7 @@ class Pairs:
     def __len__(self) -> int:
         return len(self.row)
 
-    def only(self, mask: np.ndarray) -> Pairs:
+    def only(self, mask: Mask) -> Pairs:
         """The pairs of a mask (N,)."""
         pair = mask.nonzero()[0]
         if len(pair) == len(mask):
@@ -58,14 +58,14 @@ class Pairs:
         return self._as(row, pair, self.limit, starts(row, len(self.limit)))
 
     def of(self, rows: Ints) -> Pairs:
-        """The pairs of these rows (K,), each as often as it is named."""
+        """The pairs of these rows (K,), which may repeat."""
         count = np.diff(self.start)[rows]
         start = np.concatenate([[0], np.cumsum(count)])
         pair = np.repeat(self.start[rows] - start[:-1], count) + np.arange(start[-1])
         return self._as(np.repeat(np.arange(len(rows)), count), pair, self.limit[rows], start)
 
     def _as(self, row: Ints, pair: Ints, limit: Floats, start: Ints) -> Pairs:
-        """These pairs (K,) as those of rows (K,) with these limits."""
+        """The pairs of these indices (N,), now of the rows `row` (N,), whose gates are `limit` (K,)."""
         return Pairs(
             row, self.measurement.take(pair), self.d2.take(pair), self.nis.take(pair),
             self.log_s.take(pair), self.log_l.take(pair), self.cost.take(pair), limit, start,
@@ -108,7 +108,7 @@ class Gate:
     def inside(self, limit: Floats, dim: int) -> Floats:
         """(T,) P_G, the share of a target's own measurements that gates of these limits admit: `probability`.
 
-        A box takes its axes for independent.
+        The axes of a box are taken as independent.
         """
         return np.full(len(limit), self.probability ** (dim if self.distance == "box" else 1))
 
@@ -192,9 +192,9 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 def _gated(
     m: int, mode: int, angles: tuple[int, ...]
 ) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
-    """The kernel that finds the pairs inside the gate, cell row by cell row; its arguments are constants of it.
+    """The kernel that finds the pairs inside the gate, for m components, a mode and angles that are compiled in.
 
-    It gives row, measurement, d2, nis, log_s, log_l and start of the pairs. Each track's measurements come in
+    It returns row, measurement, d2, nis, log_s, log_l and start of the pairs, the measurements of each track in
     ascending order.
     """
     wraps = tuple(a in angles for a in range(m))
@@ -299,7 +299,8 @@ def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
 
 @njit(cache=CACHE, nogil=True)
 def _grown(array: np.ndarray, size: int) -> np.ndarray:
-    """The same numbers with room for more."""
+    """The same numbers in a longer array of `size`."""
     wider = np.empty(size, array.dtype)
-    wider[: len(array)] = array
+    for i in range(len(array)):
+        wider[i] = array[i]
     return wider

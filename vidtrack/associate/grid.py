@@ -1,4 +1,4 @@
-"""A grid over points, so that who is near whom need not be asked of every pair."""
+"""A grid over points: finds candidates for gating without testing every pair."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from vidtrack.scan import Floats, Ints
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")
 def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
-    """Points z (M, m), of which the first two axes count, by (run, row of cells, column); runs numbered from 0.
+    """Sort points z (M, m) into grid cells over their first two axes, by run (M,), row and column of the cell.
 
     Returns order (M,), first, origin (2,), cell (2,), shape (2,): cell c, of sides `cell`, holds
-    order[first[c]..first[c + 1]]. Cells follow the mean gate, of half sides reach (T, 2), some four to a point at most.
+    order[first[c]..first[c + 1]]. A cell is as large as the mean of reach (T, 2), the half sides of the gates, and
+    larger where there would be more than about four cells for each point.
     """
     axes = min(2, z.shape[1])
     origin, extent = np.zeros(2), np.zeros(2)
@@ -44,7 +45,7 @@ def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floa
 
 @njit(cache=CACHE, nogil=True)
 def _typical(reach: Floats) -> Floats:
-    """(2,) mean of the finite half sides, one where there is none."""
+    """(2,) mean of the finite half sides (T, 2), ones without any."""
     total, count = np.zeros(2), 0
     for t in range(len(reach)):
         if np.isfinite(reach[t, 0]) and np.isfinite(reach[t, 1]):

@@ -23,8 +23,7 @@ class Associator(Protocol):
     """
 
     @property
-    def gated_births(self) -> bool:
-        """The setting."""
+    def gated_births(self) -> bool: ...
 
     def decide(self, problem: Problem) -> Decision:
         """Weights of the measurements for each track."""
@@ -34,7 +33,7 @@ class Associator(Protocol):
 class NN:
     """Nearest neighbour: each track takes its nearest measurement; two tracks may take the same one.
 
-    gated_births  what lies in a gate starts no track, or each redundant measurement would
+    gated_births  off: a measurement in a gate starts no track, because each redundant measurement would start one
     """
 
     gated_births: bool = False
@@ -116,8 +115,13 @@ def one_hot(taken: Ints) -> Decision:
 
 @njit(cache=CACHE, nogil=True)
 def _one_hot(taken: Ints) -> tuple[Ints, Ints, Ints, Floats, Floats]:
-    row = np.flatnonzero(taken >= 0)
-    return np.arange(len(taken)), row, taken[row], np.ones(len(row)), np.where(taken >= 0, 0.0, 1.0)
+    row, measurement, beta0 = np.empty_like(taken), np.empty_like(taken), np.ones(len(taken))
+    n = 0
+    for t in range(len(taken)):
+        if taken[t] >= 0:
+            row[n], measurement[n], beta0[t] = t, taken[t], 0.0
+            n += 1
+    return np.arange(len(taken)), row[:n], measurement[:n], np.ones(n), beta0
 
 
 @njit(cache=CACHE, nogil=True)
@@ -133,7 +137,7 @@ def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
 
 @njit(cache=CACHE, nogil=True)
 def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
-    """(T,) what each row gets if the pairs are served in this order."""
+    """(T,) measurement of each row if the pairs are served in this order, -1 for none."""
     taken, free = np.full(rows, -1), np.ones(measurements, np.bool_)
     for k in order:
         if taken[row[k]] < 0 and free[measurement[k]]:
@@ -147,7 +151,7 @@ def _assigned(
     row: Ints, start: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats,
     measurements: int, cardinal: bool,
 ) -> Ints:  # fmt: skip
-    """(T,) what each row gets, -1 for none; `cardinal`: as many rows as possible shall get something."""
+    """(T,) measurement of each row, -1 for none; `cardinal`: as many rows as possible get one."""
     if cardinal:
         miss = np.full(len(limit), _never(cost, len(limit)))
     else:
@@ -157,7 +161,7 @@ def _assigned(
 
 @njit(cache=CACHE, nogil=True)
 def _never(cost: Floats, rows: int) -> float:
-    """More than any pairs can save."""
+    """A cost larger than anything that a choice of pairs can save."""
     most = 0.0
     for k in range(len(cost)):
         most = max(most, abs(cost[k]))

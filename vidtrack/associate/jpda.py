@@ -12,10 +12,10 @@ from vidtrack.associate.assignment import solve
 from vidtrack.associate.belief import propagate
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.events import Side, exact, frontier, plan, reverse
-from vidtrack.associate.likeliest import likeliest
+from vidtrack.associate.jpda_star import likeliest_events
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Decision, Floats, Ints
+from vidtrack.scan import Decision, Floats, Ints, Mask
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ class JPDA:
     The weight of a track and measurement is the probability of all joint events with that pair: each track takes one
     gated measurement or none, no measurement serves two. A cluster whose exact solution would take more than
     `largest` steps times states gets the weights of loopy belief propagation; the decision marks its rows as
-    approximate, and the log tells.
+    approximate, and the log says so.
 
     largest       bounds the time for a cluster; with 2^16, 12 tracks that share 14 measurements are exact still
     star          JPDA* (Blom and Bloem 2000): of the events that give the same measurements to the same tracks in
@@ -77,7 +77,7 @@ class JPDA:
 @njit(cache=CACHE, nogil=True)
 def _marginals(
     start: Ints, row: Ints, measurement: Ints, factor: Floats, miss: Floats, unused: Floats, largest: int, star: bool
-) -> tuple[Floats, Floats, np.ndarray]:
+) -> tuple[Floats, Floats, Mask]:
     """beta (N,), beta0 (T,) and which rows (T,) are approximate."""
     first, back, pair = reverse(start, measurement, len(unused))
     rows = Side(start, measurement, np.arange(len(measurement)), miss)
@@ -100,7 +100,7 @@ def _marginals(
             continue
         contested = _met(tracks, rows, met)
         if star:
-            solved = likeliest(tracks, contested, rows, columns, place, factor, beta, beta0, largest)
+            solved = likeliest_events(tracks, contested, rows, columns, place, factor, beta, beta0, largest)
         else:
             by_row, row_width = plan(tracks, rows, column_frontier, largest)
             by_column, column_width = plan(contested, columns, row_frontier, largest)
@@ -116,7 +116,7 @@ def _marginals(
 
 
 @njit(cache=CACHE, nogil=True)
-def _met(tracks: Ints, rows: Side, met: np.ndarray) -> Ints:
+def _met(tracks: Ints, rows: Side, met: Mask) -> Ints:
     """The measurements that a cluster's tracks can take, in the order met."""
     found, n = np.empty(rows.start[tracks + 1].sum() - rows.start[tracks].sum(), np.int64), 0
     for t in tracks:

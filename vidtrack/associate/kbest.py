@@ -9,7 +9,7 @@ from numba import njit
 
 from vidtrack.associate.assignment import solve
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
 IMPOSSIBLE, FEASIBLE = 1e12, 1e11
 """Cost of a row that has no choice left, and what everything else stays below."""
@@ -17,8 +17,8 @@ IMPOSSIBLE, FEASIBLE = 1e12, 1e11
 
 @njit(cache=CACHE, nogil=True)
 def k_best(
-    offset: Floats, held: np.ndarray, start: Ints, column: Ints, cost: Floats, alone: Floats, most: int, slack: float
-) -> tuple[Ints, np.ndarray, Floats]:
+    offset: Floats, held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats, most: int, slack: float
+) -> tuple[Ints, Ints, Floats]:
     """The `most` cheapest assignments over all problems, without those costlier than the cheapest by over `slack`.
 
     All problems h have the same rows; row i takes edge k (start[i] <= k < start[i + 1]), that is column[k] at
@@ -87,7 +87,7 @@ def k_best(
 
 @njit(cache=CACHE, nogil=True)
 def _complete(
-    held: np.ndarray, start: Ints, column: Ints, cost: Floats, alone: Floats,
+    held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats,
     depth: int, fixed: Ints, bans: list[int], choice: Ints, gap: Floats,
 ) -> float:  # fmt: skip
     """Best completion of the first `depth` rows of `fixed`; returns its cost, at least IMPOSSIBLE if there is none.

@@ -10,7 +10,7 @@ from numba import njit
 
 from vidtrack.associate.gate import Gate, Pairs
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Floats, Ints, Mask, Scan
 
 VANISHING = 2000.0
 """A factor that is zero in a limit (no clutter; P_D P_G of one) is taken as exp(-2000) or less: against it no
@@ -50,9 +50,10 @@ class Problem:
         label: Ints | None = None,
         angles: tuple[int, ...] = (),
     ) -> Problem:
-        """The problem that a gate leaves of predicted measurements zhat (T, m), cov (T, m, m) and a scan.
+        """The problem of the pairs inside a gate, of predicted measurements zhat (T, m), cov (T, m, m) and a scan.
 
-        run (T,) Monte Carlo runs and label (T,) classes, -1 unknown: a pair has one run, and no two known classes.
+        run (T,) Monte Carlo runs, label (T,) classes, -1 unknown: both sides of a pair are of one run, and of one class
+        where both classes are known. angles: components of z that wrap.
         """
         pairs = gate.pairs(zhat, cov, scan, run, angles)
         if label is not None and scan.label is not None:
@@ -96,7 +97,7 @@ class Problem:
             missed, detection, clutter = np.log(self.missed), np.log(self.detection), np.log(self.clutter)
         return _bounded(missed, detection, clutter, self.pairs.row, self.pairs.log_l)
 
-    def only(self, mask: np.ndarray) -> Problem:
+    def only(self, mask: Mask) -> Problem:
         """The same with the pairs of a mask (N,)."""
         return self.having(self.pairs.only(mask))
 
@@ -107,7 +108,7 @@ class Problem:
         return Problem(pairs, self.scan, self.cov, self.detection, self.clutter, self.inside)
 
     def of(self, rows: Ints) -> Problem:
-        """The same for these rows (K,), each as often as it is named: successors ask what their parents asked."""
+        """The same for these rows (K,), which may repeat: successors have the pairs of their parents."""
         return replace(
             self,
             pairs=self.pairs.of(rows),

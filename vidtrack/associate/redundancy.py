@@ -10,20 +10,20 @@ from numba import njit
 from vidtrack.associate.clusters import find
 from vidtrack.associate.gate import Gate
 from vidtrack.compiled import CACHE
-from vidtrack.estimate.kernels import TURN
+from vidtrack.estimate.sensor import wrapped
 from vidtrack.scan import Floats, Ints, Scan
 
 BLOCK = 256
-"""Measurements compared with all others at a time: heaps of them at one place do not fill the memory."""
+"""Measurements that are compared with all others at a time, which bounds the memory that a heap of them takes."""
 
 
 def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
-    """The scan with the measurements of each target as one, and (M,) which of them each of the old ones is part of.
+    """The scan with the measurements of each target combined, and (M,) the index of each old one's combination.
 
     a and b are of one target if (za - zb)' (Ra + Rb)^-1 (za - zb) is at most the chi-square quantile of
     `probability`, or if a chain of such pairs leads from one to the other. They become z = R sum(Ri^-1 zi) with
-    R = (sum Ri^-1)^-1 (SPEC 001, redundancy elimination), in the box around their boxes, as strong and as sure as the
-    strongest and surest, with the label and the lasting errors of the first. Measurements of different runs stay apart.
+    R = (sum Ri^-1)^-1 (SPEC 001, redundancy elimination), with the box around their boxes, the largest amplitude and
+    score, and the label and lasting errors of the first. Measurements of different runs stay apart.
 
     Raises ConfigError for a probability outside 0..1.
     """
@@ -33,10 +33,10 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
     begin = np.searchsorted(part[order], np.arange(len(leader)))
 
     information = np.linalg.inv(scan.R)
-    away = _wrapped(scan.z - scan.z[leader][part], angles)
+    away = wrapped(scan.z - scan.z[leader][part], angles)
     R = np.linalg.inv(np.add.reduceat(information[order], begin, axis=0))
     pull = np.add.reduceat((information @ away[:, :, None])[order], begin, axis=0)
-    z = _wrapped(scan.z[leader] + (R @ pull)[:, :, 0], angles)
+    z = wrapped(scan.z[leader] + (R @ pull)[:, :, 0], angles)
 
     def strongest(values: Floats | None) -> Floats | None:
         return None if values is None else np.maximum.reduceat(values[order], begin)
@@ -55,8 +55,10 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
 
 
 def linked(scan: Scan, gate: Gate) -> Ints:
-    """(M,) the first of the measurements that each is linked to, by pairs inside a gate or chains of such (single
-    linkage); those of different runs never are."""
+    """(M,) the first measurement of each one's group; groups are linked by pairs inside a gate (single linkage).
+
+    Measurements of different runs are never linked.
+    """
     angles, root = scan.sensor.angles if scan.sensor else (), np.arange(len(scan))
     for first in range(0, len(scan), BLOCK):
         some = slice(first, first + BLOCK)
@@ -73,13 +75,6 @@ def _around(box: Floats, place: Floats, z: Floats, order: Ints, begin: Ints) -> 
     near = np.minimum.reduceat(low[order], begin, axis=0)
     far = np.maximum.reduceat(high[order], begin, axis=0)
     return np.hstack([near - z[:, :2], far - near])
-
-
-def _wrapped(z: Floats, angles: tuple[int, ...]) -> Floats:
-    """The same with its angles in -pi..pi."""
-    turns = np.zeros_like(z)
-    turns[:, list(angles)] = np.round(z[:, list(angles)] / TURN)
-    return z - TURN * turns
 
 
 @njit(cache=CACHE, nogil=True)

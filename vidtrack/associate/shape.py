@@ -10,7 +10,7 @@ from numba import njit
 from vidtrack.associate.gate import Pairs, quantile
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Shape:
 def _compare(
     row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
     sigma: float, overlap: float,
-) -> tuple[Floats, np.ndarray]:  # fmt: skip
+) -> tuple[Floats, Mask]:  # fmt: skip
     """(N,) the pairs' size distances, and which of them stay.
 
     A track without a box yet takes any size; a box of no size fits nothing.

@@ -102,8 +102,7 @@ class PSN:
         """(B,) amplitudes of measurements j that P_D `p_d` of their tracks lets pass; scores in their place."""
         if scan.amplitude is not None:
             return np.maximum(scan.amplitude[j], TINY)
-        assert scan.score is not None, "refused before"
-        weaker = np.clip(scan.score[j], 0.0, MOST)
+        weaker = np.clip(_strength(scan)[j], 0.0, MOST)
         return swerling1(self.snr).threshold(p_d * (1 - weaker))
 
     def _average(self, problem: Problem, row: Ints, threshold: Floats) -> Floats:
@@ -111,11 +110,11 @@ class PSN:
 
         (I_A / P_D - exp(-n)) / (1 - exp(-n)) for n = density times gate volume (paper 002, eqs. 16 to 19).
         """
-        assert problem.scan.noise is not None, "there are measurements"
         p_d, limit = problem.detection[row], problem.pairs.limit[row]
         p_fa = self.clutter.survival(threshold)
         average = np.ones(len(row))
         for i in np.flatnonzero((p_d > 0) & (p_fa > 0) & (problem.clutter[row] > 0) & np.isfinite(limit)):
+            assert problem.scan.noise is not None, "a row has a measurement"
             volume = gate_volume(problem.cov[row[i]] + problem.scan.noise, np.sqrt(limit[i]))
             false = problem.clutter[row[i]] * volume
             alone = Strongest(self.snr, p_fa[i], self.clutter).alone(false / p_fa[i])

@@ -1,4 +1,4 @@
-"""The score of a detection as evidence: what a detector is unsure of may continue a track, but starts none."""
+"""The score of a detection as evidence: detections with a low score may continue a track but start none."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ import numpy as np
 
 from vidtrack.associate.hard import Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Scan
-
-Mask = np.ndarray
+from vidtrack.scan import Decision, Mask, Scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,4 +39,4 @@ class Trust:
 
 
 EQUAL = Trust(-np.inf)
-"""Scores do not count."""
+"""All detections are sure, whatever their scores."""

@@ -61,7 +61,10 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run a command; every error becomes one line and an exit code (0 done, 1 stopped early, 2 usage, 3 input)."""
+    """Run a command; every error becomes one line and an exit code.
+
+    0 done, 1 stopped early, 2 wrong usage, 3 bad input, 130 Ctrl-C, 143 SIGTERM.
+    """
     signal.signal(signal.SIGTERM, terminate)
     try:
         code = cli.main(prog_name="vidtrack", standalone_mode=False)
@@ -74,7 +77,7 @@ def main() -> None:
         code = _complain("interrupted", 130)
     except Terminated:
         code = _complain("terminated", 143)
-    except OSError as error:  # where no part of the program could say more: the disk is full, a folder is read-only
+    except OSError as error:  # a full disk or a read-only folder where no module gave a better message
         place = f" {error.filename}" if error.filename else ""
         code = _complain(f"cannot read or write{place}: {error.strerror or error}", 1)
     sys.exit(code)

@@ -30,19 +30,19 @@ def command(
     config_file: Path | None,
     assignments: tuple[str, ...],
 ) -> None:
-    """Print the effective settings as TOML, ready for --config. Settings taken from the data are commented out.
+    """Print the effective settings as TOML, ready for --config. Settings that are None are commented out.
 
     --seed is accepted for uniformity.
     """
     from vidtrack.config import load
     from vidtrack.explain import as_toml
-    from vidtrack.output.folder import open_run, writing
+    from vidtrack.output.folder import open_folder, writing
 
     start_log(verbose, quiet)
     text = as_toml(load(config_file, assignments), explain=explain)
     if output is None:
         click.echo(text, nl=False)
         return
-    path = open_run(output, "config", force) / "settings.toml"
+    path = open_folder(output, "config", force) / "settings.toml"
     with writing(path):
         path.write_text(text, encoding="utf-8")

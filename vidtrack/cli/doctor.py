@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
-from vidtrack.cli.options import common, settings_options, start_log
+from vidtrack.cli.options import announce_compiling, common, settings_options, start_log
 
 if TYPE_CHECKING:
     from vidtrack.doctor.advice import Advice
@@ -53,23 +53,21 @@ def command(
     """Look at SOURCE for some seconds: a video, an image folder or glob, a MOT det.txt, a camera or a stream.
 
     Measures rate, light, noise, flicker, shake, what moves, and whether this machine keeps up; says what will hurt a
-    run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it cannot be opened.
+    run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it gives no pictures.
     """
     from vidtrack.cli.hide import hide_arguments
-    from vidtrack.compiled import first_run
     from vidtrack.config import load
     from vidtrack.doctor.examine import examine
     from vidtrack.doctor.judge import judge
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.video.live.address import secrets
 
     hide_arguments(secrets(source))
     start_log(verbose, quiet=not verbose)  # what is worth a warning is among the advice
     given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
     settings = load(config_file, [*assignments, *given])
-    if first_run() and not quiet:
-        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
-    folder = None if output is None else open_run(output, "doctor", force)
+    announce_compiling(quiet)
+    folder = None if output is None else open_folder(output, "doctor", force)
     findings = examine(source, settings, seconds)
     advice = judge(findings, settings)
     if deliver(_content(findings, advice), json_to, folder and folder / "doctor.json", quiet):

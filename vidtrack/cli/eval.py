@@ -105,10 +105,10 @@ def command(
     the tracks table gives the consistency of the covariances (NIS, NEES). --seed is accepted for uniformity.
     """
     from vidtrack import formats, score
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
 
     start_log(verbose, quiet)
-    folder = None if output is None else open_run(output, "eval", force)
+    folder = None if output is None else open_folder(output, "eval", force)
     found = formats.read(result)
     states = formats.read_states(result) if result.is_dir() else None
     scores = score.evaluate(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vidtrack.cli.options import common, settings_options, start_log
+from vidtrack.cli.options import announce_compiling, common, settings_options, start_log
 from vidtrack.cli.tracking import chosen_settings, tracking_options
 
 if TYPE_CHECKING:
@@ -85,7 +85,6 @@ def command(
     try:
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_many import are_many, track_many
-        from vidtrack.compiled import first_run
         from vidtrack.config import load
         from vidtrack.live.outputs import Extras
         from vidtrack.video.live.address import secrets
@@ -95,8 +94,7 @@ def command(
         start_log(verbose, quiet)
         given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
         settings = load(config_file, given)
-        if first_run() and not quiet:
-            click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+        announce_compiling(quiet)
         extras = Extras(rerun, video, save_masks, decisions, state, record)
         with _page(http, http_token) as page:
             if page is not None and not quiet:

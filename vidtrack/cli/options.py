@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -47,11 +48,20 @@ def start_log(verbose: int, quiet: bool, who: str = "") -> None:
     logger = logging.getLogger("vidtrack")
     handler.setLevel(level)
     logger.handlers = [handler]
+    os.environ.setdefault("RUST_LOG", "off")  # rerun's log: what matters in it reaches the user as our own error
     logger.setLevel(min(level, logging.WARNING))
 
 
+def announce_compiling(quiet: bool) -> None:
+    """Say why the first run takes longer, before it does."""
+    from vidtrack.compiled import first_run
+
+    if not quiet and first_run():
+        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+
+
 def _recording(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
-    """Where --rerun records to; a slip of the pen in "spawn" is no file."""
+    """Check the value of --rerun: a misspelt "spawn" must not become the name of a file."""
     if value is None or value in ("spawn", "serve") or value.endswith(".rrd"):
         return value
     raise click.BadParameter(f"{value!r} is not FILE.rrd, spawn or serve.")

@@ -71,11 +71,11 @@ def command(
     """
     from vidtrack.cli.radar_problem import db_to_linear
     from vidtrack.detection.amplitude import RAYLEIGH
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.radar.forecast import forecast, trial
 
     start_log(verbose, quiet)
-    folder = None if output is None else open_run(output, "predict", force)
+    folder = None if output is None else open_folder(output, "predict", force)
     outlook = forecast(kind, db_to_linear(snr_db), pfa, weibull or RAYLEIGH, q, gate, cell, scans)
     tried = None if runs is None else trial(outlook, runs, seed)
     if folder is not None:

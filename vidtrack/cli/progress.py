@@ -1,10 +1,12 @@
-"""Progress of a run: a bar with rate and remaining time on a terminal, a plain line now and then otherwise."""
+"""Progress of a run, a bar on a terminal and a plain line now and then otherwise, and what came of it."""
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import TypeVar
 
 import click
@@ -55,3 +57,15 @@ def _lines(items: Iterable[Item], expected: int | None, name: str, unit: str) ->
             click.echo(f"{name}: {unit} {done}{of}, {done / (now - began):.0f} {unit}s/s", err=True)
             told = now
     click.echo(f"{name}: {done} {unit}s in {time.monotonic() - began:.1f} s", err=True)
+
+
+def tell_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
+    """Say on stderr how many tracks and crossings a finished run found; `none` is said where there are no tracks."""
+    if quiet:
+        return
+    from vidtrack.output.draw import counted
+
+    summary = json.loads((folder / "summary.json").read_text())
+    tracks = summary["tracks"]
+    found = f"{tracks} track{'s' * (tracks != 1)}" if tracks else none
+    click.echo("; ".join([found, *(counted(line, ways) for line, ways in summary["counts"].items())]), err=True)

@@ -7,7 +7,23 @@ from typing import Any
 
 import click
 
-from vidtrack.cli.options import association_options, common, settings_options, smooth_option, start_log
+from vidtrack.cli.options import (
+    announce_compiling,
+    association_options,
+    common,
+    settings_options,
+    smooth_option,
+    start_log,
+)
+
+_SETTING = {
+    "method": "tracker.method",
+    "distance": "tracker.distance",
+    "estimator": "radar.estimator",
+    "model": "radar.model",
+    "skip_bad_rows": "radar.skip_bad_rows",
+    "smooth": "output.smooth",
+}
 
 
 @click.command(
@@ -53,17 +69,15 @@ def command(
     y north, z up. The results' folder is printed; it holds tracks.csv, tracks.parquet, summary.json and tracks.png.
     Ctrl-C ends with complete results up to then.
     """
-    from vidtrack.cli.progress import progress
+    from vidtrack.cli.progress import progress, tell_outcome
     from vidtrack.cli.signals import Terminated, stoppable
-    from vidtrack.compiled import first_run
     from vidtrack.config import load
     from vidtrack.radar_run import RadarRun
 
     start_log(verbose, quiet)
     given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
     settings = load(config_file, [*assignments, *given])
-    if first_run() and not quiet:
-        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+    announce_compiling(quiet)
     with RadarRun(plots, settings, output, force=force, rerun=rerun, decisions=decisions, seed=seed) as run:
         try:
             for _ in stoppable(progress(run, run.scans, run.name, quiet, unit="scan")):
@@ -71,14 +85,5 @@ def command(
         except (KeyboardInterrupt, Terminated):
             click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
             raise
+    tell_outcome(run.folder, quiet)
     click.echo(run.folder)
-
-
-_SETTING = {
-    "method": "tracker.method",
-    "distance": "tracker.distance",
-    "estimator": "radar.estimator",
-    "model": "radar.model",
-    "skip_bad_rows": "radar.skip_bad_rows",
-    "smooth": "output.smooth",
-}

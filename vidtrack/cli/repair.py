@@ -33,17 +33,21 @@ def command(
     A killed run stays marked as interrupted in summary.json. A finished run is left as it is. Of a live run in
     parts, every part is repaired. --seed is accepted for uniformity.
     """
-    from shutil import copytree
+    from shutil import Error, copytree
 
+    from vidtrack.errors import StoppedEarly
     from vidtrack.live.keep import parts_of
-    from vidtrack.output.folder import open_run, writing
+    from vidtrack.output.folder import open_run, spare
     from vidtrack.output.repair import repair
 
     start_log(verbose, quiet)
     if output is not None and folder.is_dir():
+        spare(folder, output)
         copy = open_run(output, "repair", force)
-        with writing(copy):
+        try:
             copytree(folder, copy, dirs_exist_ok=True)
+        except Error as error:  # of all files that were not copied
+            raise StoppedEarly(f"cannot copy {folder} to {copy}: {error.args[0][0][-1]}") from None
         folder = copy
     for part in parts_of(folder) or [folder]:
         rows = repair(part)

@@ -35,7 +35,7 @@ def command(
 
     Each writes NAME.png and NAME.csv and prints in one sentence what came out.
     """
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.papers.registry import choose
 
     start_log(verbose, quiet)
@@ -45,7 +45,7 @@ def command(
         for name, experiment in chosen.items():
             click.echo(f"{name:{width}}  {experiment.title}")
         return
-    folder = open_run(output or Path("reproduced"), "reproduced", force or output is None)
+    folder = open_folder(output or Path("reproduced"), "reproduced", force or output is None)
     for name, experiment in chosen.items():
         if not quiet:
             click.echo(f"{name} ...", err=True)

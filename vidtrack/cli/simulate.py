@@ -89,11 +89,11 @@ def command(
 def _draw_video(
     scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, options: dict[str, Any]
 ) -> None:
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.simulate import simulate, write
 
     clip = simulate(scenario, seed=seed, **options)
-    folder = open_run(output, scenario, force)
+    folder = open_folder(output, scenario, force)
     with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=quiet) as frames:
         write(clip, folder, frames)
 
@@ -109,12 +109,12 @@ def _draw_plots(
     weibull: Weibull | None,
     glint: float | None,
 ) -> None:
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.simulate.radar_scenarios import simulate_radar
     from vidtrack.simulate.radar_write import write_radar
 
     seen = simulate_radar(scenario, seed, snr_db=snr_db, p_fa=pfa, clutter=weibull, glint=glint)
-    write_radar(seen, open_run(output, scenario, force))
+    write_radar(seen, open_folder(output, scenario, force))
 
 
 def _refuse_options_of(other_kind: tuple[str, ...], scenario: str) -> None:

@@ -71,12 +71,12 @@ def command(
     from vidtrack.cli.radar_problem import db_to_linear
     from vidtrack.detection.amplitude import RAYLEIGH
     from vidtrack.errors import ConfigError
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.radar.prediction import normalised
     from vidtrack.radar.psn_threshold import best_psn_threshold
 
     start_log(verbose, quiet)
-    folder = None if output is None else open_run(output, "threshold", force)
+    folder = None if output is None else open_folder(output, "threshold", force)
     snr = db_to_linear(snr_db)
     if not 0 < pfa_max <= 1:
         raise ConfigError(f"--pfa-max is {pfa_max}; it must lie above 0 and up to 1")

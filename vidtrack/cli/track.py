@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vidtrack.cli.options import common, settings_options, smooth_option, start_log
+from vidtrack.cli.options import announce_compiling, common, settings_options, smooth_option, start_log
 from vidtrack.cli.tracking import chosen_settings, tracking_options
 
 
@@ -46,9 +46,8 @@ def command(
     tracks.png. Ctrl-C ends with complete results up to then. --seed is accepted for uniformity:
     tracking draws no random numbers.
     """
-    from vidtrack.cli.progress import progress
+    from vidtrack.cli.progress import progress, tell_outcome
     from vidtrack.cli.signals import Terminated, stoppable
-    from vidtrack.compiled import first_run
     from vidtrack.config import load
     from vidtrack.run import Run
     from vidtrack.video.recording import is_recording, recorded_settings
@@ -56,8 +55,7 @@ def command(
     start_log(verbose, quiet)
     base = recorded_settings(source) if is_recording(source) else None
     settings = load(config_file, [*assignments, *chosen_settings(chosen)], base)
-    if first_run() and not quiet:
-        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+    announce_compiling(quiet)
     with Run(
         source, settings, output, force=force, rerun=rerun, video=video, masks=save_masks, decisions=decisions
     ) as run:
@@ -67,4 +65,5 @@ def command(
         except (KeyboardInterrupt, Terminated):
             click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
             raise
+    tell_outcome(run.folder, quiet, "no tracks; vidtrack doctor SOURCE may say why")
     click.echo(run.folder)

@@ -12,18 +12,36 @@ from vidtrack.cli.options import association_options
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+
+def _mp4(_context: click.Context, _option: click.Parameter, value: Path | None) -> Path | None:
+    """Check the value of --video: players take a file for what its name says."""
+    if value is None or value.suffix.lower() == ".mp4":
+        return value
+    raise click.BadParameter(f"the annotated video is an MP4; name it {value.with_suffix('.mp4')}, not {value}.")
+
+
 _OPTIONS = (
     click.option(
         "--detector",
         type=click.Choice(["disturbance", "paper", "mog2", "knn"]),
         help="How vehicles are told from the scene.  [default: disturbance]",
     ),
-    click.option("--video", type=click.Path(path_type=Path), metavar="FILE.mp4", help="Write an annotated video."),
+    click.option(
+        "--video",
+        type=click.Path(path_type=Path),
+        metavar="FILE.mp4",
+        callback=_mp4,
+        help="Write an annotated video.",
+    ),
     click.option(
         "--save-masks", type=click.Path(path_type=Path), metavar="DIR", help="Write each frame's mask as PNG."
     ),
     click.option(
-        "--line", "lines", multiple=True, metavar="NAME:x1,y1,x2,y2", help="Count over a line; repeat for more."
+        "--line",
+        "lines",
+        multiple=True,
+        metavar="NAME:x1,y1,x2,y2",
+        help="Count over a line, in pixels; repeat for more.",
     ),
     click.option("--start", type=float, metavar="S", help="Begin at this time [s]."),
     click.option("--end", type=float, metavar="S", help="Stop at this time [s]."),

@@ -38,20 +38,20 @@ def command(
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
     while tracking, with --rerun. --seed is accepted for uniformity.
     """
+    start_log(verbose, quiet)  # before rerun, which starts its own log
     from contextlib import ExitStack, closing
 
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
-    from vidtrack.output.folder import open_run
+    from vidtrack.output.folder import open_folder
     from vidtrack.output.rerun import RerunSink
     from vidtrack.output.rerun_radar import RadarRerun
     from vidtrack.traffic.lines import parse_lines
     from vidtrack.video.source import open_source
 
-    start_log(verbose, quiet)
     finished = replay.read_run(run)
     if output is not None and save is None:
-        save = str(open_run(output, "view", force) / "view.rrd")
+        save = str(open_folder(output, "view", force) / "view.rrd")
     if finished.shape is None:
         with closing(RadarRerun(save or "spawn", finished.settings)) as radar:
             for step in replay.steps(finished):

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from vidtrack.detection.reduction import KE_DIM, KE_GATE, gate_volume, q2
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 
 LEAST_LOG_P_FA = -40.0
 """The optimum is sought down to P_F = exp(-40)."""
@@ -24,7 +24,7 @@ KE_LEAST_SNR = 1.57
 """Up to this linear SNR (1.96 dB) the fit's q2 has no maximum below P_F = 1; exact q2 can have one."""
 
 
-def closed_form(snr: ArrayLike, cells: ArrayLike, p_fa_max: float = 1.0) -> tuple[Floats, np.ndarray]:
+def closed_form(snr: ArrayLike, cells: ArrayLike, p_fa_max: float = 1.0) -> tuple[Floats, Mask]:
     """P_F* = [0.37 n (SNR - 1.57)]^(-(1 + SNR) / (SNR - 0.57)), and whether it was clamped (paper 000, eq. 25).
 
     snr, cells (n) broadcast. Where SNR <= 1.57, or the formula gives p_fa_max or more, the fit's q2 grows with P_F

@@ -1,4 +1,4 @@
-"""Looks at a source for some seconds and measures what a tracker will meet. The page to read first here."""
+"""Looks at a source for some seconds and measures what a tracker will meet. Read this file first in `doctor`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from vidtrack.config import Settings
 from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.objects import ObjectMeter, finer
 from vidtrack.doctor.opening import is_live, looked_at, open_pictures
+from vidtrack.errors import SourceError
 from vidtrack.pipeline import build_detector, build_tracker, video_steps
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video.detections import is_detections, open_detections
@@ -27,6 +28,7 @@ from vidtrack.video.quality.timing import timing
 from vidtrack.video.stats import SourceStats
 
 _PATIENCE = 6.0  # times the seconds asked for: pictures may be large and the machine slow
+_QUIET = 2.0  # time-outs without a picture: one to give it up, one to connect again
 _BLOCKS_EVERY = 25  # frames
 
 
@@ -34,23 +36,26 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
     """What `seconds` of a source are like.
 
     A live source is only read for half of the time, for its pace, and watched for the other half; a file is read
-    first and watched then. Raises SourceError if it cannot be opened or yields nothing, FormatError for a bad line
-    of detections.
+    first and watched then. Raises SourceError if it cannot be opened, yields nothing or falls silent before it is
+    watched, FormatError for a bad line of detections.
     """
     if is_detections(source):
         return _of_detections(source, settings)
     live = is_live(source)
     span = seconds / 2 if live else seconds
+    patience_s, quiet_s = _PATIENCE * seconds, _QUIET * settings.live.timeout_s
     with ExitStack() as stack:
         opened = stack.enter_context(closing(open_pictures(source, settings)))
         began = perf_counter()
-        times = np.array([frame.time_s for frame in looked_at(opened, span, _PATIENCE * seconds)])
+        times = np.array([frame.time_s for frame in looked_at(opened, span, patience_s, quiet_s)])
         decode_s = None if live else (perf_counter() - began) / len(times)
-        reception = _reception(opened.stats)
+        stats, dropped = opened.stats, opened.stats.frames_dropped
         if not live:
             opened = stack.enter_context(closing(open_pictures(source, settings)))
         watch = Watch(settings, (opened.height, opened.width))
-        watch.all(looked_at(opened, span, _PATIENCE * seconds))
+        watch.all(looked_at(opened, span, patience_s, quiet_s))
+    if not watch.track_s:
+        raise SourceError(f"{redact(source)} gave pictures, and then nothing for {quiet_s:g} s; look at the network")
     pace = timing(times, watch.samples.repeats) if len(times) > 1 else None
     return Findings(
         source=redact(source),
@@ -58,7 +63,7 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
         width=opened.width,
         height=opened.height,
         fps=opened.fps,
-        reception=reception,
+        reception=_reception(stats, dropped),
         timing=pace,
         light=light(watch.samples),
         flicker=flicker(watch.samples, pace.rate if pace else opened.fps),
@@ -97,7 +102,7 @@ class Watch:
             self.objects.take(step)
             self.samples.take(frame)
             self.shake.take(frame)
-            if frame.index % _BLOCKS_EVERY == 0:
+            if len(self.track_s) % _BLOCKS_EVERY == 1:  # the first one, however few there are
                 self.blockiness.append(blockiness(frame.y))
             yield frame
 
@@ -105,16 +110,17 @@ class Watch:
         return build_tracker(settings.tracker, self._bounds)
 
 
-def _reception(stats: SourceStats) -> Reception:
+def _reception(stats: SourceStats, dropped: int = 0) -> Reception:
     live = stats if isinstance(stats, LiveStats) else LiveStats()
     return Reception(
         header_fps=stats.header_fps,
         fps_assumed=stats.fps_assumed,
         truncated=stats.truncated,
         decode_errors=stats.decode_errors,
-        dropped=stats.frames_dropped,
+        dropped=dropped,
         reconnects=live.reconnects,
         stalls=live.stalls,
+        gone=live is stats and live.state != "running",
     )
 
 

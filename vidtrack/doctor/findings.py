@@ -20,6 +20,7 @@ class Reception:
     decode_errors  damaged pictures
     dropped        pictures that came too fast to be decoded
     reconnects, stalls   of a live source
+    gone           it was not there any more at the end
     """
 
     header_fps: float | None
@@ -29,6 +30,7 @@ class Reception:
     dropped: int = 0
     reconnects: int = 0
     stalls: int = 0
+    gone: bool = False
 
 
 @dataclass(frozen=True, slots=True)

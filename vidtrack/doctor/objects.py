@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vidtrack.config import BlobSettings, Settings
 from vidtrack.doctor.findings import Objects
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE, Floats
+from vidtrack.scan import TENTATIVE, Floats, Mask
 from vidtrack.tracking.boxes import best_cover, longer, widened
 from vidtrack.video.background.picture import reduction
 from vidtrack.video.blobs import find_blobs
@@ -109,7 +109,7 @@ class ObjectMeter:
             restless_box=box,
         )
 
-    def _collect(self, step: Step, among: NDArray[np.bool_], sizes: dict[int, list[float]]) -> None:
+    def _collect(self, step: Step, among: Mask, sizes: dict[int, list[float]]) -> None:
         """Sizes of those confirmed tracks, among (T,), that went somewhere."""
         tracks = step.tracks
         size = longer(tracks.box)
@@ -129,7 +129,7 @@ class ObjectMeter:
         return float((often > 0).mean()), (left, top, width, height)
 
 
-def _covered(step: Step, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def _covered(step: Step, shape: tuple[int, int]) -> Mask:
     """(h, w) the boxes of confirmed tracks, with a margin."""
     assert step.foreground is not None
     boxes = widened(step.tracks.box[step.tracks.status != TENTATIVE], _MARGIN) / step.foreground.step

@@ -39,9 +39,10 @@ def _on_reception(findings: Findings) -> Iterator[Advice]:
     if lost.decode_errors:
         text = f"{lost.decode_errors} pictures were damaged; on a live source use TCP or a better line"
         yield Advice("damage", True, text)
-    if lost.reconnects or lost.stalls:
-        text = f"the connection was lost {lost.reconnects} times and stalled {lost.stalls} times while it was watched"
-        yield Advice("connection", True, f"{text}: tracks end in a long gap; look at the network")
+    if lost.reconnects or lost.stalls or lost.gone:
+        text = f"the connection stalled {lost.stalls} times and was made anew {lost.reconnects} times"
+        end = ", and nothing came at the end" if lost.gone else ""
+        yield Advice("connection", True, f"{text}{end}: tracks end in a long gap; look at the network")
     if lost.dropped:
         text = f"{lost.dropped} pictures came faster than this machine decodes them"
         yield Advice("decoding", True, f"{text}: let the camera send a smaller picture, or fewer of them")

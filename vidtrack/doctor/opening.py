@@ -28,10 +28,16 @@ def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Reco
     return open_source(source, settings.source)
 
 
-def looked_at(frames: Source | LiveSource | Recording, seconds: float, patience_s: float) -> Iterator[Frame]:
-    """The frames of so many seconds: of the source's own time, and not after `patience_s` by the clock."""
+def looked_at(
+    frames: Source | LiveSource | Recording, seconds: float, patience_s: float, quiet_s: float
+) -> Iterator[Frame]:
+    """The frames of so many seconds of the source's own time.
+
+    Ends early after `patience_s` by the clock, or when a live source gives nothing for `quiet_s`.
+    """
     began_s: float | None = None
-    until_s = monotonic() + patience_s
+    heard_s = monotonic()
+    until_s = heard_s + patience_s
     for frame in frames:
         if frame is not None:
             if began_s is None:
@@ -39,5 +45,6 @@ def looked_at(frames: Source | LiveSource | Recording, seconds: float, patience_
             if frame.time_s - began_s >= seconds:
                 return
             yield frame
-        if monotonic() > until_s:
+            heard_s = monotonic()
+        if monotonic() > min(until_s, heard_s + quiet_s):
             return

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import Columns, at_rest
+from vidtrack.estimate.model import Columns, at_rest, check
 from vidtrack.scan import Floats, Ints
 
 LONG = 10.0
@@ -33,7 +32,7 @@ class ConstantAcceleration(Columns):
     per_size: bool = False
 
     def __post_init__(self) -> None:
-        _check(self, "change", "hold_s", "speed", "accel")
+        check(self, (1, 2, 3), "change", "hold_s", "speed", "accel")
 
     @property
     def states(self) -> int:
@@ -80,7 +79,7 @@ class Singer(Columns):
     per_size: bool = False
 
     def __post_init__(self) -> None:
-        _check(self, "accel", "hold_s", "speed")
+        check(self, (1, 2, 3), "accel", "hold_s", "speed")
 
     @property
     def states(self) -> int:
@@ -128,14 +127,3 @@ def _each_axis(M: Floats, dim: int) -> Floats:
 def _priors(dim: int, speed: float, accel: float) -> Floats:
     """(1, n) standard deviations of what one measurement does not tell."""
     return np.array([[speed] * (2 * dim) + [accel] * dim])
-
-
-def _check(model: ConstantAcceleration | Singer, *names: str) -> None:
-    """Raise ConfigError for a model that cannot be."""
-    kind = type(model).__name__
-    if model.dim not in (1, 2, 3):
-        raise ConfigError(f"{kind}: dim is {model.dim}; it must be 1, 2 or 3")
-    for name in names:
-        value = getattr(model, name)
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise ConfigError(f"{kind}: {name} is {value}; it must be above zero")

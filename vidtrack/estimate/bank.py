@@ -1,4 +1,4 @@
-"""What an estimator owes the tracker: one filter a row, all rows as arrays."""
+"""The interface of an estimator: one filter per row, all rows as arrays."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from vidtrack.estimate.model import Motion
 from vidtrack.estimate.particle import NO_GLINT, Glint, ParticleBank
 from vidtrack.estimate.particle_kernels import copy, normalise
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Decision, Floats, Ints, Mask, Scan
 
 
 class ErrorSignalBank(ParticleBank):
@@ -66,7 +66,7 @@ class ErrorSignalBank(ParticleBank):
 
 @njit(cache=CACHE, nogil=True)
 def keep_near(
-    z: Floats, limit: Floats, wraps: np.ndarray, seen: Floats, x: Floats, parent: Ints, start: Ints,
+    z: Floats, limit: Floats, wraps: Mask, seen: Floats, x: Floats, parent: Ints, start: Ints,
     measurement: Ints, log_weight: Floats, new: Floats,
 ) -> Ints:  # fmt: skip
     """Survivors of each row (K,); new (K, N, n) particles and log_weight (K, N), normalised.
@@ -96,7 +96,7 @@ def keep_near(
 
 
 @njit(cache=CACHE, nogil=True)
-def cycle(near: np.ndarray, chosen: Ints) -> int:
+def cycle(near: Mask, chosen: Ints) -> int:
     """Indices of the near (N,) particles in their order, over and over until chosen (N,) is full; how many are near.
 
     With none, chosen stays as it is. The fill loop printed in fig. 3 begins one too early and would lose the last one.
@@ -113,7 +113,7 @@ def cycle(near: np.ndarray, chosen: Ints) -> int:
 
 
 @njit(cache=CACHE, nogil=True)
-def _within(z: Floats, seen: Floats, limit: Floats, wraps: np.ndarray) -> bool:
+def _within(z: Floats, seen: Floats, limit: Floats, wraps: Mask) -> bool:
     for a in range(len(z)):
         error = z[a] - seen[a]
         if wraps[a]:

@@ -1,4 +1,4 @@
-"""Alpha-beta and alpha-beta-gamma filters: Kalman filters whose gain has settled once and for all."""
+"""Alpha-beta and alpha-beta-gamma filters: Kalman filters with the gain of their steady state."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vidtrack.estimate.sensor import Sensor
 from vidtrack.scan import Decision, Floats, Scan
 
 START = 3
-"""Updates for which a new row runs as a Kalman filter: until then its position and velocity are hardly known."""
+"""Updates for which a new row runs as a Kalman filter, because its velocity is hardly known at first."""
 
 
 class FixedGainBank(KalmanBank):

@@ -1,4 +1,4 @@
-"""What a motion model owes the estimators."""
+"""The interface of a motion model."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
+from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints
 
 
 class Motion(Protocol):
-    """How a state moves and how uncertain it grows while nobody looks.
+    """How a state moves, and how its uncertainty grows between measurements.
 
     Every model's state begins with [x, vx, y, vy, ...]; what else it holds (accelerations, a turn rate) follows.
 
@@ -65,6 +66,18 @@ class Columns:
     def velocity(self) -> tuple[int, ...]:
         """Columns of the state that are velocities."""
         return tuple(range(1, 2 * self.dim, 2))
+
+
+def check(model: Columns, dims: tuple[int, ...], *names: str) -> None:
+    """Raise ConfigError if the model's `dim` is not among dims, or a named value is given and not above zero."""
+    kind = type(model).__name__
+    if model.dim not in dims:
+        allowed = ", ".join(map(str, dims[:-1]))
+        raise ConfigError(f"{kind}: dim is {model.dim}; it must be {allowed} or {dims[-1]}")
+    for name in names:
+        value = getattr(model, name)
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise ConfigError(f"{kind}: {name} is {value}; it must be above zero")
 
 
 def at_rest(position: Floats, cov: Floats, sigma: Floats) -> tuple[Floats, Floats]:

@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 
 from vidtrack.compiled import CACHE
-from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import Columns, at_rest
+from vidtrack.estimate.model import Columns, at_rest, check
 from vidtrack.scan import Floats, Ints
 
 
@@ -39,12 +38,7 @@ class ConstantVelocity(Columns):
     per_size: bool = False
 
     def __post_init__(self) -> None:
-        if self.dim not in (1, 2, 3):
-            raise ConfigError(f"ConstantVelocity: dim is {self.dim}; it must be 1, 2 or 3")
-        for name in ("accel", "cross", "speed", "hold_s"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise ConfigError(f"ConstantVelocity: {name} is {value}; it must be above zero")
+        check(self, (1, 2, 3), "accel", "cross", "speed", "hold_s")
 
     @property
     def states(self) -> int:

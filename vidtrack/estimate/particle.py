@@ -15,7 +15,7 @@ from vidtrack.estimate.sensor import Sensor, wrapped
 from vidtrack.scan import Decision, Floats, Ints, Scan
 
 PART = 50_000
-"""Particles that are worth a thread of their own."""
+"""Particles in a part: enough that a thread of its own pays."""
 
 
 class Glint(NamedTuple):
@@ -32,10 +32,10 @@ class ParticleBank:
     """Particle filters in rows, with the motion model as proposal (Gordon, Salmond and Smith 1993).
 
     number      N, particles a row
-    resampling  how particles are chosen anew; see `Resampling`
-    threshold   they are, as soon as the effective number 1 / sum of w^2 is below this share of N
+    resampling  how particles are resampled; see `Resampling`
+    threshold   they are when the effective number 1 / sum of w^2 falls below this share of N
     glint       the measurements' errors, where they are not normal
-    seed        everything random follows from it, however many threads there are
+    seed        of all random numbers, which do not depend on the number of threads
 
     particles (T, N, n), log_weight (T, N), the weights of a row summing to one; hits (T,) updates so far; scale (T,)
     size of each object where the model works per size, one elsewhere. What a miss tells (inflation) is not used: the

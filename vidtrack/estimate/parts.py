@@ -1,4 +1,4 @@
-"""Rows of a bank shared out among the processors."""
+"""Rows of a bank processed in parallel."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 
 def in_parts(rows: int, size: int, work: Callable[[slice], None]) -> None:
-    """Call work for parts of `size` rows that cover all, in threads if there are several; kernels free the interpreter.
+    """Call work on slices of `size` rows that cover all rows, in threads if there are several slices.
 
-    The parts do not depend on the number of threads, and neither must what the work does.
+    Kernels release the interpreter's lock. The slices do not depend on the number of threads; results must not either.
     """
     parts = [slice(first, min(first + size, rows)) for first in range(0, rows, size)]
     if len(parts) < 2:

@@ -55,12 +55,12 @@ POSITION = Position()
 
 @lru_cache
 def _selection(columns: tuple[int, ...], n: int) -> Floats:
-    """(1, d, n) the matrix that picks these columns of n; nobody may write into it, or all would see that."""
+    """(1, d, n) the matrix that picks these columns of n; it is cached, so do not write into it."""
     return np.eye(n)[None, list(columns)]
 
 
 def wrapped(difference: Floats, angles: tuple[int, ...]) -> Floats:
-    """(N, m) differences of measurements with their angles taken the short way round, in -pi..pi."""
+    """The differences (N, m) of measurements, changed in place so that their angles lie in -pi..pi."""
     for a in angles:
         difference[:, a] -= 2 * np.pi * np.round(difference[:, a] / (2 * np.pi))
     return difference

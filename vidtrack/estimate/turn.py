@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import Columns, at_rest
+from vidtrack.estimate.model import Columns, at_rest, check
 from vidtrack.scan import Floats, Ints
 
 STRAIGHT = 1e-4
@@ -36,12 +35,7 @@ class CoordinatedTurn(Columns):
     per_size: bool = False
 
     def __post_init__(self) -> None:
-        if self.dim not in (2, 3):
-            raise ConfigError(f"CoordinatedTurn: dim is {self.dim}; it must be 2 or 3")
-        for name in ("accel", "turn", "speed", "turn_rate"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ConfigError(f"CoordinatedTurn: {name} is {value}; it must be above zero")
+        check(self, (2, 3), "accel", "turn", "speed", "turn_rate", "hold_s")
 
     @property
     def states(self) -> int:

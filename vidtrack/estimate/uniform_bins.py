@@ -1,4 +1,4 @@
-"""The particle filter of paper 003, table 1: each scan for itself, uniform particles in the bin of the measurement."""
+"""The particle filter of paper 003, table 1: uniform particles in the bin of the measurement, each scan by itself."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from vidtrack.estimate.sensor import Sensor
 from vidtrack.scan import Decision, Floats, Scan
 
 RANGE_M = (10e3, 30e3, 50e3, 70e3, 100e3)
-AZIMUTH_DEG = (0.0, 90.0, 180.0, 270.0, 360.0)
-ELEVATION_DEG = (-3.0, 25.0, 50.0, 75.0, 90.0)
-"""Edges of the bins of paper 003, table 1, where the labels of azimuth and elevation are swapped."""
+"""m; edges of the range bins of paper 003, table 1."""
 
 
 class UniformBinsBank(KalmanBank):
-    """Filters in rows that forget: N uniform particles in the bin that holds the measurement, weighed by it.
+    """Filters in rows without a memory: N uniform particles in the bin of the measurement, weighed by it.
 
     The literal reading of paper 003, table 1. The particles stand for one component of one measurement; their mean and
     variance take the measurement's place, and nothing of the past is used but for the rows' association: a row's

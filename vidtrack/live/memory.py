@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Thread
 from time import monotonic
 
+from vidtrack.errors import OutputError
 from vidtrack.output.folder import usable
 from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
@@ -74,7 +75,8 @@ class StateFile(NoStateFile):
     found  what an earlier run left; None without one
     lost   times that it could not be saved
 
-    Raises FormatError for a file that is no saved state, OutputError for a place where it cannot be saved.
+    Raises FormatError for a file that is no saved state, OutputError for a place where it cannot be saved; the first
+    `offer` raises that too.
     """
 
     def __init__(self, path: Path) -> None:
@@ -94,8 +96,8 @@ class StateFile(NoStateFile):
             return
         self._reserved = next_id + _BLOCK
         state = memory.gather() | {_NEXT_ID: self._reserved, _FRAME: memory.frame + _BLOCK}
-        if self._writing is None:  # nothing is reserved yet
-            self._write(state)
+        if self._writing is None:
+            self._reserve(state)
         self._writing = Thread(target=self._write, args=(state,), name="save-state", daemon=True)
         self._writing.start()
 
@@ -108,6 +110,14 @@ class StateFile(NoStateFile):
             self._writing.join(max(0.0, until_s - monotonic()))
         if memory is not None:
             self._write(memory.gather())
+
+    def _reserve(self, state: State) -> None:
+        """The first save: before it is on the disk, no number may be used."""
+        try:
+            write_state(self.path, state)
+        except OSError as error:
+            why = error.strerror or error
+            raise OutputError(f"cannot save the state in {self.path}: {why}; choose another file for --state") from None
 
     def _write(self, state: State) -> None:
         try:

@@ -26,6 +26,7 @@ from vidtrack.video.recording import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VID
 log = logging.getLogger(__name__)
 
 _RETRY_S = 5.0  # after a failed write
+_TELL_S = 60.0  # a loss that lasts is told so often
 _NOWHERE: Place = (-1, 0)
 
 
@@ -69,6 +70,7 @@ class Recorder(NoRecorder):
         self._part = 0
         self._period = 0
         self._retry_s = 0.0
+        self._told_s = -_TELL_S
         self._logged = _NOWHERE[0]
         self._to_write: deque[tuple[int, State | str]] = deque()
         self._list: LineFile | None = None
@@ -160,8 +162,11 @@ class Recorder(NoRecorder):
         self.hang_up()
         folder = self._folders.get(self._part)
         if folder is not None and not (folder / FRAMES).exists():  # nothing of it can be repeated
+            del self._folders[self._part]
             shutil.rmtree(folder, ignore_errors=True)
-        log.warning("recording pauses: %s; tracking goes on", why)
+        if monotonic() - self._told_s > _TELL_S:
+            self._told_s = monotonic()
+            log.warning("recording pauses: %s; tracking goes on", why)
 
     def _end_list(self) -> None:
         ended, self._list = self._list, None
@@ -179,7 +184,9 @@ class Recorder(NoRecorder):
 
     def _begin_list(self, part: int, state: State) -> None:
         self._end_list()
-        folder = self._folders[part]
+        folder = self._folders.get(part)
+        if folder is None:  # the disk refused its pictures
+            return
         with writing(folder):
             write_state(folder / STATE, state)
         self._list = LineFile(folder / FRAMES, FRAMES_HEADER)

@@ -1,4 +1,4 @@
-"""A live run: a camera tracked into a folder of results until it is told to stop. The page to read first here."""
+"""A live run: a camera tracked into a folder of results until it is told to stop. Read this file first in `live`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ from types import TracebackType
 from typing import Any
 
 from vidtrack.config import Settings
-from vidtrack.live.keep import Keep, parts_of
+from vidtrack.live.keep import Keep
 from vidtrack.live.memory import Memory, NoStateFile, StateFile
 from vidtrack.live.outputs import Extras, Outputs, Subject
+from vidtrack.live.places import lock_extras, lock_folder
 from vidtrack.live.recorder import NoRecorder, Recorder
-from vidtrack.output.folder import open_run, usable
-from vidtrack.output.lock import alone
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
 from vidtrack.pipeline import build_detector, build_tracker, video_steps
@@ -26,12 +25,12 @@ from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection
 from vidtrack.video.live.source import LiveSource
-from vidtrack.video.resources import keep_freed_memory, opencv_single_threaded
+from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
 
 _HOUR_S = 3600.0
-_END_S = 1.6  # from the word to stop until everything has to be finished
-_LEAST_S = 0.5  # that this gets, however long the last frame took
+_END_S = 1.6  # from `stop` until everything has to be finished
+_LEAST_S = 0.5  # left for finishing, however long the last frame took
 
 
 class LiveRun:
@@ -63,24 +62,22 @@ class LiveRun:
         roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
         keep = Keep(live.keep_s, live.keep_bytes)
         self._outputs: Outputs | None = None
-        self._until_s: float | None = None  # when everything has to be finished; None: nobody said stop
-        self._in_work = False  # a frame is, and the memory is of no use until it is done
-        with ExitStack() as locks, ExitStack() as stack:  # whatever fails below, what is open by then is closed
-            _lock(extras, locks)
+        self._until_s: float | None = None  # when everything has to be finished; None: not told to stop
+        self._in_work = False  # while a frame is processed the memory is half updated and must not be saved
+        with ExitStack() as locks, ExitStack() as stack:  # if a later step fails, what is already open is closed
+            lock_extras(extras, output, locks)
             self._state_file = NoStateFile() if extras.state is None else StateFile(extras.state)
             self._recorder = NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, keep)
             stack.callback(self._recorder.close)
             self._source = source = stack.enter_context(self._open_source(connect))
-            keep_freed_memory()
-            if settings.detector.kind not in ("mog2", "knn"):  # they are OpenCV's, and long enough for its threads
-                stack.enter_context(opencv_single_threaded())
+            stack.enter_context(frame_by_frame(settings.detector.kind))
             self._memory = self._remembered(explain=extras.decisions or extras.rerun is not None)
             if extras.state or extras.record:
                 self._memory.gather()  # what cannot be saved is refused now
             lines = parse_lines(settings.output.lines, source.width, source.height)
             counter = LineCounter(lines) if lines else None
             shown, scene = self._address.shown, self._memory.detector.scene
-            self.folder = _folder(output, self.name, force, roll_s is not None, locks)
+            self.folder = lock_folder(output, self.name, extras, locks, force=force, in_parts=roll_s is not None)
             keep.roots.append(self.folder)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
             subject = Subject(shown, source.like.shape, source.fps, scene, self._reading, counter)
@@ -143,7 +140,7 @@ class LiveRun:
         return memory
 
     def _frames(self) -> Iterator[Frame]:
-        """The frames to track; before each one, what is to be kept of the memory that it meets."""
+        """The frames to track; before each one the memory is offered to the recording and the state file."""
         memory, recorder, span = self._memory, self._recorder, Span.of(self._settings.source)
         for frame in self._source:
             if frame is None or not span.begun(frame.time_s):
@@ -186,22 +183,3 @@ class LiveRun:
     def _account(self) -> Account:
         stats = self._source.stats
         return Account(stats.state, self._reading(), list(stats.problems))
-
-
-def _lock(extras: Extras, locks: ExitStack) -> None:
-    """Keep other runs off the files that this one continues."""
-    if extras.state is not None:
-        usable(extras.state.parent)
-        locks.enter_context(alone(extras.state))
-    if extras.record is not None:
-        locks.enter_context(alone(usable(extras.record)))
-
-
-def _folder(output: Path | None, name: str, force: bool, in_parts: bool, locks: ExitStack) -> Path:
-    """A new folder, or that of an earlier run in parts, which is continued; other runs are kept out."""
-    if output is not None:
-        locks.enter_context(alone(usable(output)))  # before `force` deletes what another one writes
-        return output if in_parts and parts_of(output) else open_run(output, name, force)
-    folder = open_run(None, name, force)
-    locks.enter_context(alone(folder))
-    return folder

@@ -8,7 +8,7 @@ from vidtrack.output.linefile import LineFile
 from vidtrack.output.sink import Step
 from vidtrack.scan import Choices, Event
 
-HEADER = "time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,reason\n"
+HEADER = "time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,candidates,reason\n"
 
 
 class DecisionLog:
@@ -43,17 +43,28 @@ def _choice_rows(choices: Choices) -> list[str]:
         choices.gate,
         choices.runner_up,
         choices.runner_up_d2,
+        choices.candidates,
+        choices.candidates_weight,
+        choices.candidates_d2,
     )
     return [
         f"{track},{'miss' if chosen < 0 else 'update'},{_index(chosen)},{_real(weight)},{_real(d2)},{_real(gate)},"
-        f"{_index(second)},{_real(second_d2)},"
-        for track, chosen, weight, d2, gate, second, second_d2 in zip(*(c.tolist() for c in columns), strict=True)
+        f"{_index(second)},{_real(second_d2)},{_candidates(*candidates)},"
+        for track, chosen, weight, d2, gate, second, second_d2, *candidates in zip(
+            *(c.tolist() for c in columns), strict=True
+        )
     ]
 
 
 def _event_row(event: Event) -> str:
     reason = event.reason.replace('"', "'")
-    return f'{event.track_id},{event.kind},,,,,,,"{reason}"'
+    return f'{event.track_id},{event.kind},,,,,,,,"{reason}"'
+
+
+def _candidates(measurements: list[int], weights: list[float], d2: list[float]) -> str:
+    """measurement:weight:d2 of each."""
+    found = zip(measurements, weights, d2, strict=True)
+    return ";".join(f"{j}:{_real(weight)}:{_real(distance)}" for j, weight, distance in found if j >= 0)
 
 
 def _index(value: int) -> str:

@@ -22,6 +22,10 @@ _LUMA = (0.114, 0.587, 0.299)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
+Patch = tuple[slice, slice]
+"""Rows and columns of a picture."""
+
+
 class Pen:
     """Draws on one picture, with strokes and letters in proportion to it."""
 
@@ -54,14 +58,15 @@ class Pen:
         (width, height), _ = cv2.getTextSize(text, _FONT, self.text_scale, self.width)
         return width + 4, height + 2
 
-    def label(self, text: str, left: float, bottom: float, ink: Colour) -> None:
-        """Black or white text on a patch of colour, kept inside the picture."""
+    def label(self, text: str, left: float, bottom: float, ink: Colour) -> Patch:
+        """Black or white text on a patch of colour, kept inside the picture; returns the patch."""
         width, height = self.size(text)
         x = int(np.clip(left, 0, max(0, self.picture.shape[1] - width)))
         y = int(np.clip(bottom, height, self.picture.shape[0]))
         cv2.rectangle(self.picture, (x, y - height), (x + width, y), ink, -1)
         text_ink = BLACK if np.dot(ink, _LUMA) > 100 else WHITE
         cv2.putText(self.picture, text, (x + 2, y - 2), _FONT, self.text_scale, text_ink, self.width, cv2.LINE_AA)
+        return slice(y - height, y), slice(x, x + width)
 
 
 def draw_trails(pen: Pen, paths: Mapping[int, Floats]) -> None:
@@ -88,12 +93,16 @@ def draw_tracks(pen: Pen, tracks: Tracks) -> None:
         pen.label("+".join(map(str, np.sort(tracks.id[members]))), low[0], low[1], WHITE)
 
 
-def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str, int]] | None = None) -> None:
-    """Counting lines with their names and, given totals, their counts."""
+def counted(line: str, ways: Mapping[str, int]) -> str:
+    """A line's counts in words: "ramp: 12 left, 3 right"."""
+    return f"{line}: {', '.join(f'{count} {way}' for way, count in ways.items())}" if ways else line
+
+
+def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str, int]] | None = None) -> list[Patch]:
+    """Counting lines with their names and, given totals, their counts; returns where these stand."""
     for line in lines:
         pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE)
-        counts = "".join(f" {way} {n}" for way, n in (totals or {}).get(line.name, {}).items())
-        pen.label(line.name + counts, line.x1, line.y1, LINE)
+    return [pen.label(counted(k.name, (totals or {}).get(k.name, {})), k.x1, k.y1, LINE) for k in lines]
 
 
 def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:

@@ -27,15 +27,26 @@ RESULTS = (
 """Everything a run writes into its folder; `--force` replaces these and leaves other files alone."""
 
 
-def open_run(path: Path | None, source_name: str, force: bool) -> Path:
-    """The folder for a run's results, empty of earlier results.
+def open_folder(path: Path | None, name: str, force: bool) -> Path:
+    """A folder to write into.
 
-    path         the folder asked for; None: `runs/<source_name>`, then `runs/<source_name>-2`, ...
-    force        results of an earlier run in `path` are deleted
+    path    the folder asked for; None: `runs/<name>`, then `runs/<name>-2`, ...
+    force   `path` may hold other files
 
     Raises OutputError when the folder cannot be made or written, or `path` is not empty and `force` is off.
     """
-    return usable(_next_free(source_name) if path is None else _asked_for(path, force))
+    return usable(_next_free(name) if path is None else _asked_for(path, force))
+
+
+def open_run(path: Path | None, source_name: str, force: bool) -> Path:
+    """The folder for a run's results as `open_folder`; with `force` those of an earlier run in it are deleted."""
+    folder = open_folder(path, source_name, force)
+    if force:
+        try:
+            _remove_results(folder)
+        except OSError as error:
+            raise OutputError(f"cannot replace the results in {folder}: {error}; choose another folder") from None
+    return folder
 
 
 @contextmanager
@@ -48,10 +59,22 @@ def begun(path: Path | None, source_name: str, force: bool) -> Iterator[Path]:
     try:
         yield folder
     except BaseException:
-        with suppress(OSError):
-            _remove_results(folder)
-            folder.rmdir()
+        withdraw(folder)
         raise
+
+
+def withdraw(folder: Path) -> None:
+    """Take a run's results away again, and the folder if nothing else is in it."""
+    with suppress(OSError):
+        _remove_results(folder)
+        folder.rmdir()
+
+
+def spare(read: Path, *written: Path | None) -> None:
+    """Raise OutputError if one of the places to write to is the file, or the folder, that is read."""
+    for path in written:
+        if path is not None and path.resolve() == read.resolve():
+            raise OutputError(f"{path} is what is to be read; choose another place for the results")
 
 
 def usable(folder: Path) -> Path:
@@ -121,9 +144,7 @@ def _next_free(source_name: str) -> Path:
 def _asked_for(folder: Path, force: bool) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if force:
-            _remove_results(folder)
-        elif any(folder.iterdir()):
+        if not force and any(folder.iterdir()):
             raise OutputError(f"{folder} is not empty; choose another folder with -o, or add --force to replace it")
     except OSError as error:
         raise OutputError(f"cannot use {folder} for results: {error.strerror}; choose another with -o") from None

@@ -26,7 +26,7 @@ def alone(path: Path) -> Iterator[None]:
         yield
         return
     is_folder = path.is_dir()
-    place = path if is_folder else path.with_name(path.name + ".lock")
+    place = path if is_folder else lock_file(path)
     try:
         handle = os.open(place, os.O_RDONLY if is_folder else os.O_RDWR | os.O_CREAT, 0o644)
     except OSError as error:
@@ -37,6 +37,11 @@ def alone(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)  # the file stays: who waits for it may have opened it already
+
+
+def lock_file(path: Path) -> Path:
+    """The file whose lock stands for that of `path`."""
+    return path.with_name(path.name + ".lock")
 
 
 def _locked(handle: int) -> bool:

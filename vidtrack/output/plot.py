@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -11,7 +11,7 @@ import numpy as np
 
 from vidtrack.compiled import CACHE
 from vidtrack.output.colours import colour
-from vidtrack.output.draw import Pen, draw_lines
+from vidtrack.output.draw import Patch, Pen, draw_lines
 from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Tracks
@@ -31,16 +31,23 @@ _NUMBERED = 150
 class TrajectoryPlot:
     """Sink that draws each confirmed track as it moves, so memory does not grow with the run.
 
-    shape  (H, W) of the source
-    scene  gives the (H, W, 3) background when the run ends; None: plain grey
+    shape   (H, W) of the source
+    scene   gives the (H, W, 3) background when the run ends; None: plain grey
+    totals  gives the counts by line and direction when the run ends; None: lines show their names only
     """
 
     def __init__(
-        self, path: Path, shape: tuple[int, int], scene: Callable[[], Image] | None = None, lines: Sequence[Line] = ()
+        self,
+        path: Path,
+        shape: tuple[int, int],
+        scene: Callable[[], Image] | None = None,
+        lines: Sequence[Line] = (),
+        totals: Callable[[], Mapping[str, Mapping[str, int]]] | None = None,
     ) -> None:
         self._path = path
         self._scene = scene
         self._lines = lines
+        self._totals = totals
         self._shape = shape
         self._zoom = max(1, round(_SIDE / max(shape)))
         # Colour times opacity, and opacity: anti-aliased strokes then blend exactly.
@@ -86,14 +93,16 @@ class TrajectoryPlot:
         _lay_over(self._layer, picture)
         pen = Pen(picture)
         zoom = self._zoom
-        draw_lines(pen, [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines])
-        self._number(pen)
+        enlarged = [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines]
+        self._number(pen, draw_lines(pen, enlarged, self._totals() if self._totals else None))
         with replacing(self._path) as new:  # half a picture would look like one
             new.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
-    def _number(self, pen: Pen) -> None:
+    def _number(self, pen: Pen, taken: Sequence[Patch]) -> None:
         """Each track's number at its end, or in the nearest free place above or below."""
         free = np.ones(self._layer.shape[:2], bool)
+        for patch in taken:
+            free[patch] = False
         for track_id, xy in sorted(self._ends.items()):
             width, height = pen.size(str(track_id))
             x = int(np.clip(xy[0] * self._zoom, 0, max(0, free.shape[1] - width)))
@@ -107,7 +116,7 @@ class TrajectoryPlot:
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _lay_over(layer, picture):  # type: ignore[no-untyped-def]
+def _lay_over(layer: Image, picture: Image) -> None:
     """Blend a layer (h, w, 4), colours times opacity and the opacity, over the picture (h, w, 3); both uint8."""
     white = np.float32(255)
     for y in range(picture.shape[0]):

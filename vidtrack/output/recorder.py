@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import socket
+import sys
 import sysconfig
 from pathlib import Path
 from typing import ClassVar
@@ -25,6 +26,7 @@ from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
 _log = logging.getLogger(__name__)
 
 _ADDRESS = ("127.0.0.1", 9876)
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 _LANES = 200
 """Lanes of track life: hundreds of entities make the viewer slow, so track i uses lane i modulo this."""
 
@@ -41,7 +43,7 @@ _GONE = "gone"
 class Recorder:
     """Sink that records tracks' lives, numbers, times and decisions; what it looks like is drawn by its children.
 
-    target    FILE.rrd, "spawn" or "serve"; the last two reach the own machine only
+    target    FILE.rrd; "spawn": a viewer that is started here; "serve": on loopback, for viewers of this machine
     view      what is seen, beside the plots
     measured  what the tracker's measurements are called
     trail_s   how far back the trails reach
@@ -56,6 +58,7 @@ class Recorder:
         self, target: str, settings: Settings, view: rrb.View | rrb.Container, measured: str, trail_s: float
     ) -> None:
         self._recording = _open(target, self._layout(view, measured))
+        self._lost = "is the disk full?" if target.endswith(".rrd") else "was the viewer closed?"
         self._trails = Trails(trail_s)
         self._due = Every(1.0)
         self._life: dict[int, str] = {}
@@ -79,7 +82,7 @@ class Recorder:
             self._flush()
 
     def close(self) -> None:
-        """Finish the recording. Raises StoppedEarly when the disk refused some of it."""
+        """Finish the recording. Raises StoppedEarly when the disk or the viewer refused some of it."""
         try:
             self._flush()
         finally:
@@ -90,7 +93,7 @@ class Recorder:
         try:
             self._recording.flush()
         except RuntimeError as error:
-            raise StoppedEarly(f"the rerun recording is incomplete: {error}; is the disk full?") from None
+            raise StoppedEarly(f"the rerun recording is incomplete: {error}; {self._lost}") from None
 
     def _log(self, path: str, what: rr.AsComponents) -> None:
         self._recording.log(path, what)
@@ -160,6 +163,16 @@ def gates(scan: Scan, tracks: Tracks, R: Floats) -> NDArray[np.float32]:
     return (tracks.xy[:, None, :2] + np.swapaxes(np.linalg.cholesky(cov) @ circle, 1, 2)).astype(np.float32)
 
 
+def _refuse_without_display() -> None:
+    """Raise OutputError where no viewer runs and none could open a window: its end would be noticed late."""
+    with socket.socket() as probe:
+        runs = probe.connect_ex(_ADDRESS) == 0
+    if not runs and sys.platform == "linux" and not any(os.environ.get(name) for name in _DISPLAYS):
+        raise OutputError(
+            "no display for the viewer; record a FILE.rrd here and open it with `rerun FILE.rrd` elsewhere"
+        )
+
+
 def _open(target: str, layout: rrb.Blueprint) -> rr.RecordingStream:
     """A recording that goes to a file, to a viewer that it starts ("spawn"), or is served on loopback ("serve").
 
@@ -168,6 +181,7 @@ def _open(target: str, layout: rrb.Blueprint) -> rr.RecordingStream:
     recording = rr.RecordingStream("vidtrack")
     try:
         if target == "spawn":
+            _refuse_without_display()
             # The viewer is installed beside this Python, which need not be on the path.
             os.environ["PATH"] += os.pathsep + sysconfig.get_path("scripts")
             recording.spawn(memory_limit="2GB", default_blueprint=layout)
@@ -182,5 +196,5 @@ def _open(target: str, layout: rrb.Blueprint) -> rr.RecordingStream:
             recording.save(target, default_blueprint=layout)
             recording.send_recording_name(Path(target).stem)  # to tell cameras apart in one viewer
     except (OSError, RuntimeError) as error:
-        raise OutputError(f"cannot open the recording {target}: {error}; give --rerun another place") from None
+        raise OutputError(f"cannot open the recording {target}: {error}; choose another place") from None
     return recording

@@ -56,7 +56,7 @@ def _blocks(path: Path) -> tuple[pa.Schema, Iterator[pa.Table]]:
     try:
         with path.open() as file:
             wanted = schema(layout(file.readline().strip().split(",")))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise FormatError(f"{path.parent} is not a run: it has no {path.name}") from None
     return wanted, _read_blocks(path, wanted)
 

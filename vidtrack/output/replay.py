@@ -53,7 +53,8 @@ def read_run(folder: Path) -> Run:
 
 def background(folder: Path, shape: tuple[int, int]) -> Image:
     """tracks.png in source size (H, W), grey without one."""
-    picture = cv2.imread(str(folder / "tracks.png"))
+    path = folder / "tracks.png"
+    picture = cv2.imread(str(path)) if path.is_file() else None  # OpenCV would complain aloud
     if picture is None:
         return np.full((*shape, 3), 60, np.uint8)
     return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)

@@ -20,7 +20,7 @@ from vidtrack.video.frame import Image
 class RerunSink(Recorder):
     """Sink that records pictures, masks, blobs, tracks, gates, trails, lives, times and decisions.
 
-    target  FILE.rrd, "spawn" or "serve"; the last two reach the own machine only
+    target  FILE.rrd, "spawn" or "serve"
     shape   (H, W) of the source
 
     Raises OutputError when the file cannot be written or the viewer not be started.

@@ -21,7 +21,7 @@ class Results:
         self._summary = summary
         self._sinks: list[Sink] = []
         self._open = ExitStack()
-        self._open.callback(summary.close)  # last of all: it reports what the others did
+        self._open.push(self._end)  # last of all: it reports what the others did
 
     def add(self, sink: Sink) -> None:
         """One more sink for all steps."""
@@ -41,5 +41,9 @@ class Results:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._summary.interrupted = kind is not None
         self._open.__exit__(kind, error, trace)
+
+    def _end(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """The error is that of the run, or of a sink that could not be closed."""
+        self._summary.interrupted = kind is not None
+        self._summary.close()

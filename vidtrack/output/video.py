@@ -69,6 +69,8 @@ class AnnotatedVideo:
             self._container.mux(self._stream.encode(None))
         self._container.close()
         self._disk.close()
+        if self._stream is None and self._path.is_file():
+            self._path.unlink()  # nothing plays a video without a picture
         self._check_disk()
 
     def _draw(self, step: Step, picture: Image) -> Image:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from bisect import bisect_right
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vidtrack.radar.table import Table
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 
 TIME = ("scan", "time_s")
 POLAR = ("range_m", "azimuth_deg", "elevation_deg")
@@ -79,7 +78,7 @@ def check_order(table: Table, measured: list[str]) -> None:
         table.note(rows[k], f"scan is {scan[rows[k]]:.0f}; a gap of more than {LONGEST_GAP:,} scans before it")
 
 
-def _in_order(values: Floats) -> NDArray[np.bool_]:
+def _in_order(values: Floats) -> Mask:
     """(N,) a longest selection that never decreases: whatever is left out of it is what disturbs the order."""
     if (np.diff(values) >= 0).all():
         return np.ones(len(values), bool)

@@ -13,7 +13,7 @@ from vidtrack.detection.amplitude import RAYLEIGH, Weibull, detection_probabilit
 from vidtrack.detection.reduction import gate_volume
 from vidtrack.detection.strongest import Strongest
 from vidtrack.detection.threshold import ThresholdController
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Floats, Ints, Mask, Scan
 
 MOST_CLUTTER = 1000.0
 """False plots expected in a gate beyond which none are drawn and the target is missed: nothing can be learnt."""
@@ -37,7 +37,7 @@ class Gates:
         return gate_volume(self.S, self.gate)
 
     @property
-    def holds_target(self) -> np.ndarray:
+    def holds_target(self) -> Mask:
         """(T,) whether the target's measurement lies inside."""
         v = self.target - self.zhat
         d2 = np.einsum("ti,ti->t", v, np.linalg.solve(self.S, v[..., None])[..., 0])

@@ -14,7 +14,7 @@ from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.in_gate import AllPlots, Gates, StrongestPlot
 from vidtrack.radar.prediction import Scenario, position_error
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
 BLOCK = 1000
 """Runs at a time: bounds the memory that clutter takes."""
@@ -37,11 +37,11 @@ class Outcome:
     p_fa: Floats
     outside: Ints
 
-    def lost(self, limit: float) -> np.ndarray:
+    def lost(self, limit: float) -> Mask:
         """(runs,) error above `limit` at the end, or the target outside the gate in all of the last five scans."""
         return np.asarray((self.error[-1] > limit) | (self.outside >= LAST_SCANS))
 
-    def strayed(self, limit: float) -> np.ndarray:
+    def strayed(self, limit: float) -> Mask:
         """(runs,) error above `limit` at any scan, even if the track recovered."""
         return np.asarray((self.error > limit).any(axis=0))
 

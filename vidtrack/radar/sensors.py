@@ -18,54 +18,49 @@ NEAREST_M = 1e-6
 """The line of sight has no direction at the sensor itself: no target is nearer than this."""
 
 
+class _Polar:
+    """Range, azimuth[, elevation][, range rate] seen from `origin`; d is the number of space dimensions."""
+
+    __slots__ = ()
+    angles: ClassVar[tuple[int, ...]] = (1,)
+    origin: tuple[float, ...]
+    doppler: bool
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, d) or (T, d + 1) expected measurements, azimuth in -pi..pi."""
+        return _expected(x, position, self.origin, self.doppler)
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(T, d, n) or (T, d + 1, n) Jacobians of h."""
+        return _jacobian(x, position, self.origin, self.doppler)
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """Positions (M, d) and covariances (M, d, d): the unbiased conversion."""
+        return _located(z, R, self.origin)
+
+
 @dataclass(frozen=True, slots=True)
-class RangeAzimuth:
+class RangeAzimuth(_Polar):
     """z = range [m], azimuth [rad][, range rate [m/s]] of a target in the plane.
 
     origin   (x, y) of the radar [m]
     doppler  the range rate is measured too
     """
 
-    angles: ClassVar[tuple[int, ...]] = (1,)
     origin: tuple[float, float] = (0.0, 0.0)
     doppler: bool = False
 
-    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
-        """(T, 2 or 3) expected measurements, azimuth in -pi..pi."""
-        return _expected(x, position, self.origin, self.doppler)
-
-    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
-        """(T, 2 or 3, n) Jacobians of h."""
-        return _jacobian(x, position, self.origin, self.doppler)
-
-    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
-        """Positions (M, 2) and covariances (M, 2, 2): the unbiased conversion."""
-        return _located(z, R, self.origin)
-
 
 @dataclass(frozen=True, slots=True)
-class RangeAzimuthElevation:
+class RangeAzimuthElevation(_Polar):
     """z = range [m], azimuth [rad], elevation [rad][, range rate [m/s]].
 
     origin   (x, y, z) of the radar [m]
     doppler  the range rate is measured too
     """
 
-    angles: ClassVar[tuple[int, ...]] = (1,)
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     doppler: bool = False
-
-    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
-        """(T, 3 or 4) expected measurements, azimuth in -pi..pi."""
-        return _expected(x, position, self.origin, self.doppler)
-
-    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
-        """(T, 3 or 4, n) Jacobians of h."""
-        return _jacobian(x, position, self.origin, self.doppler)
-
-    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
-        """Positions (M, 3) and covariances (M, 3, 3): the unbiased conversion."""
-        return _located(z, R, self.origin)
 
 
 @dataclass(frozen=True, slots=True)

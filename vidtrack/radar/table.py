@@ -12,10 +12,9 @@ import pyarrow as pa
 import pyarrow.compute
 import pyarrow.csv
 import pyarrow.parquet
-from numpy.typing import NDArray
 
 from vidtrack.errors import PlotFormatError, SourceError
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
 Faults = dict[int, str]
 """What is wrong, by line of the file; the first fault of a line is kept."""
@@ -42,7 +41,7 @@ class Table:
     unit: str
     faults: Faults
 
-    def refuse(self, bad: NDArray[np.bool_], name: str, rule: str) -> None:
+    def refuse(self, bad: Mask, name: str, rule: str) -> None:
         """Note the rows of a mask (N,) whose value in column `name` breaks a rule."""
         for row in np.flatnonzero(bad):
             self.note(int(row), f"{name} is {self.columns[name][row]:.10g}; {rule}")
@@ -52,7 +51,7 @@ class Table:
         self.faults.setdefault(int(self.line[row]), fault)
 
     @property
-    def good(self) -> NDArray[np.bool_]:
+    def good(self) -> Mask:
         """(N,) rows without a fault."""
         return ~np.isin(self.line, list(self.faults))
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Ints
-from vidtrack.score.matching import Mask, Matchup, best_pairs, split_contests
+from vidtrack.scan import Ints, Mask
+from vidtrack.score.matching import Matchup, best_pairs, split_contests
 
 EPS = float(np.finfo(float).eps)
 CONTINUES = 1000.0  # outweighs any similarity, so that keeping last frame's pairs comes first

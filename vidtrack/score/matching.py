@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from vidtrack.errors import ConfigError
 from vidtrack.formats import Table
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
-Mask = NDArray[np.bool_]
 FRAME_SPACING = 3.0  # in units of the reach: rows of different frames are never near
 ROUNDING = 1e-9  # keeps pairs exactly at the reach, which are judged afterwards
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from vidtrack.detection.amplitude import RAYLEIGH, Weibull, linear, swerling1
 from vidtrack.radar.coordinates import to_polar, wrap
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.simulate.flight import Flight
 
 GLINT_FACTOR = 5.0
@@ -64,7 +63,7 @@ class Radar:
         polar[:, 1] %= 360
         return polar
 
-    def covers(self, xyz: Floats) -> NDArray[np.bool_]:
+    def covers(self, xyz: Floats) -> Mask:
         """(K,) positions (K, 3) inside the coverage."""
         polar = self.measures(xyz)
         return np.asarray(((polar >= self.low) & (polar <= self.high)).all(axis=1))
@@ -99,8 +98,8 @@ class Seen:
     amplitude: Floats
     times: Floats
     states: Floats
-    there: NDArray[np.bool_]
-    merged: NDArray[np.bool_]
+    there: Mask
+    merged: Mask
 
 
 def observe(radar: Radar, targets: Sequence[Target], scans: int, rng: Generator) -> Seen:
@@ -132,7 +131,7 @@ def observe(radar: Radar, targets: Sequence[Target], scans: int, rng: Generator)
     )
 
 
-def _unresolved(true: Floats, there: NDArray[np.bool_], cell: Floats) -> Ints:
+def _unresolved(true: Floats, there: Mask, cell: Floats) -> Ints:
     """(targets, K) the first target among those that share one echo with each: neighbours, and theirs."""
     apart = np.abs(_differences(true[:, None], true[None]))
     near = (apart < cell).all(axis=-1) & there[:, None] & there[None]
@@ -149,9 +148,7 @@ def _differences(a: Floats, b: Floats) -> Floats:
     return difference
 
 
-def _echoes(
-    radar: Radar, true: Floats, there: NDArray[np.bool_], leader: Ints, rng: Generator
-) -> tuple[Ints, Floats, Floats]:
+def _echoes(radar: Radar, true: Floats, there: Mask, leader: Ints, rng: Generator) -> tuple[Ints, Floats, Floats]:
     """Scan, measurement and amplitude of the targets' plots: an unresolved group is one, at its centre of power."""
     if radar.snr_db is None:
         strength = np.ones(there.shape)

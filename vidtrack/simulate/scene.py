@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 
 Colour = tuple[float, float, float]
 
@@ -111,12 +110,12 @@ def bounds(polygons: Floats) -> Floats:
     return np.concatenate([polygons.min(axis=-2), polygons.max(axis=-2)], axis=-1)
 
 
-def inside(boxes: Floats, size: tuple[int, int]) -> NDArray[np.bool_]:
+def inside(boxes: Floats, size: tuple[int, int]) -> Mask:
     """Which boxes (..., 4) of left, top, right, bottom lie whole in a picture of `size` (width, height)."""
     return np.asarray((boxes[..., :2] >= 0).all(axis=-1) & (boxes[..., 2:] <= size).all(axis=-1))
 
 
-def touching(a: Floats, b: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
+def touching(a: Floats, b: Floats, margin: float = 0.0) -> Mask:
     """In which rows (N,) the convex polygons a (N, V, 2) and b (N, W, 2) overlap, or come closer than `margin`.
 
     By the separating axis theorem; with a margin, corners that face each other count a little early.

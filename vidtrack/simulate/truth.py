@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.simulate.scene import Actor, Scene, bounds
 
 RASTER = 4  # grid cells per scene pixel and axis when areas are counted
@@ -94,7 +93,7 @@ def _visible_share(actor: Actor, near: tuple[Actor, ...], time: float, size: Int
     return np.count_nonzero(mask) / total
 
 
-def _silhouette(actor: Actor, time: float, origin: Floats, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def _silhouette(actor: Actor, time: float, origin: Floats, shape: tuple[int, int]) -> Mask:
     """Which cells of a grid (`shape`, from `origin`) the actor's parts cover."""
     image = np.zeros(shape, np.uint8)
     for part in actor.look.parts:

@@ -1,4 +1,4 @@
-"""Who gets what: from the gated pairs of a scan to a decision, and to the measurements that may start a track."""
+"""Association of one scan: from gated pairs to a decision, and to the measurements that may start tracks."""
 
 from __future__ import annotations
 
@@ -11,28 +11,27 @@ import numpy as np
 from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.trust import Trust
-from vidtrack.scan import Decision, Event, Ints
+from vidtrack.scan import Decision, Event, Ints, Mask
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.forest import Forest
 from vidtrack.tracking.register import Register
 
 CLAIMED = 0.1
-"""A measurement that tracks claim with more weight than this in sum starts no track."""
+"""A measurement whose weights over all tracks sum to more than this starts no track."""
 UNSURE = 0.01
-"""Share of its likelihood that a detection which is not sure has in decisions that wait: more such are false."""
+"""Factor on the likelihood of a detection with a low score where decisions wait: more of these are false."""
 
-Mask = np.ndarray
 Claim = Callable[[Ints], tuple[Ints, Mask]]
 
 
 class Association(NamedTuple):
-    """What comes out of a scan.
+    """The outcome of a scan's association.
 
-    problem   the scan's problem as the successors of the rows see it
-    decision  how K successors come from the rows
-    shared    (K,) blob that each leans on by its edges; -1: none
-    hides     (M,) blobs that hide more than their tracks account for
+    problem   the scan's problem as the K successors of the rows see it
+    decision  how the successors come from the rows
+    shared    (K,) blob whose edges update each successor; -1: none
+    hides     (M,) blobs that are larger than their tracks account for
     free      (M,) measurements that may start a track
     """
 
@@ -44,11 +43,10 @@ class Association(NamedTuple):
 
 
 def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, claim: Claim | None) -> Association:
-    """Confirmed tracks (T,) choose first, then those on shared blobs claim them, then tentative tracks choose,
-    which share nothing whatever the rule.
+    """Decide in this scan: confirmed tracks (T,) first, then the sharing of blobs, then tentative tracks.
 
-    claim  given what each track took (T,), who leans on which blob (T,) and which blobs (M,) hide more; None where
-           blobs are not shared
+    claim  maps the measurement of each track (T,) to the shared blob of each (T,) and the blobs (M,) that hide more;
+           None where blobs are not shared
     """
     pairs, rows, count = problem.pairs, problem.rows, problem.measurements
     sure = trust.sure(problem.scan)
@@ -72,7 +70,7 @@ def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, c
 def deferred(
     problem: Problem, forest: Forest, trust: Trust, births: bool, register: Register, events: list[Event]
 ) -> Association:
-    """Rows become their successors in a forest, and so do the register's; no blob is shared."""
+    """Grow the forest, which decides scans later; the register's rows become their successors. No blob is shared."""
     pairs, sure = problem.pairs, trust.sure(problem.scan)
     log_l = pairs.log_l + np.where(sure, 0.0, np.log(UNSURE))[pairs.measurement]
     problem = replace(problem, pairs=replace(pairs, log_l=log_l))
@@ -81,7 +79,7 @@ def deferred(
 
 
 def _starter(rule: Associator) -> Associator:
-    """The rule of tentative tracks: whole measurements, or clutter would never let go of them."""
+    """The rule for tentative tracks: whole measurements, because weights of clutter would keep them alive for ever."""
     return rule if isinstance(rule, HARD) else GNN()
 
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Floats, Mask, Scan
 from vidtrack.tracking.boxes import area, best_cover, widened
 
 FRAGMENT, NEAR, SMALL = 0.6, 0.5, 0.3
 """A leftover blob starts no track where a tracked vehicle, widened by NEAR of its longer side, covers FRAGMENT of
 it, if the blob is smaller than SMALL of the vehicle: it is a piece of it, or of its shadow."""
 
-Mask = np.ndarray
-
 
 def distinct(scan: Scan, free: Mask) -> Mask:
-    """(M,) the free measurements (M,) of which no earlier one lies in the same cell, a least standard deviation wide.
+    """(M,) one of the free measurements (M,) in each cell; a cell is the smallest standard deviation wide.
 
-    Measurements that cannot be told apart start one track: a heap of them at one place is one target until shown
-    otherwise, and not thousands of tracks that all gate the next heap.
+    Measurements that cannot be told apart start one track: a heap of them would otherwise start thousands of tracks
+    that all gate the next heap.
     """
     candidates = free.nonzero()[0]
     if len(candidates) < 2:

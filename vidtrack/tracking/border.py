@@ -1,4 +1,4 @@
-"""The border of the picture: what it cuts, and who is on the way out."""
+"""The border of the picture: which boxes it cuts, and which tracks are leaving."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ import numpy as np
 from numba import njit
 
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 
 REACH = 2.0
 """px; a box this close to the border is cut by it."""
 SPECK = 1 / 30
-"""Share of the longer side of the picture; what is smaller must travel as far as if it were that large. The leaves of a
-swaying tree are small, and what passes for the travel of one is the way to the next."""
-
-Mask = np.ndarray
+"""Share of the picture's longer side; a smaller object must travel as far as one of this size to be confirmed. The
+leaves of a swaying tree are small, and a track that jumps from leaf to leaf seems to travel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +26,7 @@ class Border:
 
     @property
     def speck(self) -> float:
-        """px; the size of what is small in this picture, zero without a border."""
+        """px; size below which objects are treated as this large, zero without a border."""
         return 0.0 if np.isinf(self.width) else SPECK * max(self.width, self.height)
 
     def sides(self, box: Floats) -> Mask:
@@ -48,7 +46,7 @@ class Border:
         return _leaving(box, v, self.width, self.height)
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
-        """Boxes (N, 4) drawn out to the border on the given sides (N, 4)."""
+        """Boxes (N, 4) extended to the border on the given sides (N, 4)."""
         return _reaching(box, sides, (self.width, self.height))
 
 

@@ -4,14 +4,43 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Floats, Ints
+from vidtrack.errors import ScanError
+from vidtrack.scan import Floats, Ints, Mask, Scan
+
+JITTER = 0.05
+"""Standard deviation of a box's centre, in its longer sides, where nobody measured it."""
+
+LEAST_SIGMA_PX = 0.5
+"""No detector says better where a box's centre is."""
+
+
+def box_scan(t: float, box: ArrayLike, score: ArrayLike | None = None, jitter: float = JITTER) -> Scan:
+    """The boxes that a detector found at time t [s]: their centres are the measurements.
+
+    box     (M, 4) left, top, width, height in the picture [px]; an empty list where nothing was found
+    score   (M,) confidence
+    jitter  standard deviation of a centre, in longer sides of its box; at least LEAST_SIGMA_PX are assumed
+
+    Corners x1, y1, x2, y2 have the same shape and pass unnoticed: give np.hstack([c[:, :2], c[:, 2:] - c[:, :2]]).
+    Raises ScanError for another shape, negative sizes, NaN.
+    """
+    boxes = np.asarray(box, dtype=float)
+    boxes = boxes.reshape(0, 4) if boxes.shape == (0,) else boxes
+    if boxes.ndim != 2 or boxes.shape[1] != 4:
+        raise ScanError(f"boxes must be (M, 4) left, top, width, height, not {boxes.shape}")
+    size = boxes[:, 2:]
+    sigma = np.maximum(jitter * longer(boxes), LEAST_SIGMA_PX)
+    R = sigma[:, None, None] ** 2 * np.eye(2)
+    scores = None if score is None else np.asarray(score, dtype=float)
+    return Scan(t, boxes[:, :2] + size / 2, R, box=np.hstack([-size / 2, size]), score=scores)
 
 
 @njit(cache=CACHE, nogil=True)
 def absolute(box: Floats, xy: Floats) -> Floats:
-    """(N, 4) boxes relative to their points (N, d), placed in the picture."""
+    """(N, 4) boxes in the picture, from boxes relative to points (N, d)."""
     placed = box.copy()
     for i in range(len(box)):
         for axis in range(min(2, xy.shape[1])):
@@ -20,10 +49,10 @@ def absolute(box: Floats, xy: Floats) -> Floats:
 
 
 @njit(cache=CACHE, nogil=True)
-def follow(box: Floats, seen: Floats, taken: Ints, at_once: np.ndarray, share: Floats) -> None:
-    """Move boxes (T, 4) by a share (T,) towards those seen (M, 4) that they have `taken` (T,); -1: none.
+def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, share: Floats) -> None:
+    """Move boxes (T, 4), in place, by a share (T,) towards the boxes seen (M, 4) that they have `taken` (T,); -1: none.
 
-    at_once  (M,) boxes that are taken over as they are, as the first one of a track is
+    at_once  (M,) boxes that are copied unchanged, as the first one of a track is
     """
     for t in range(len(box)):
         j = taken[t]

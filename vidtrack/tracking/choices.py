@@ -1,4 +1,4 @@
-"""What a scan decided, in the tracks' own order: for the snapshot and for `--decisions`."""
+"""What was decided in a scan, row by row: for the snapshot and for `--decisions`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from vidtrack.associate.problem import Problem
 from vidtrack.compiled import CACHE
 from vidtrack.scan import Choices, Decision, Floats, Ints
 
+LISTED = 10
+"""Candidates told of each track and scan: of a heap of measurements not all."""
+
 
 def heaviest(decision: Decision) -> Ints:
     """(K,) measurement of the largest weight in each row, -1 where a miss is likelier than not."""
@@ -17,11 +20,11 @@ def heaviest(decision: Decision) -> Ints:
 
 
 def evidence(problem: Problem, decision: Decision, taken: Ints) -> tuple[Floats, Floats]:
-    """What each row got: its log-likelihood ratio (T,), target against none, and nis (T,), NaN where that is nothing.
+    """Log-likelihood ratio (T,) of each row, target against none, and NIS (T,), NaN for a miss.
 
-    A row with one measurement for certain: P_D N / clutter of that one. A shared-out row: the PDA's normaliser
-    1 - P_D P_G + sum of P_D N / clutter, which is what any of its choices weighs over its share; here the miss where
-    nothing was `taken` (T,), else that measurement.
+    A row with one certain measurement has the ratio P_D N / clutter of that one. A row with weights has the PDA's
+    normaliser 1 - P_D P_G + sum of P_D N / clutter, which is the ratio of any one of its choices over the weight of
+    that choice; the choice used is the measurement `taken` (T,), or the miss where that is -1.
     """
     pairs = problem.pairs
     ratio, share, nis = _of_taken(
@@ -46,7 +49,10 @@ def _of_taken(
     chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,
 ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """(T,) log-likelihood ratio, share and nis of what each row took; the pairs and then the weights are in rows."""
-    ratio, share, nis = log_missed.copy(), np.where(taken < 0, beta0, 1.0), np.full(len(taken), np.nan)
+    ratio, share, nis = log_missed.copy(), np.ones(len(taken)), np.full(len(taken), np.nan)
+    for t in range(len(taken)):
+        if taken[t] < 0:
+            share[t] = beta0[t]
     for k in range(len(row)):
         if measurement[k] == taken[row[k]]:
             ratio[row[k]], nis[row[k]] = log_ratio[k], pair_nis[k]
@@ -57,7 +63,7 @@ def _of_taken(
 
 
 def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices:
-    """Who was chosen, how far it was, and who came second."""
+    """The measurement chosen by each track, its weight and distance, the runner-up, and the LISTED heaviest."""
     rows = len(ids)
     weight, runner, runner_d2 = np.zeros(rows), np.full(rows, -1), np.full(rows, np.nan)
     np.maximum.at(weight, decision.row, decision.beta)
@@ -68,4 +74,26 @@ def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices
     order = others[np.argsort(-pairs.d2[others], kind="stable")]
     runner[pairs.row[order]] = pairs.measurement[order]
     runner_d2[pairs.row[order]] = pairs.d2[order]
-    return Choices(ids.copy(), taken.copy(), weight, d2, pairs.limit.copy(), runner, runner_d2)
+    candidates = _candidates(pairs, _weight(pairs, decision), rows)
+    return Choices(ids.copy(), taken.copy(), weight, d2, pairs.limit.copy(), runner, runner_d2, *candidates)
+
+
+def _weight(pairs: Pairs, decision: Decision) -> Floats:
+    """(N,) weight of each pair; zero for those that the decision does not name."""
+    count = 1 + int(pairs.measurement.max(initial=0))
+    name = pairs.row * count + pairs.measurement  # ascending
+    weight = np.zeros(len(pairs))
+    weight[np.searchsorted(name, decision.row * count + decision.measurement)] = decision.beta
+    return weight
+
+
+def _candidates(pairs: Pairs, weight: Floats, rows: int) -> tuple[Ints, Floats, Floats]:
+    """(T, LISTED) measurements, weights and d2 of each row's pairs, the heaviest first, of equals the nearest."""
+    order = np.lexsort((pairs.d2, -weight, pairs.row))
+    place = np.arange(len(order)) - pairs.start[pairs.row]
+    listed = place < LISTED
+    cell, pair = (pairs.row[listed], place[listed]), order[listed]
+    measurement = np.full((rows, LISTED), -1)
+    share, d2 = np.full((2, rows, LISTED), np.nan)
+    measurement[cell], share[cell], d2[cell] = pairs.measurement[pair], weight[pair], pairs.d2[pair]
+    return measurement, share, d2

@@ -1,4 +1,4 @@
-"""Deferred decisions: a track is a tree whose leaves, rows of the bank, are what it may have done so far."""
+"""Deferred decisions: a track is a tree, and each of its leaves, a row of the bank, is one possible history."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Event, Floats, Ints
+from vidtrack.scan import Decision, Event, Floats, Ints, Mask
 from vidtrack.tracking.register import Register
-
-Mask = np.ndarray
 
 
 class Growth(NamedTuple):
     """What becomes of the trees in a scan.
 
-    problem   what each successor could choose from: of a heap of measurements only the likeliest
+    problem   what each successor could choose from, limited to the likeliest measurements
     decision  how the successors come from the rows
     born      (M,) measurements that start trees
     """
@@ -29,8 +27,8 @@ class Growth(NamedTuple):
 class Forest(Protocol):
     """The trees of a tracker, one leaf a row of its bank and register; leaves of one tree have one track id.
 
-    shown  rows of the tracks that are believed at present, at most one of each tree
-    sure   (T,) rows whose tree is no matter of doubt any more
+    shown  rows that are shown as tracks at present, at most one of each tree
+    sure   (T,) rows whose tree is probable enough to be confirmed
     """
 
     @property
@@ -40,25 +38,25 @@ class Forest(Protocol):
     def sure(self) -> Mask: ...
 
     def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
-        """Decide on a scan, and take the rows of the register over to the successors.
+        """Decide on a scan and replace the rows of the register by their successors.
 
-        The new trees become the last rows, in the order of their measurements. starts (M,) measurements that may
-        start one.
+        starts (M,) measurements that may start a tree. New trees become the last rows, in the order of their
+        measurements.
         """
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
-        """Make up its mind about who is shown, once all rows of the scan are there."""
+        """Choose the rows that are shown, once those of the new trees are in the bank."""
 
     def keep(self, kept: Mask) -> None:
         """Drop all rows but these; trees that are not yet in the bank stay."""
 
     def add(self, count: int) -> None:
-        """Trees with a known first leaf, as last rows."""
+        """Append `count` trees of one leaf each as last rows."""
 
 
 @runtime_checkable
 class Deferred(Protocol):
-    """An association rule that decides later: MHT, Split."""
+    """An association rule that decides some scans later: MHT, Split."""
 
     def forest(self) -> Forest:
         """A new tracker's trees."""
@@ -83,7 +81,7 @@ class Window:
         return len(self.age)
 
     def move(self, parent: Ints, taken: Ints, born: Ints, measurements: int) -> None:
-        """One scan on: successors of parent (K,) took measurement taken (K,) or -1; then trees born of born (B,)."""
+        """Add a scan: successors of `parent` (K,) took measurement `taken` (K,) or -1; then trees from `born` (B,)."""
         number = np.where(taken < 0, -1, taken + self.seen)
         past = np.full((len(parent) + len(born), self.past.shape[1]), -1)
         past[: len(parent), 1:] = self.past[parent, :-1]

@@ -18,14 +18,14 @@ from vidtrack.tracking.tracker import Tracker
 
 @dataclass(frozen=True, slots=True)
 class Formation:
-    """What a group is.
+    """What makes a group.
 
-    link   px or m; measurements no farther apart, or linked by others that are not, are of one group
+    link   px or m; measurements at most this far apart, directly or by way of others, are one group
     merge  px or m; confirmed groups whose centroids are closer become one
-    scans  a member counts once it was seen in so many scans in a row, and a gap wider than `link` that lasts so many
+    scans  a member counts once it was seen in this many scans in a row; a gap wider than `link` that lasts this many
            scans splits the group
-    by     what updates a group: the mean of its measurements, or that of its members, each where its measurement is
-           or, without one, where the group's velocity took it
+    by     what updates a group: the mean of its measurements, or the mean of its members, each at its measurement or,
+           without one, where the group's velocity took it
     """
 
     link: float
@@ -143,8 +143,10 @@ class GroupTracker:
             yield Event(t, int(old), "split", f"{leaving.sum()} members went apart as group {new}")
 
     def _restate(self, ids: Ints, name: int | None, were: Tracks, members: Members) -> int:
-        """One group in place of those of these ids, under a name, or under a new one: where its members are on the
-        average, moving as the groups did that each of them came from."""
+        """Replace the groups of these ids by one, and return its id: `name`, or a new one for None.
+
+        It is at the mean of its members, with the mean motion of the groups `were` that they came from.
+        """
         x, P = were.x.mean(axis=0), were.P.mean(axis=0)
         x[list(were.position)] = members.z.mean(axis=0)
         self.tracker.remove(ids)

@@ -7,8 +7,8 @@ from numba import njit
 
 from vidtrack.associate.kbest import k_best
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Floats, Ints
-from vidtrack.tracking.hypotheses import Hypotheses, Mask, log_sum
+from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.tracking.hypotheses import Hypotheses, log_sum
 
 NEVER = -1e6
 """ln of the likelihood of what cannot be seen. The fewest such factors win."""

@@ -16,7 +16,7 @@ from numba import njit
 
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.boxes import best_cover
 
 ONE_SIDED = 4.0
@@ -50,19 +50,17 @@ class Groups:
         if not 0 < self.cover <= 1:
             raise ConfigError(f"group cover is {self.cover}; it must lie in 0..1")
 
-    def share(
-        self, predicted: Floats, taken: Ints, confirmed: np.ndarray, whole: np.ndarray, blobs: Floats
-    ) -> tuple[Ints, np.ndarray]:
-        """(T,) the blob that each track leans on by its edges, -1: none; (M,) blobs that may hide somebody new.
+    def share(self, predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats) -> tuple[Ints, Mask]:
+        """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.
 
-        A track leans on a blob that it shares with others, that it lies on without having got it, or that is not
-        the vehicle it was. predicted (T, 4) boxes, taken (T,) measurement of each track or -1, confirmed (T,), whole
-        (T,) those whose box is believed and all in the picture, blobs (M, 4) boxes.
+        The edges count where a track shares its blob with others, lies on a blob that it was not assigned, or where
+        its blob no longer fits the vehicle. predicted (T, 4) boxes, taken (T,) measurement of each track or -1,
+        confirmed (T,), whole (T,) tracks whose box is reliable and inside the picture, blobs (M, 4) boxes.
         """
         return _share(predicted, taken, confirmed, whole, blobs, self.cover, self.growth, self.edge)
 
     def measure(
-        self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, hides: np.ndarray
+        self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: Mask, hides: Mask
     ) -> tuple[Floats, Floats, Ints]:
         """Position (G, 2), variances (G, 2) and count of own edges (G,) for tracks on blobs.
 
@@ -75,9 +73,9 @@ class Groups:
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")
 def _share(
-    predicted: Floats, taken: Ints, confirmed: np.ndarray, whole: np.ndarray, blobs: Floats,
+    predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats,
     cover: float, growth: float, edge: float,
-) -> tuple[Ints, np.ndarray]:  # fmt: skip
+) -> tuple[Ints, Mask]:  # fmt: skip
     shared = _blob_of(predicted, taken, confirmed, blobs, cover)
     explained = np.zeros(len(blobs))
     for t in range(len(shared)):
@@ -90,8 +88,8 @@ def _share(
 
 
 @njit(cache=CACHE, nogil=True)
-def _blob_of(predicted: Floats, taken: Ints, confirmed: np.ndarray, blobs: Floats, cover: float) -> Ints:
-    """(T,) the blob each track shares with others or lies on without having got it; -1 for all others."""
+def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, cover: float) -> Ints:
+    """(T,) the blob each track shares with others, or lies on without being assigned it; -1 for all others."""
     shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
     orphans = np.flatnonzero(confirmed & (taken < 0))
     blob, share = best_cover(predicted[orphans], blobs)
@@ -123,7 +121,7 @@ def _changed(box: Floats, blob: Floats, growth: float, edge: float) -> bool:
 
 @njit(cache=CACHE, nogil=True, error_model="numpy")
 def _from_edges(
-    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: np.ndarray, hides: np.ndarray,
+    predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: Mask, hides: Mask,
     gate: float, edge: float,
 ) -> tuple[Floats, Floats, Ints]:  # fmt: skip
     """Each member's position from the four edges of its blob.

@@ -8,9 +8,7 @@ import numpy as np
 from numba import njit
 
 from vidtrack.compiled import CACHE
-from vidtrack.scan import Floats, Ints
-
-Mask = np.ndarray
+from vidtrack.scan import Floats, Ints, Mask
 
 
 class Hypotheses(NamedTuple):

@@ -12,17 +12,15 @@ from scipy.special import bdtrc
 
 from vidtrack.compiled import CACHE
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Floats, Ints
+from vidtrack.scan import MERGED, TENTATIVE, Floats, Ints, Mask
 from vidtrack.tracking.register import Register
-
-Mask = np.ndarray
 
 
 class Life(Protocol):
     """Rules for the rows of a register.
 
     birth            log-odds that a measurement which belongs to no track is a target's
-    confirms, ends   what to say of a track that was confirmed, and of one that is hopeless
+    confirms, ends   the reason that the events of a confirmation, and of a hopeless track's deletion, give
     """
 
     @property
@@ -35,10 +33,10 @@ class Life(Protocol):
     def ends(self) -> str: ...
 
     def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
-        """(T,) tentative rows that now deserve belief. travel (T,) from where they began, size (T,) of the objects."""
+        """(T,) tentative rows to confirm now. travel (T,) from where they began, size (T,) of the objects."""
 
     def hopeless(self, register: Register) -> Mask:
-        """(T,) rows that what was seen of them, and what was not, speaks against."""
+        """(T,) rows to delete because their hits and misses speak against a target."""
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long."""
@@ -80,7 +78,7 @@ class LifeCycle:
 
     @property
     def ends(self) -> str:
-        """Why hopeless rows are."""
+        """Reason of the deletion of hopeless rows."""
         return "too many misses before confirmation"
 
     @property
@@ -105,12 +103,12 @@ class LifeCycle:
 
 
 def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
-    """(T,) tentative rows that are old enough and whose travel (T,) is at least so much (T,)."""
+    """(T,) tentative rows that are old enough and whose travel (T,) is at least `least` (T,)."""
     return _grown(register.status, t - register.born_s, travel, age_s * (1 - 1e-9), least)
 
 
 def missed(register: Register, scans: int | None) -> Mask:
-    """(T,) rows that the last scans, so many, did not show; None: no limit."""
+    """(T,) rows without a hit in the last `scans` scans; None: no limit."""
     if scans is None:
         return np.zeros(len(register), bool)
     return register.history & ((1 << scans) - 1) == 0
@@ -142,7 +140,7 @@ def confirmation_probability(p: float, hits: int, window: int, *, initiated: boo
 
 
 def scans_to_false_deletion(misses: int, detection: float) -> float:
-    """Mean number of scans until so many misses in a row end the track of a target seen with this probability."""
+    """Mean number of scans until `misses` in a row delete the track of a target that each scan shows with P_D."""
     q = 1 - detection
     return sum(q**-i for i in range(1, misses + 1)) if q > 0 else inf
 
@@ -165,7 +163,7 @@ def _unseen(status: np.ndarray, since: Floats, alone: float, hidden: float) -> M
 
 @njit(cache=CACHE, nogil=True)
 def _often(history: Ints, window: int, least: int) -> Mask:
-    """(T,) rows with at least so many hits within the window."""
+    """(T,) rows with at least `least` hits within the window."""
     often = np.zeros(len(history), np.bool_)
     for t in range(len(history)):
         often[t] = _counts(history[t], window)[0] >= least
@@ -183,7 +181,7 @@ def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> M
 
 @njit(cache=CACHE, nogil=True)
 def _counts(history: int, window: int) -> tuple[int, int]:
-    """Hits and misses of a row in its last scans, so many; its birth is the highest bit of its history."""
+    """Hits and misses of a row in its last `window` scans; its birth is the highest bit of its history."""
     hits, misses = 0, 0
     for _ in range(window):
         if history == 0:

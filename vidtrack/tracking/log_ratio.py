@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, log
 
-import numpy as np
-
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 from vidtrack.tracking.lifecycle import grown, missed, refuse_immortal, unseen
 from vidtrack.tracking.register import Register
 
 LEAST = 1e-8
 """Smallest error probability: scores are kept within limits that it does not reach."""
-
-Mask = np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +63,7 @@ class LogRatio:
 
     @property
     def ends(self) -> str:
-        """Why hopeless rows are."""
+        """Reason of the deletion of hopeless rows."""
         return f"score fell by {self.drop:.2f}"
 
     @property

@@ -10,10 +10,8 @@ from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.redundancy import linked
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Floats, Ints, Mask, Scan
 from vidtrack.tracking.choices import heaviest
-
-Mask = np.ndarray
 
 
 class Members(NamedTuple):
@@ -48,7 +46,7 @@ class Members(NamedTuple):
         return Members(*(column[rows] for column in self))
 
     def joined(self, other: Members) -> Members:
-        """Both."""
+        """These members, then the others."""
         return Members(*(np.concatenate(columns) for columns in zip(self, other, strict=True)))
 
     def moved(self, ids: Ints, shift: Floats) -> Members:
@@ -79,8 +77,8 @@ class Members(NamedTuple):
 
         While others of the group are missing, a plot may stand for several. The farther it is from where a member was
         expected, the less the member follows it: by the share of the measurement's variance in the square of that.
-        Who was seen in so many `scans` in a row counts from then on; who was not, and is missed, is nobody, unless
-        nobody in the group counts yet.
+        A member seen in `scans` scans in a row counts from then on. One that does not count yet is dropped when it is
+        missed, unless no member of its group counts.
         """
         hit, doubtful = taken >= 0, self.doubtful
         surprise, var = np.zeros_like(self.z), np.ones(len(self.z))

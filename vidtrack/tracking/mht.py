@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
-from vidtrack.scan import TENTATIVE, Event, Floats, Ints
+from vidtrack.scan import TENTATIVE, Event, Floats, Ints, Mask
 from vidtrack.tracking.forest import Growth, Window, one_each
 from vidtrack.tracking.generation import NEVER, agreeing, children, likeliest
 from vidtrack.tracking.hypotheses import Hypotheses, surviving
@@ -18,18 +18,16 @@ from vidtrack.tracking.register import Register
 SURE = 0.9
 """A track is confirmed only when the hypotheses that have it are together at least so probable."""
 
-Mask = np.ndarray
-
 
 @dataclass(frozen=True, slots=True)
 class MHT:
     """Multiple hypotheses: what a measurement was is decided scans later, by what came after.
 
-    n_scan       a scan is decided so many scans later, as the likeliest hypothesis has it
-    hypotheses   likeliest ones kept in each cluster
-    threshold    less probable ones are dropped
-    mass         the likeliest that sum to this probability are enough
-    branches     likeliest measurements a leaf may take
+    n_scan       a scan is decided this many scans later, as the likeliest hypothesis has it
+    hypotheses   largest number kept in each cluster
+    threshold    hypotheses less probable than this are dropped
+    mass         of each cluster the likeliest are kept whose probabilities sum to this
+    branches     largest number of measurements a leaf may branch to, the likeliest
     new_share    density of the measurements that new targets begin with, per density of false ones
 
     A track is confirmed when its life cycle says so and hardly a hypothesis doubts it. What is shown is the likeliest
@@ -110,9 +108,9 @@ class HypothesisForest:
         return Growth(problem.of(parent), one_each(parent, taken), born)
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
-        """The likeliest hypothesis is shown, and what tentative tracks may be doing that it calls false.
+        """Show the likeliest hypothesis, and tentative tracks that only less likely hypotheses have.
 
-        A tree that is not shown any more will come back, if ever, under another id.
+        A tree that is no longer shown comes back, if ever, under another id.
         """
         best, p = self.hypotheses.best, self._held()
         self.shown = np.concatenate([best, self._doubted(best, p, register)])
@@ -205,9 +203,9 @@ class HypothesisForest:
         return cluster
 
     def _doubted(self, best: Ints, p: Floats, register: Register) -> Ints:
-        """Of each tentative tree that the best leaves (B,) have nothing of, the likeliest leaf, p (T,) probable.
+        """The likeliest leaf, by probability p (T,), of each tentative tree without a leaf among the best (B,).
 
-        None that took, in the undecided scans, what a best leaf or an older tree's took.
+        Leaves that share a measurement of the undecided scans with a best leaf or an older tree's leaf are left out.
         """
         past, name = self.window.past, register.id
         taken = np.isin(past, past[best]) & (past >= 0)

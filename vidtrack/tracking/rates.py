@@ -1,21 +1,20 @@
-"""How often targets are seen, and how dense false measurements are: given, or learnt from what tracks take."""
+"""Detection probability and clutter density: given, or estimated from what tracks take and leave."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Decision, Floats, Ints, Scan
+from vidtrack.scan import MERGED, TENTATIVE, Decision, Floats, Ints, Mask, Scan
 from vidtrack.tracking.register import Register
 
 MEMORY_S = 300.0
-"""Time constant of forgetting."""
+"""Time constant with which old scans are forgotten."""
 PRIOR, PRIOR_SCANS = 0.9, 10.0
 """Detection probability before anything was seen, and the scans of one track that weigh as much."""
 HIGHEST = 0.999
-"""A target that was always seen may be missed yet."""
+"""Largest estimate of P_D: a target that was always seen may still be missed."""
 
-Mask = np.ndarray
 Rate = float | Floats | None
 
 
@@ -53,7 +52,7 @@ class Rates:
 
     @property
     def estimated(self) -> bool:
-        """Whether either is."""
+        """Whether one of them, or both, is estimated."""
         return self._detection is None or self._clutter is None
 
     @property
@@ -83,7 +82,7 @@ class Rates:
         )
 
     def look(self, scan: Scan) -> None:
-        """Take in where measurements lie, where that is asked for."""
+        """Extend the surveyed space by this scan's measurements, unless it was given."""
         if self._clutter is not None or self._space is not None or not len(scan):
             return
         reach = np.sqrt(3 * np.diagonal(scan.R, axis1=1, axis2=2))  # half the width of a uniform error

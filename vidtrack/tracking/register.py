@@ -7,18 +7,16 @@ from numba import njit
 from scipy.special import expit
 
 from vidtrack.compiled import CACHE
-from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Floats, Ints
+from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Floats, Ints, Mask
 
 BELIEF = 20.0
 """Largest log-odds of a track's existence."""
 SCANS = (1 << 63) - 1
-"""The bits of a history that count: its 63 lowest."""
-
-Mask = np.ndarray
+"""Mask of the bits of a history that are kept: the 63 lowest."""
 
 
 class Register:
-    """Who the rows are; one row a track, in the order of the estimator's rows.
+    """Identity and history of each row; rows are in the order of the estimator's.
 
     id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest),
     start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
@@ -81,11 +79,11 @@ class Register:
         _see(self.history, self.alone_s, self.updated_s, self.status, hit, sure, t, dt)
 
     def believe(self, log_ratio: Floats) -> None:
-        """Take in evidence (T,) for the rows' existence: Bayes' rule in log-odds."""
+        """Add evidence (T,) to the log-odds of existence: Bayes' rule."""
         _believe(self.score, self.best, self.status, log_ratio)
 
     def settle(self) -> None:
-        """Give the rows that are confirmed the status that follows from what was seen of them."""
+        """Set the status of confirmed rows by this scan: confirmed, coasting or merged."""
         _settle(self.status, self.history, self.group)
 
     def append(

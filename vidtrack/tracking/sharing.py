@@ -1,4 +1,4 @@
-"""The book of shared blobs: who lives on which, since when, and the update by edges that follows from it."""
+"""Shared blobs: which tracks are on which blob, since when, and the update of these tracks by its edges."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ import numpy as np
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.lasting import inflation
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Event, Floats, Ints, Scan
+from vidtrack.scan import Decision, Event, Floats, Ints, Mask, Scan
 from vidtrack.tracking.border import Border
 from vidtrack.tracking.boxes import absolute
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.register import Register
 
-ADULT = 5
-"""Updates after which a track's box is believed."""
+SETTLED = 5
+"""Updates after which a track's box is reliable."""
 SLOW = 5.0
 """A box follows a blob of another size this many times more slowly than its own."""
-
-Mask = np.ndarray
 
 
 class Sharing:
@@ -33,18 +31,18 @@ class Sharing:
         self._made = 0
 
     def claim(self, predicted: Floats, hits: Ints, taken: Ints, confirmed: Mask, blobs: Floats) -> tuple[Ints, Mask]:
-        """Which tracks lean on a blob by its edges, and which blobs the tracks on them do not account for.
+        """Which tracks are updated by the edges of a blob, and which blobs are larger than their tracks account for.
 
         predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
-        Returns (T,) the blob or -1, and (M,) blobs that may hide somebody new.
+        Returns (T,) the blob or -1, and (M,) blobs that may hide a vehicle without a track.
         """
-        whole = (hits > ADULT) & ~self._border.cut(predicted)
+        whole = (hits > SETTLED) & ~self._border.cut(predicted)
         return self._groups.share(predicted, taken, confirmed, whole, blobs)
 
     def follow(
         self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
     ) -> None:
-        """Update the tracks that lean on blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
+        """Update the tracks on shared blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
         leans = shared >= 0
         rows = leans.nonzero()[0]
         if not len(rows):

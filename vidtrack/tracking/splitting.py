@@ -9,21 +9,19 @@ from scipy.special import chdtri
 
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Event, Floats, Ints
+from vidtrack.scan import Event, Floats, Ints, Mask
 from vidtrack.tracking.forest import Growth, Window, one_each
 from vidtrack.tracking.generation import NEVER, likeliest
 from vidtrack.tracking.register import Register
-
-Mask = np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
 class Split:
     """Track splitting: every gated report, and the miss, continues a track in a branch of its own.
 
-    n_scan       branches that took the same measurements in so many scans are one
-    leaves       likeliest branches kept of each track
-    branches     likeliest measurements a branch may take
+    n_scan       branches that took the same measurements in this many scans are merged
+    leaves       largest number of branches kept of each track, the likeliest
+    branches     largest number of measurements a branch may split into, the likeliest
     probability  share of true branches that the test of their score admits: the sum of v' S^-1 v over the last
                  n_scan scans is chi-square distributed
 
@@ -66,7 +64,7 @@ class BranchForest:
 
     @property
     def sure(self) -> Mask:
-        """(T,) true: branches are no matter of doubt for others."""
+        """(T,) true: no hypothesis competes with a branch."""
         return np.ones(len(self.window), bool)
 
     def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
@@ -133,7 +131,7 @@ class BranchForest:
         return parent, taken
 
     def _thinned(self, tree: Ints, dim: int) -> Ints:
-        """Branches (rows, ascending) that are plausible, nobody's double, and among the likeliest of their tree."""
+        """Branches (rows, ascending) that are plausible, no duplicates, and among the likeliest of their tree."""
         alive = self._plausible(tree, dim)
         alive = alive[self._different(tree[alive], self.window.past[alive], self.window.age[alive], self.log_l[alive])]
         return np.sort(alive[_rank(tree[alive], self.log_l[alive]) < self.rule.leaves])

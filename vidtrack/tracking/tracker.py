@@ -1,4 +1,4 @@
-"""The tracker: scans in, tracks out. The page to read first."""
+"""The tracker: scans in, tracks out. Read this file first."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.estimate.smoother import smoothing_gain
-from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Scan, Tracks
+from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Mask, Scan, Tracks, check_states
 from vidtrack.tracking.association import Association, at_once, deferred
 from vidtrack.tracking.births import pieces
 from vidtrack.tracking.border import Border
@@ -37,34 +37,32 @@ from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.sharing import Sharing
 
 EXIT_S = 0.2
-"""A track on its way over the border is given up after so long without evidence."""
-
-Mask = np.ndarray
+"""s; a track that is leaving over the border is deleted this long after its last evidence."""
 
 
 class Tracker:
     """Multi-target tracker: predict, gate, associate, update, register, delete.
 
     model      motion model of every target
-    associate  association rule: NN(), GNN(), ..., or one that decides scans later: MHT(), Split()
+    associate  association rule: NN(), GNN(), ..., or one that decides some scans later: MHT(), Split()
     gate       Gate, or the probability of one
-    life       confirmation and deletion: LifeCycle(), M of N, or LogRatio(), by the score
+    life       confirmation and deletion: LifeCycle(), M of N, or LogRatio(), by the log-likelihood ratio
     groups     how tracks share merged blobs (scans with boxes only); None: they do not
     shape      how the size of boxes counts in the association; None: it does not
     trust      which scores may start a track; None: scores do not count
-    estimator  the filters' bank, made from the model
+    estimator  makes the bank of filters from the model
     bounds     (width, height) of the picture; a track that leaves it is deleted; None: no border
     births     whether measurements that belong to no track start one
     detection_probability, clutter_density [per px^2 or m^2]   for weights and existence probability: numbers, arrays
-               (B,) with one for each Monte Carlo run, or None: estimated from the scans (`rates` has what they are)
-    threshold  sets the threshold on amplitudes for each track and scan, from its innovation covariance; P_D and clutter
-               density follow from it, whatever was given for them. None: measurements are taken as they are
-    surveyed   area [px^2 or m^2] that the estimate of clutter is about; None: the picture, else where measurements lie
+               (B,) with one for each Monte Carlo run, or None: estimated from the scans (`rates` has the estimates)
+    threshold  controller of the detection threshold, set for each track and scan from its innovation covariance; P_D
+               and clutter density then follow from it, and those given are ignored. None: all measurements are used
+    surveyed   area [px^2 or m^2] over which the clutter is estimated; None: the picture, else the measurements' extent
     box_s      time constant [s] with which a track's box follows its blobs' boxes
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
-    Raises ConfigError for numbers out of range, or a rule given by its class or name.
+    Raises ConfigError for numbers out of range, or an association rule that is not an instance.
     """
 
     STATE = ("t", "bank", "register", "sharing", "forest", "rates")
@@ -135,7 +133,7 @@ class Tracker:
         if self.sharing and blobs is not None:
             self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
         why = self._why(problem, decision, taken) if self.explain else None
-        nis = self._believe(problem, decision, taken, shared, dt)
+        nis = self._weigh_evidence(problem, decision, taken, shared, dt)
         kept = self._delete(scan.t, events)
         if self.sharing:
             self.sharing.regroup(shared[kept], self.register, scan.t, events)
@@ -147,12 +145,12 @@ class Tracker:
         return self._snapshot(scan.t, self.bank.x, self.bank.P, taken, nis, events=tuple(events), choices=why, **links)
 
     def predict(self, t: float) -> Tracks:
-        """All tracks as expected at time t; changes nothing. Raises ScanError for a time before the last scan's."""
+        """All tracks predicted to time t; the tracker does not change. Raises ScanError for a time in the past."""
         x, P = self.bank.ahead(self._since_last(t))
         return self._snapshot(t, x, P, np.full(len(x), -1), np.full(len(x), np.nan))
 
     def remove(self, ids: Ints) -> None:
-        """Take out the tracks of these ids."""
+        """Delete the tracks with these ids."""
         self._keep(~np.isin(self.register.id, ids))
 
     def add(
@@ -164,7 +162,11 @@ class Tracker:
         box: Floats | None = None,
         ids: Ints | None = None,
     ) -> Ints:
-        """Put in confirmed tracks with known states x (B, n), P (B, n, n); returns their ids: new ones, or as given."""
+        """Add confirmed tracks with known states x (B, n), P (B, n, n); returns their ids (B,), new unless given.
+
+        Raises ScanError for states or covariances that are none.
+        """
+        check_states(x, P)
         first, count = len(self.bank), len(x)
         position = list(self.model.position)
         self.bank.insert(x, P, np.ones(count))
@@ -180,7 +182,7 @@ class Tracker:
         return self.register.id[first:].copy()
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
-        """Move all rows to the scan's time; those unseen for too long end here, before they gate anything."""
+        """Move all rows to the scan's time and delete those unseen for too long; returns the time step [s]."""
         t = scan.t
         if len(scan) and scan.sensor is None and scan.z.shape[1] != self.model.dim:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
@@ -199,9 +201,9 @@ class Tracker:
         return dt
 
     def _remember(self, dt: float, x: Floats, P: Floats) -> None:
-        """For a smoother: what was predicted from x, P for the tracks that were shown, and what it says about them."""
+        """Keep what a smoother needs: the prediction of the tracks that were shown, and the gain back to x, P."""
         gain = smoothing_gain(P, self.bank.jacobian(dt, x), self.bank.P)
-        prior_x = np.where(self._believed(len(x))[:, None], self.bank.x, np.nan)
+        prior_x = np.where(self._shown(len(x))[:, None], self.bank.x, np.nan)
         self.register.link(prior_x, self.bank.P, gain)
 
     def _since_last(self, t: float) -> float:
@@ -225,7 +227,7 @@ class Tracker:
         return problem.having(self.shape.weigh(problem.pairs, self._boxes(), blobs))
 
     def _associated(self, problem: Problem, blobs: Floats | None, events: list[Event]) -> Association:
-        """Who gets what, at once or with decisions that wait."""
+        """Assign measurements to tracks, at once or by decisions that wait for later scans."""
         if self.forest:
             return deferred(problem, self.forest, self.trust, self.births, self.register, events)
         claim, confirmed = None, self.register.status != TENTATIVE
@@ -236,7 +238,7 @@ class Tracker:
     def _update(
         self, decision: Decision, taken: Ints, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float
     ) -> None:
-        """States by their measurements, boxes by theirs."""
+        """Update states and boxes with the measurements that the tracks took."""
         register = self.register
         self.bank.update(decision, scan.weakened(inflation(dt)), sensor)
         hit = decision.beta0 < 0.5
@@ -255,33 +257,33 @@ class Tracker:
             self.bank.scale[rows] = longer(register.box)[rows]
 
     def _why(self, problem: Problem, decision: Decision, taken: Ints) -> Choices:
-        """What was decided for each track that is believed."""
+        """The choices of the tracks that are shown."""
         why = choices(self.register.id, problem.pairs, decision, taken)
-        return why.only(self._believed(problem.rows)) if self.forest else why
+        return why.only(self._shown(problem.rows)) if self.forest else why
 
-    def _believed(self, rows: int) -> Mask:
-        """(rows,) which of the first rows are shown at present; all, unless decisions wait."""
-        believed = np.full(rows, self.forest is None)
+    def _shown(self, rows: int) -> Mask:
+        """(rows,) whether each of the first rows is shown as a track; all are, unless decisions wait."""
+        shown = np.full(rows, self.forest is None)
         if self.forest:
-            believed[self.forest.shown[self.forest.shown < rows]] = True
-        return believed
+            shown[self.forest.shown[self.forest.shown < rows]] = True
+        return shown
 
-    def _believe(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints, dt: float) -> Floats:
-        """What the tracks got, as evidence for their existence (Bayes' rule in log-odds) and for the rates.
+    def _weigh_evidence(self, problem: Problem, decision: Decision, taken: Ints, shared: Ints, dt: float) -> Floats:
+        """Update the tracks' existence (Bayes' rule in log-odds) and the estimates of P_D and clutter density.
 
-        Returns the normalised innovations squared (T,).
+        Returns the normalised innovations squared (T,), NaN for a miss.
         """
         register = self.register
         log_ratio, nis = evidence(problem, decision, taken)
         log_ratio[shared >= 0] = 0.0
         register.believe(log_ratio)
         if self.rates.estimated:
-            alone = self._believed(problem.rows) & (shared < 0)
+            alone = self._shown(problem.rows) & (shared < 0)
             self.rates.learn(decision, register, alone, problem.inside, problem.measurements, dt)
         return nis
 
     def _delete(self, t: float, events: list[Event]) -> Mask:
-        """Drop the rows that are not believed any more; returns the mask of those kept."""
+        """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         left = self._left(t)
         hopeless = self.life.hopeless(self.register)
         parts = self.sharing.passengers(self.register, t) if self.sharing else np.zeros(len(left), bool)
@@ -297,7 +299,7 @@ class Tracker:
         return kept
 
     def _left(self, t: float) -> Mask:
-        """(T,) tracks that this scan missed, and that are over the border or were last seen on their way there."""
+        """(T,) tracks without a hit in this scan that are beyond the border, or were leaving when last seen."""
         register = self.register
         left = register.history & 1 == 0
         missed = left.nonzero()[0]
@@ -309,7 +311,7 @@ class Tracker:
         return left
 
     def _register(self, scan: Scan, sensor: Sensor, blobs: Floats | None, free: Mask, events: list[Event]) -> Ints:
-        """Start tentative tracks from measurements that belong to nobody; returns their indices."""
+        """Start tentative tracks from measurements that belong to no track; returns the indices of these."""
         born = (free & self.births).nonzero()[0]
         if blobs is not None and self.sharing and len(born):
             born = born[~pieces(blobs[born], self._boxes()[self.register.status != TENTATIVE])]
@@ -327,7 +329,7 @@ class Tracker:
         return born
 
     def _confirm(self, t: float, events: list[Event]) -> None:
-        """Tentative tracks that earned it are confirmed; the others' status follows what was seen of them."""
+        """Confirm the tentative tracks that qualify, and set the status of all others by what was seen of them."""
         register = self.register
         if self.forest:
             self.forest.settle(register, t, events)
@@ -350,7 +352,7 @@ class Tracker:
         return absolute(self.register.box, self._xy())
 
     def _ends(self, going: Mask, why: Mask | None = None) -> Ints:
-        """Ids of the tracks that lose their last row when `going` (T,) go, and one row of which goes by `why` (T,)."""
+        """Ids of the tracks whose last row is among `going` (T,); with `why` (T,), only those with a row in it."""
         ids = self.register.id
         ended = ids[going if why is None else why]
         return np.setdiff1d(ended, ids[~going]) if self.forest else ended

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints, Status, Tracks
+from vidtrack.scan import Floats, Ints, Mask, Status, Tracks
 
 _log = logging.getLogger(__name__)
 
@@ -171,7 +170,7 @@ class LineCounter:
             return []
         return self._collect(state, np.repeat(gone[:, None], len(self.lines), axis=1))
 
-    def _collect(self, state: _State, clear: NDArray[np.bool_]) -> list[Crossing]:
+    def _collect(self, state: _State, clear: Mask) -> list[Crossing]:
         """Crossings among the (track, line) pairs whose side is clear."""
         side = state.distance >= 0
         crossed = clear & (side != state.side) & state.seen & state.confirmed[:, None]

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.compiled import CACHE
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
 from vidtrack.video.foreground import Foreground
+from vidtrack.video.frame import Image
 from vidtrack.video.runs import components, connect, find_runs, join
 
 _SPREAD = 1.2  # predicted boxes are taken this much larger about their centres before fragments are sought in them
@@ -44,7 +46,7 @@ class Blobs:
         """The blobs as measurements: z the centroids, boxes relative to them.
 
         R = (jitter_px step)^2 I + jitter_share^2 cov: the border is uncertain by a part of a processed pixel, and
-        what is missed or added at an end moves the centroid along the extent, and lasts. From frame to frame
+        what is missed or added at an end moves the centroid along the extent for many frames. From frame to frame
         centroids of vehicles jitter by 0.1 to 0.25 px at 240 to 360 rows; the defaults are above that, because
         shadow and parts that look like the road come and go slowly.
         """
@@ -73,8 +75,8 @@ def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
 def join_fragments(blobs: Blobs, predicted: Floats) -> Blobs:
     """Blobs whose boxes lie for the most part in the same one of the predicted boxes (K, 4), joined; moments exact.
 
-    A blob that has to do with no or with several predicted boxes stays as it is. So do pieces farther apart than
-    `join_gap`: two vehicles that entered as one blob drift apart inside the box that was predicted for both.
+    A blob that touches no predicted box, or several, stays as it is. So do pieces farther apart than `join_gap`: two
+    vehicles that entered as one blob drift apart inside the box that was predicted for both.
     """
     most, gap = blobs.settings.join_overlap, blobs.settings.join_gap
     group, count = _fragments(blobs.box, predicted, most, gap)
@@ -108,7 +110,7 @@ def _joined(blobs: Blobs, group: Ints, count: int) -> Blobs:
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _fragments(box, predicted, most, gap):  # type: ignore[no-untyped-def]
+def _fragments(box: Floats, predicted: Floats, most: float, gap: float) -> tuple[Ints, int]:
     """Group of each box (B,) and the number of groups: close pieces of the same predicted vehicle are in one."""
     parent = np.arange(len(box))
     vehicle = np.empty(len(box), np.int64)
@@ -123,7 +125,7 @@ def _fragments(box, predicted, most, gap):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _only_vehicle(box, predicted, most):  # type: ignore[no-untyped-def]
+def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     """The predicted box in which most of this box (4,) lies; -1 if there is none, or others have a part in it."""
     vehicle, sharers = -1, 0
     for k in range(len(predicted)):
@@ -135,7 +137,7 @@ def _only_vehicle(box, predicted, most):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _share_inside(box, other):  # type: ignore[no-untyped-def]
+def _share_inside(box: Floats, other: Floats) -> float:
     """Share of a box's area that lies in the other one, spread."""
     common = 1.0
     for axis in range(2):
@@ -146,14 +148,14 @@ def _share_inside(box, other):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _gap(a, b):  # type: ignore[no-untyped-def]
+def _gap(a: Floats, b: Floats) -> float:
     """Distance between two boxes along the axis that separates them more; negative where they overlap."""
     across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
     return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _measure(mask, strength, least):  # type: ignore[no-untyped-def]
+def _measure(mask: Image, strength: NDArray, least: float) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Of each component of at least so many pixels: count (B,), mean (B, 2), covariance (B, 2, 2), box, strength."""
     row, start, stop = find_runs(mask, False)
     label, blobs = connect(row, start, stop, 1)

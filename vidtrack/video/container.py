@@ -12,7 +12,7 @@ import av
 from vidtrack.config import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
-from vidtrack.video.header import avi_period_s, missing_bytes
+from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
 from vidtrack.video.stats import SourceStats
 
 _DECODERS = 4  # at least: pictures take unlike times, and with three of them on two cores one is idle more often
@@ -23,12 +23,12 @@ _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K vi
 class VideoFile:
     """The pictures of a video file in order of presentation; iterate once.
 
-    name, fps, frames as for Source. Damage is counted in `stats` and reading goes on with the next picture
+    name, place, fps, frames as for Source. Damage is counted in `stats` and reading goes on with the next picture
     that can be decoded. Raises SourceError for what is not a readable video.
     """
 
     def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats) -> None:
-        self._path = path
+        self._path = self.place = path
         self._stats = stats
         self._container = _open(path)
         self._stream = _video_stream(self._container, path)
@@ -112,9 +112,10 @@ class VideoFile:
         stamps = [self._stamp(packet) for packet in self._opening if packet is not None]
         rate = stamp_rate([stamp for stamp in stamps if stamp is not None])
         measured = None if rate is None else rate * ticks_per_s
-        header = float(self._stream.average_rate or 0)
+        is_stated = not self._is_avi or avi_states_rate(self._path)
+        header = float(self._stream.average_rate or 0) if is_stated else 0.0
         self._stats.header_fps = header or None
-        fps = settings.fps or nominal_rate(header, measured) or self._rate_by_main_header()
+        fps = settings.fps or (nominal_rate(header, measured) if is_stated else None) or self._rate_by_main_header()
         if measured is not None and (settings.fps is not None or not is_plausible(measured)):
             ticks_per_s *= fps / measured
         return fps, ticks_per_s

@@ -13,15 +13,12 @@ from vidtrack.config import DetectionSettings, Settings
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.formats import read_mot
 from vidtrack.scan import Floats, Scan
-from vidtrack.tracking.boxes import longer
+from vidtrack.tracking.boxes import JITTER, box_scan
 from vidtrack.video.habits import Habits, habits
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.span import Span
 from vidtrack.video.stats import SourceStats
 
-JITTER = 0.05
-"""Object sizes; standard deviation of a box's centre where the file is too short to tell."""
-LEAST_SIGMA_PX = 0.5
 _LINES_LOOKED_AT = 20
 
 
@@ -37,8 +34,8 @@ def is_detections(path: str) -> bool:
 def open_detections(path: str, settings: Settings) -> Detections:
     """Read a MOT file of detections.
 
-    Raises SourceError if it cannot be read, FormatError naming a bad line, ConfigError for a method that needs scores
-    where there are none.
+    Raises SourceError if it cannot be read or holds no frame of the span, FormatError for a bad line, ConfigError for
+    a method that needs scores where there are none.
     """
     return Detections(Path(path), settings)
 
@@ -46,7 +43,7 @@ def open_detections(path: str, settings: Settings) -> Detections:
 class Detections:
     """Iterates over (index, time_s, Scan), one scan a frame, in order.
 
-    name, width, height, fps, frames, stats   as for Source; without seqinfo.ini the size is what holds all boxes
+    name, place, width, height, fps, frames, stats   as for Source; without seqinfo.ini the size is that of all boxes
     settings   of detections, with what the file tells in place of None
 
     z is the centre of a box, R the square of its jitter (at least LEAST_SIGMA_PX). The score is the share
@@ -73,6 +70,7 @@ class Detections:
             )
         self.stats = SourceStats()
         info = read_sequence_info(path.parent)
+        self.place = path
         self.name = info.name or path.stem
         self.fps = untimed_rate(info, settings.source, self.stats)
         told = habits(self._frame, self._box, self._score, self.fps, settings.tracker.hold_s)
@@ -80,8 +78,11 @@ class Detections:
         right, bottom = np.ceil((self._box[:, :2] + self._box[:, 2:]).max(axis=0)).astype(int)
         self.width, self.height = info.width or int(right), info.height or int(bottom)
         length = max(info.length or 0, int(self._frame[-1]) + 1)
-        self._frames = Span.of(settings.source).frames(self.fps, length)
+        span = Span.of(settings.source)
+        self._frames = span.frames(self.fps, length)
         self.frames = len(self._frames)
+        if not self._frames:
+            raise SourceError(f"{path} has no frame between {span}; the last one is at {(length - 1) / self.fps:g} s")
 
     def __iter__(self) -> Iterator[tuple[int, float, Scan]]:
         for index in self._frames:
@@ -89,22 +90,16 @@ class Detections:
             time_s = index / self.fps
             self.stats.frames_read += 1
             score = self._score[rows] if self._ranked else None
-            yield index, time_s, _scan(time_s, self._box[rows], score, self.settings.jitter or JITTER)
+            yield index, time_s, box_scan(time_s, self._box[rows], score, self.settings.jitter or JITTER)
+
+    def close(self) -> None:
+        """Nothing stays open: the file was read as a whole."""
 
 
 def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
     """The settings, what they leave open taken from the file's habits."""
     open_ones = {name: value for name, value in asdict(habits).items() if getattr(settings, name) is None}
     return settings.model_copy(update=open_ones)
-
-
-def _scan(time_s: float, box: Floats, score: Floats | None, jitter: float) -> Scan:
-    """Boxes (M, 4) as measurements of their centres."""
-    size = box[:, 2:]
-    sigma = np.maximum(jitter * longer(box), LEAST_SIGMA_PX)
-    relative = np.hstack([-size / 2, size])
-    R = sigma[:, None, None] ** 2 * np.eye(2)
-    return Scan(time_s, box[:, :2] + size / 2, R, box=relative, score=score)
 
 
 def _rank(score: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What a detector hands on: where the picture differs from the scene, and by how much."""
+"""The output of a detector: where the picture differs from the scene, and by how much."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Background(Protocol):
     """A model of the scene without traffic."""
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box is never taken for scene, however long it stands.
+        """Foreground of `frame`; what covers a `known` box is never absorbed into the scene, however long it stands.
 
         known (K, 4): left, top, width, height [source px] of vehicles the tracker predicts here.
         """

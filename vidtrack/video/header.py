@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from pathlib import Path
 from typing import BinaryIO
 
 _BOXES = frozenset(b"ftyp styp pdin moov moof mfra mdat free skip wide sidx ssix prft emsg meta uuid".split())
+_HEADERS = 1 << 16  # bytes of an AVI file in which its headers are looked for
 _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 
 
@@ -36,6 +38,13 @@ def avi_period_s(path: Path) -> float | None:
     if len(head) < 36 or head[:4] != b"RIFF" or head[24:28] != b"avih":
         return None
     return struct.unpack("<I", head[32:])[0] * 1e-6 or None
+
+
+def avi_states_rate(path: Path) -> bool:
+    """Whether an AVI file states a rate; where neither of its headers does, FFmpeg assumes one without a word."""
+    with path.open("rb") as file:
+        stream = re.search(rb"strh.{4}vids.{16}(.{4})(.{4})", file.read(_HEADERS), re.DOTALL)
+    return avi_period_s(path) is not None or stream is None or all(map(any, stream.groups()))
 
 
 def _riff_end(file: BinaryIO, size: int) -> int:

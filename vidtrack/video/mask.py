@@ -12,8 +12,14 @@ from vidtrack.video.frame import Image
 
 
 def read_mask(path: Path) -> Image:
-    """(H, W) picture that is white where traffic is looked for. Raises ConfigError if it is not a picture."""
-    mask = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    """(H, W) picture that is white where traffic is looked for. Raises ConfigError if it is no such picture."""
+    try:
+        data = np.frombuffer(path.read_bytes(), np.uint8)
+    except OSError as error:
+        raise ConfigError(f"cannot read the mask {path}: {error.strerror}") from None
+    mask = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
     if mask is None:
         raise ConfigError(f"cannot read the mask {path}; it must be a picture, white where traffic is looked for")
+    if not (mask > 127).any():
+        raise ConfigError(f"the mask {path} is black all over; it must be white where traffic is looked for")
     return np.asarray(mask, np.uint8)

@@ -32,16 +32,16 @@ _DECODERS = {
 class ImageSequence:
     """Pictures in files of their own, in natural order (img2 before img10), at a rate they do not know.
 
-    name, fps, frames as for Source. An image that cannot be read is counted and skipped; its number and
+    name, place, fps, frames as for Source. An image that cannot be read is counted and skipped; its number and
     its time stay empty, so that the others keep theirs.
     """
 
     def __init__(self, paths: Iterable[Path], settings: SourceSettings, stats: SourceStats) -> None:
         self._paths = sorted(paths, key=_natural)
         self._stats = stats
-        folder = self._paths[0].parent
-        info = read_sequence_info(folder)
-        self.name = info.name or _name(folder.resolve())
+        self.place = self._paths[0].parent
+        info = read_sequence_info(self.place)
+        self.name = info.name or _name(self.place.resolve())
         self.fps = untimed_rate(info, settings, stats)
         self.frames = len(self._paths)
 

@@ -21,13 +21,16 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
     Planar 8-bit YUV and grey are read-only views of the decoder's memory whose rows may be padded; finer
     chroma is thinned to half size by stride. Everything else (RGB, palettes, more than 8 bits, packed
     layouts) is converted: RGB to full-range BT.601, which `Frame.bgr` undoes; YUV keeps its range.
+    A picture that says how it is to be turned, as a phone's does, comes upright.
     """
+    quarter_turns = round(picture.rotation / 90)
     picture = planar(picture)
     y, *chroma = map(_view, picture.planes)
     if not chroma:
-        return Frame(index, time_s, y, full_range=picture.color_range != _LIMITED)
+        return Frame(index, time_s, _turned(y, quarter_turns), full_range=picture.color_range != _LIMITED)
     height, width = (picture.height + 1) // 2, (picture.width + 1) // 2
-    u, v = (_thinned(plane, height, width) for plane in chroma)
+    chroma = [_thinned(plane, height, width) for plane in chroma]
+    y, u, v = (_turned(plane, quarter_turns) for plane in (y, *chroma))
     full_range = picture.color_range == _FULL or picture.format.name.startswith("yuvj")
     return Frame(index, time_s, y, u, v, full_range)
 
@@ -62,6 +65,11 @@ def _view(plane: VideoPlane) -> Image:
 def _thinned(plane: Image, height: int, width: int) -> Image:
     """Every second row or column where the plane has more than (height, width)."""
     return plane[:: 2 if plane.shape[0] > height else 1, :: 2 if plane.shape[1] > width else 1]
+
+
+def _turned(plane: Image, quarter_turns: int) -> Image:
+    """The plane turned counterclockwise; a copy only where it is turned."""
+    return np.ascontiguousarray(np.rot90(plane, quarter_turns)) if quarter_turns else plane
 
 
 def matched(frame: Frame, first: Frame) -> Frame:

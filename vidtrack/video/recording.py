@@ -46,7 +46,7 @@ def part_order(part: Path) -> tuple[str, int]:
 class Recording:
     """The frames of a recording that were tracked, with their numbers and times; iterate once.
 
-    name, width, height, fps, frames, stats  as for Source
+    name, place, width, height, fps, frames, stats  as for Source
     like      a frame of the size and kind of all
     remember  is given the memory of the live run before the first frame of each part; set it before iterating
 
@@ -59,7 +59,8 @@ class Recording:
             raise SourceError(f"the recording {path} holds no frame that was tracked")
         state = read_state(self._parts[0] / STATE)
         self.like = Frame.blank((state["height"], state["width"]), state["coloured"])
-        self.name = Path(path).resolve().name
+        self.place = Path(path)
+        self.name = self.place.resolve().name
         self.height, self.width = self.like.shape
         self.fps = FALLBACK_FPS
         self.frames = sum(_row_count(part) for part in self._parts)
@@ -67,9 +68,13 @@ class Recording:
         self.remember: Callable[[State], None] = lambda state: None
 
     def __iter__(self) -> Iterator[Frame]:
+        last = -1
         for part in self._parts:
             self.remember(read_state(part / STATE))
             for frame in self._replayed(part):
+                if frame.index <= last:
+                    self.stats.warn(f"another run begins with {part}: its frames and tracks are numbered anew")
+                last = frame.index
                 self.stats.frames_read += 1
                 yield matched(frame, self.like)
 

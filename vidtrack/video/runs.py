@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.compiled import CACHE
+from vidtrack.scan import Ints
+from vidtrack.video.frame import Image
+
+Runs = NDArray[np.int32]
+"""(N,) row, first column or column after the last of each run."""
+Words = NDArray[np.uint64]
+"""Eight pixels in each."""
 
 _HIGHS, _NONE = np.uint64(0x8080808080808080), np.uint64(0)  # the highest bit of each of eight bytes, or of none
 _BYTE, _LAST = np.uint64(8), np.uint64(56)  # bits up to the next byte, and up to the last one
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def find_runs(mask, background):  # type: ignore[no-untyped-def]
+def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
     """Maximal horizontal runs of pixels that are not 0, or for `background` those that are: row, start, stop.
 
     mask (h, w) uint8; each (N,) int32 in raster order, stop excluded.
@@ -28,7 +36,7 @@ def find_runs(mask, background):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _find_runs(words, rest, outside, w, row, start, stop):  # type: ignore[no-untyped-def]
+def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: Runs, start: Runs, stop: Runs) -> int:
     """Fill row, start, stop and return the number of runs.
 
     words (N,) eight pixels each, and the rest of them; outside: the marks of eight pixels that are in no run.
@@ -61,7 +69,7 @@ def _find_runs(words, rest, outside, w, row, start, stop):  # type: ignore[no-un
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _rest(pixels, filler):  # type: ignore[no-untyped-def]
+def _rest(pixels: Image, filler: bool) -> np.uint64:
     """The last pixels, fewer than eight, as a word that is filled up."""
     rest = np.full(8, filler, np.uint8)
     for x in range(len(pixels) // 8 * 8, len(pixels)):
@@ -70,13 +78,13 @@ def _rest(pixels, filler):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _not_zero(word):  # type: ignore[no-untyped-def]
+def _not_zero(word: np.uint64) -> np.uint64:
     """The highest bit of each byte that is not 0."""
     return ((word & ~_HIGHS) + ~_HIGHS | word) & _HIGHS
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _lowest_byte(word):  # type: ignore[no-untyped-def]
+def _lowest_byte(word: np.uint64) -> int:
     """Number of the lowest byte that is not 0, of a word that is not 0."""
     number = 0
     if word & np.uint64(0xFFFFFFFF) == 0:
@@ -87,7 +95,7 @@ def _lowest_byte(word):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _after_zeros(words, k):  # type: ignore[no-untyped-def]
+def _after_zeros(words: Words, k: int) -> int:
     """Number of the first word from k on that is not 0, or of words if there is none."""
     while k + 8 <= len(words) and _all_zero(words, k):
         k += 8
@@ -97,7 +105,7 @@ def _after_zeros(words, k):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _all_zero(words, k):  # type: ignore[no-untyped-def]
+def _all_zero(words: Words, k: int) -> bool:
     """Whether the eight words from k on are all 0."""
     total = _NONE
     for i in range(k, k + 8):
@@ -106,7 +114,7 @@ def _all_zero(words, k):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
+def connect(row: Runs, start: Runs, stop: Runs, diagonal: int) -> tuple[Ints, int]:
     """Component of each run and their number; runs of neighbouring rows touch if they overlap.
 
     diagonal: 1 joins across corners (8-connected), 0 does not (4-connected). Components are numbered by their
@@ -128,7 +136,7 @@ def connect(row, start, stop, diagonal):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def components(parent):  # type: ignore[no-untyped-def]
+def components(parent: Ints) -> tuple[Ints, int]:
     """Component of each element (N,) after `join`, numbered by their first elements, and their number."""
     label = np.empty(len(parent), np.int64)
     count = 0
@@ -142,7 +150,7 @@ def components(parent):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def join(parent, a, b):  # type: ignore[no-untyped-def]
+def join(parent: Ints, a: int, b: int) -> None:
     """Make one component of those of a and b; parent (N,) int64 begins as 0, 1, 2, ..."""
     a, b = _root(parent, a), _root(parent, b)
     if a < b:
@@ -152,7 +160,7 @@ def join(parent, a, b):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _root(parent, k):  # type: ignore[no-untyped-def]
+def _root(parent: Ints, k: int) -> int:
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]

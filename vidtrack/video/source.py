@@ -38,6 +38,7 @@ class Source:
     """The frames of an input from `start_s` to `end_s`, read in a thread of their own; iterate once.
 
     name           what to call the run
+    place          the file, or the folder of the images
     width, height  of the first picture [px]; later ones of another size are scaled to it
     fps            nominal frames/s; each frame has its own time
     frames         how many to expect, for progress bars only; None if unknown
@@ -50,6 +51,7 @@ class Source:
         self._pictures = pictures
         self._span = Span.of(settings)
         self.name = pictures.name
+        self.place = pictures.place
         self.fps = pictures.fps
         self.stats = stats
         frames = (to_frame(*picture) for picture in pictures)

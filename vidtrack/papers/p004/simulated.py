@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import Associator
 from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Floats, Ints, Scan, Tracks
+from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
 from vidtrack.tracking.forest import Deferred
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
@@ -33,7 +32,7 @@ class Targets:
     truth: Floats
     z: Floats
     run: Ints
-    seen: NDArray[np.bool_]
+    seen: Mask
 
 
 def drive(

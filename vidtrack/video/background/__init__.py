@@ -1,4 +1,4 @@
-"""Background models: what of a frame is traffic, by the scene learnt from the frames before."""
+"""Background models: they tell traffic from the scene, which is learnt from earlier frames."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from vidtrack.video.foreground import Background
 def create(settings: DetectorSettings, scale: float | None = None, keep: NDArray | None = None) -> Background:
     """The detector `settings.kind`.
 
-    scale: processed over source size, None by the picture's size; keep (h, w) of any size: there is no foreground
-    where this picture is dark.
+    scale  processed over source size; None: by the picture's size
+    keep   (h, w) of any size; there is no foreground where this picture is dark
     """
     view = View(scale, keep)
     if settings.kind == "paper":

@@ -1,4 +1,4 @@
-"""Tell a change of the whole picture (light, view) from traffic: by how much is foreground, and how fast it spreads."""
+"""Tells a change of the whole picture (light, view) from traffic by how much is foreground and how fast it spreads."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _CELLS = (12, 8)  # columns and rows of a grid over the picture
 _TOUCHED = 0.03  # share of a cell that makes it one with foreground
 _SUDDEN = 0.25  # share of the cells; traffic reaches at most 0.12 more in 0.2 s
 _SUDDEN_S = 0.4
-_SETTLED_S = 2.0  # after a start, in which everything that moves comes out of the scene at once
-_UNSEEN_S = 2.0  # nobody looked for so long: who knows what became of the light and the camera
+_SETTLED_S = 2.0  # after a start, while everything that moves appears as foreground at once
+_UNSEEN_S = 2.0  # after a longer gap light or view may have changed: compare with the last steady picture
 
 
 class Change:
@@ -28,7 +28,7 @@ class Change:
     STATE = ("_start_s", "_steady_s", "_steady_spread", "_time_s", "_recent")
 
     def __init__(self, largest_share: float) -> None:
-        """largest_share: more foreground than that is no traffic, however slowly it came."""
+        """largest_share: a larger share of foreground is a change, however slowly it came."""
         self._largest_share = largest_share
         self._start_s = -math.inf
         self._steady_s = math.inf  # when the picture was last steady,
@@ -41,7 +41,7 @@ class Change:
         self._start_s = time_s
 
     def lasted_s(self, mask: Image, time_s: float) -> float:
-        """Seconds since the picture was steady, 0 while it is; mask (h, w)."""
+        """Seconds since the picture was last steady, 0 while it is; mask (h, w)."""
         share, spread = _shares(mask, *_CELLS)
         changing = self._steady_s < self._time_s
         unseen = time_s - self._time_s > _UNSEEN_S
@@ -58,7 +58,7 @@ class Change:
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _shares(mask, columns, rows):  # type: ignore[no-untyped-def]
+def _shares(mask: Image, columns: int, rows: int) -> tuple[float, float]:
     """Share of the pixels, and of the cells of a grid, that are foreground; mask (h, w) uint8, 0 and 255."""
     h, w = mask.shape
     columns, rows = min(columns, w), min(rows, h)

@@ -6,12 +6,23 @@ import numba
 import numpy as np
 
 from vidtrack.compiled import CACHE
+from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.scene import Levels, Scene
+from vidtrack.video.frame import Image
 
 _ONE = np.float32(1)
 
 
 @numba.njit(cache=CACHE, nogil=True, error_model="numpy")
-def disturbance(picture, scene, floor, noise_factor, chroma_threshold, strength, hit):  # type: ignore[no-untyped-def]
+def disturbance(
+    picture: Picture,
+    scene: Scene,
+    floor: np.float32,
+    noise_factor: np.float32,
+    chroma_threshold: np.float32,
+    strength: Levels,
+    hit: Image,
+) -> None:
     """strength = sqrt((dY / TY)^2 + (dCb / TC)^2 + (dCr / TC)^2) and hit = strength > 1, both (h, w).
 
     TY = max(floor, noise_factor * noise), per pixel; TC = chroma_threshold. Four luminance pixels share one of

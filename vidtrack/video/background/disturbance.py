@@ -16,17 +16,17 @@ from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Scene, absorb, adopt, learn, nothing, spare, start
+from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
 from vidtrack.video.background.shadow import mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
-_FIRST_S = 0.1  # plain averaging after a start
-_UNSURE_S = 10.0  # after a start ghosts are many: for so long
-_UNSURE_GHOST_S = 0.3  # they need only so much cover
+_FIRST_S = 0.1  # after a start, while all frames weigh the same in the average
+_UNSURE_S = 10.0  # after a start, while ghosts are frequent
+_UNSURE_GHOST_S = 0.3  # cover that makes a ghost during that time
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
-_GAP_S = 2.0  # a longer time between two frames went unseen: it is no cover, and what stands there now is unsure
-_KNOWN_S = np.float32(0.1)  # shorter than all of these, and not 0: that is for pixels that are seen free
+_GAP_S = 2.0  # after a longer gap between frames the scene is as uncertain as after a start, and no cover is counted
+_KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but not the 0 of pixels that were seen free
 
 
 class Disturbance:
@@ -42,12 +42,12 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._scene = nothing()
+        self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never taken for scene."""
+        """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never absorbed into the scene."""
         s = self._settings
         picture = smooth(self._view.reduce(frame))
         if not self._scene.luma.size:
@@ -104,7 +104,7 @@ class Disturbance:
         return strength, hit
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:
-        """Blobs that are in the scene and not in the picture leave both mask and scene."""
+        """Remove ghosts, blobs that are in the scene and not in the picture, from mask and scene."""
         settled_s = min(self._settings.ghost_s, _UNSURE_GHOST_S) if self._unsure else self._settings.ghost_s
         row, begin, end = find_ghosts(mask, picture.luma, scene, np.float32(settled_s))
         adopt(picture, scene, row, begin, end)
@@ -124,6 +124,6 @@ class Disturbance:
         learn(picture, scene, covered, hit, np.float32(weight), np.float32(noise_weight), np.float32(seen_s))
 
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
-        """Take for scene what has stood for absorb_s, and lasting shadow."""
+        """Absorb what has stood for absorb_s, and lasting shadow, into the scene."""
         shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
         absorb(picture, scene, hit, np.float32(self._settings.absorb_s), np.float32(shadow_s))

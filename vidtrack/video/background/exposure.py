@@ -6,6 +6,9 @@ import numba
 import numpy as np
 
 from vidtrack.compiled import CACHE
+from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.scene import Levels, Scene
+from vidtrack.video.frame import Image
 
 _POINTS = 1500  # wanted on the grid
 _DARK, _BRIGHT = np.float32(24), np.float32(235)  # grey levels between which a ratio means something
@@ -15,7 +18,7 @@ _LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covere
 
 
 @numba.njit(cache=CACHE, nogil=True, error_model="numpy")
-def follow_gain(picture, scene, black):  # type: ignore[no-untyped-def]
+def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
     """Multiply the scene's luminance by the camera's gain against it, if that is more than learning follows."""
     g = gain(picture.luma, scene, black)
     if abs(g - np.float32(1)) > _STEP:
@@ -25,13 +28,13 @@ def follow_gain(picture, scene, black):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _amplify(row, g, black):  # type: ignore[no-untyped-def]
+def _amplify(row: Levels, g: np.float32, black: np.float32) -> None:
     for x in range(len(row)):
         row[x] = min(black + g * (row[x] - black), np.float32(255))
 
 
 @numba.njit(cache=CACHE, nogil=True, error_model="numpy")
-def gain(luma, scene, black):  # type: ignore[no-untyped-def]
+def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     """Median of (Y - black) / (B - black) over the points that were not covered before; 1 if they are too few.
 
     luma (h, w) uint8. New traffic does not move it while it comes on less than half of the points.
@@ -53,7 +56,7 @@ def gain(luma, scene, black):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _mostly_steady(ratio):  # type: ignore[no-untyped-def]
+def _mostly_steady(ratio: Levels) -> bool:
     """Whether the median of ratio (N,) is so close to 1 that it needs no search."""
     above = below = 0
     for r in ratio:

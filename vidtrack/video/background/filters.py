@@ -33,10 +33,10 @@ def smoothed(plane: Image) -> Image:
 def _averaging(step: int) -> Callable[..., Any]:
     """The kernel for one step: only with a constant stride is it vectorised.
 
-    It reads a picture in the order of memory: cv2.resize does not, and waits for a picture that is in no cache.
+    It reads the picture in the order of memory, which is faster than cv2.resize where the picture is in no cache.
     """
 
-    def average(plane, reduced):  # type: ignore[no-untyped-def]
+    def average(plane: Image, reduced: Image) -> None:
         h, w = reduced.shape
         column = np.empty(step * w, np.uint16)
         for y in range(h):
@@ -55,7 +55,7 @@ def _averaging(step: int) -> Callable[..., Any]:
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def _weigh(plane, smooth):  # type: ignore[no-untyped-def]
+def _weigh(plane: Image, smooth: Image) -> None:
     """Fill smooth (h, w) from plane (h, w)."""
     h, w = plane.shape
     column = np.empty(w + 2, np.uint16)

@@ -6,10 +6,11 @@ import numba
 import numpy as np
 
 from vidtrack.compiled import CACHE
+from vidtrack.video.frame import Image
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def majority(hit, window, mask):  # type: ignore[no-untyped-def]
+def majority(hit: Image, window: int, mask: Image) -> None:
     """mask = 255 where more than half of the window x window pixels around have hit == 1, else 0.
 
     hit, mask (h, w) uint8; window is odd and at most 15; pixels outside the picture have no hit.

@@ -31,7 +31,7 @@ class Picture(NamedTuple):
 
 
 class View:
-    """How a detector sees a source; the first frame decides.
+    """How a source is reduced for a detector; the first frame decides.
 
     step   source pixels per processed pixel; small pictures keep at least 2 x 2
     black  luminance of black
@@ -64,7 +64,7 @@ class View:
         return reduce(frame, self.step)
 
     def foreground(self, mask: Image, strength: NDArray) -> Foreground:
-        """The mask (h, w), 0 and 255, without what is not to be looked at."""
+        """The mask (h, w), 0 and 255, cleared where `keep` is dark, with strength (h, w) and step."""
         if self._keep is not None:
             h, w = mask.shape
             keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)

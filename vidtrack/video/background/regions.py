@@ -1,12 +1,15 @@
-"""What whole regions of a mask tell: enclosed holes belong to their blob, and a blob may be a ghost."""
+"""Whole regions of a mask: enclosed holes are filled, and blobs that are ghosts are found."""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.compiled import CACHE
-from vidtrack.video.runs import connect, find_runs
+from vidtrack.video.background.scene import Scene
+from vidtrack.video.frame import Image
+from vidtrack.video.runs import Runs, connect, find_runs
 
 _REACH = 3  # px to either side of a border over which contrast is taken
 _ALIKE = np.float32(6)  # grey levels within which a pixel is as it was before; wider, dark vehicles pass for it
@@ -15,14 +18,14 @@ _MARGIN = np.float32(1.3)  # against healing what is really there: a dark vehicl
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def paint(mask, row, start, stop, value):  # type: ignore[no-untyped-def]
+def paint(mask: Image, row: Runs, start: Runs, stop: Runs, value: int) -> None:
     """Set mask (h, w) uint8 to value on the runs."""
     for k in range(len(row)):
         mask[row[k], start[k] : stop[k]] = value
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def fill_holes(mask):  # type: ignore[no-untyped-def]
+def fill_holes(mask: Image) -> None:
     """Set to 255 the background regions (4-connected) that do not reach the picture's edge. mask (h, w) uint8."""
     h, w = mask.shape
     row, start, stop = find_runs(mask, True)
@@ -36,12 +39,12 @@ def fill_holes(mask):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
-    """Runs (row, start, stop) of the blobs that are in the scene and no longer in the picture.
+def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -> tuple[Runs, Runs, Runs]:
+    """Runs (row, start, stop) of the ghosts: blobs of objects that are in the scene and no longer in the picture.
 
-    Either the road is seen again as it was before the scene took over what stood on it. Or the edge of the object
-    that made the blob is in the scene: along its border the scene has clearly more contrast (luminance differences
-    over +-3 px, across and down) than the frame, and it has been covered for settled_s on average.
+    A blob is a ghost if the road is seen again as it was before the object was absorbed into the scene. It is also one
+    if the object's edge is in the scene only: along the blob's border the scene has clearly more contrast (luminance
+    differences over +-3 px, across and down) than the frame, and has been covered for settled_s on average.
     """
     h, w = mask.shape
     row, start, stop = find_runs(mask, False)
@@ -70,6 +73,6 @@ def find_ghosts(mask, luma, scene, settled_s):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _contrast(luma, y, x):  # type: ignore[no-untyped-def]
+def _contrast(luma: NDArray, y: int, x: int) -> np.float32:
     across = abs(np.float32(luma[y, x + _REACH]) - np.float32(luma[y, x - _REACH]))
     return across + abs(np.float32(luma[y + _REACH, x]) - np.float32(luma[y - _REACH, x]))

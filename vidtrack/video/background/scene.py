@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.compiled import CACHE
+from vidtrack.scan import Floats
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.shadow import SHADOW
+from vidtrack.video.frame import Image
+from vidtrack.video.runs import Runs
+
+Levels = NDArray[np.float32]
 
 FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
-NEVER = np.float32(-1000)  # like no luminance
+NEVER = np.float32(-1000)  # unlike any luminance
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
 _NONE = np.float32(0)
 _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
@@ -28,15 +33,15 @@ class Scene(NamedTuple):
     former        luma before the picture was adopted last, NEVER if it was not
     """
 
-    luma: NDArray[np.float32]
-    cb: NDArray[np.float32]
-    cr: NDArray[np.float32]
-    noise: NDArray[np.float32]
-    covered_s: NDArray[np.float32]
-    former: NDArray[np.float32]
+    luma: Levels
+    cb: Levels
+    cr: Levels
+    noise: Levels
+    covered_s: Levels
+    former: Levels
 
 
-def nothing() -> Scene:
+def no_scene() -> Scene:
     """The scene before the first frame."""
     return Scene(*np.empty((6, 0, 0), np.float32))
 
@@ -49,7 +54,15 @@ def start(picture: Picture) -> Scene:
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def learn(picture, scene, covered, hit, weight, noise_weight, dt):  # type: ignore[no-untyped-def]
+def learn(
+    picture: Picture,
+    scene: Scene,
+    covered: Image,
+    hit: Image,
+    weight: np.float32,
+    noise_weight: np.float32,
+    dt: np.float32,
+) -> None:  # fmt: skip
     """One step of the running averages where covered (h, w) uint8 is 0 and hit no SHADOW; else the seconds are counted.
 
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
@@ -72,7 +85,7 @@ def learn(picture, scene, covered, hit, weight, noise_weight, dt):  # type: igno
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def adopt(picture, scene, row, start, stop):  # type: ignore[no-untyped-def]
+def adopt(picture: Picture, scene: Scene, row: Runs, start: Runs, stop: Runs) -> None:
     """Take the picture for the scene on the runs (row, start, stop), as if it had just begun there."""
     for k in range(len(row)):
         for x in range(start[k], stop[k]):
@@ -80,7 +93,7 @@ def adopt(picture, scene, row, start, stop):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def absorb(picture, scene, hit, absorb_s, shadow_s):  # type: ignore[no-untyped-def]
+def absorb(picture: Picture, scene: Scene, hit: Image, absorb_s: np.float32, shadow_s: np.float32) -> None:
     """Take the picture for the scene where it was covered for absorb_s, or is shadow and was covered for shadow_s."""
     h, w = hit.shape
     for y in range(h):
@@ -91,8 +104,8 @@ def absorb(picture, scene, hit, absorb_s, shadow_s):  # type: ignore[no-untyped-
 
 
 @numba.njit(cache=CACHE, nogil=True)
-def spare(covered_s, box, longest_s):  # type: ignore[no-untyped-def]
-    """Let the cover inside the boxes (K, 4) left, top, width, height never last longer than longest_s."""
+def spare(covered_s: Levels, box: Floats, longest_s: np.float32) -> None:
+    """Limit the seconds of cover inside boxes (K, 4) left, top, width, height to longest_s."""
     h, w = covered_s.shape
     for left, top, width, height in box:
         for y in range(max(int(top), 0), min(int(top + height + 1), h)):
@@ -101,7 +114,7 @@ def spare(covered_s, box, longest_s):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _adopt(picture, scene, y, x):  # type: ignore[no-untyped-def]
+def _adopt(picture: Picture, scene: Scene, y: int, x: int) -> None:
     scene.former[y, x] = scene.luma[y, x]
     scene.luma[y, x] = picture.luma[y, x]
     scene.noise[y, x] = FRESH_NOISE

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numba
 import numpy as np
 
 from vidtrack.compiled import CACHE
+from vidtrack.video.frame import Image
 from vidtrack.video.runs import find_runs
+
+if TYPE_CHECKING:  # the scene needs SHADOW
+    from vidtrack.video.background.picture import Picture
+    from vidtrack.video.background.scene import Levels, Scene
 
 SHADOW = np.uint8(2)  # value of a hit that is shadow
 _DARKEST, _LIGHTEST = np.float32(0.5), np.float32(0.97)  # share of the scene's light
@@ -18,7 +25,7 @@ _NEUTRAL = np.float32(128)  # chroma of grey
 
 
 @numba.njit(cache=CACHE, nogil=True, error_model="numpy")
-def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
+def mark_shadow(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> None:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's, times one factor r.
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
@@ -38,14 +45,14 @@ def mark_shadow(picture, scene, black, hit):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _same_colour(picture, scene, y, x, r):  # type: ignore[no-untyped-def]
+def _same_colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> bool:
     blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * (scene.cb[y, x] - _NEUTRAL)
     red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * (scene.cr[y, x] - _NEUTRAL)
     return max(abs(blue), abs(red)) < _CHROMA
 
 
 @numba.njit(cache=CACHE, nogil=True, inline="always")
-def _texture_error(luma, scene, y, x, r):  # type: ignore[no-untyped-def]
+def _texture_error(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> np.float32:
     h, w = luma.shape
     up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
     across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - r * (scene[y, right] - scene[y, left])

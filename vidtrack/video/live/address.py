@@ -6,12 +6,13 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from vidtrack.errors import SourceError
 
 HIDDEN = "***"
 _SCHEMES = ("rtsp", "rtsps", "http", "https")
+_MAY_STAY = "%:@!$&'()*+,;=~"  # in user and password
 _USER = re.compile(r"://([^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$)).*@)")
 _SECRET_FIELD = re.compile(r"([?&;](?:pass\w*|pwd|user\w*|usr|auth\w*|token|\w*key|secret|sig\w*)=)[^&;#\s]*", re.I)
 
@@ -59,7 +60,7 @@ def parse_address(source: str, timeout_s: float) -> Address:
     if scheme.startswith("rtsp"):
         # TCP: lost UDP packets become grey smears that look like vehicles.
         options = {"rtsp_transport": "tcp", "timeout": microseconds, "allowed_media_types": "video"}
-    return Address(source, shown, urlsplit(shown).netloc.rpartition("@")[2] or scheme, None, options)
+    return Address(_escaped(source), shown, _host(shown), None, options)
 
 
 def redact(address: str) -> str:
@@ -70,6 +71,25 @@ def redact(address: str) -> str:
     if _USER.search(address):
         address = re.sub("://.*@", f"://{HIDDEN}@", address)
     return _SECRET_FIELD.sub(rf"\1{HIDDEN}", address)
+
+
+def _host(shown: str) -> str:
+    """Host and port. Raises SourceError where there is none, or no such port."""
+    try:
+        parts = urlsplit(shown)
+        named = parts.hostname and parts.port != 0
+    except ValueError:  # the port is no number below 65536, or a bracket is missing
+        named = False
+    if not named:
+        raise SourceError(f"cannot read {shown}: it names no host, or no such port; write it as rtsp://HOST:PORT/PATH")
+    return parts.netloc.rpartition("@")[2]
+
+
+def _escaped(address: str) -> str:
+    """The address as FFmpeg reads it: without "/", "?" and "#" in the password."""
+    if not _USER.search(address):
+        return address
+    return re.sub("://.*@", lambda found: "://" + quote(found[0][3:], safe=_MAY_STAY), address)
 
 
 def secrets(address: str) -> list[str]:
@@ -84,8 +104,8 @@ def _between(whole: str, shown: str) -> list[str]:
 
 
 def _device(path: Path) -> Address:
-    if path.is_file():
-        raise SourceError(f"{path} is a file, not a camera; read it with vidtrack track")
+    if path.is_file() or path.is_dir():
+        raise SourceError(f"{path} is no camera; if it holds pictures, read it with vidtrack track")
     if not path.exists():
         raise SourceError(
             f"no such device {path}; give a camera index, a device such as /dev/video0, or an rtsp:// or http:// stream"

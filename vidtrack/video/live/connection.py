@@ -120,7 +120,7 @@ def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout
         code = "401" if isinstance(error, av.error.HTTPUnauthorizedError) else "403"
         return Refused(
             f"{start} the camera refuses the user or the password ({code}); "
-            "write them as rtsp://USER:PASSWORD@HOST/..., special characters as %XX"
+            "write them as rtsp://USER:PASSWORD@HOST/..., a % in them as %25"
         )
     if isinstance(error, av.error.HTTPNotFoundError):
         return SourceError(f"{start} the camera knows no such path (404)")

@@ -110,7 +110,7 @@ class Reader:
         until = monotonic() + self._backoff.next_s()
         while not self._stopping.is_set() and (left := until - monotonic()) > 0:
             self.alive_s = monotonic()
-            self._stopping.wait(min(left, 1.0))
+            self._stopping.wait(min(left, self._settings.timeout_s))
 
     def _read(self) -> None:
         """One connection, from its opening to its end, which is an error, or to `stop`."""

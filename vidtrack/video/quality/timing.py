@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 from vidtrack.video.clock import stamp_rate
 
 _GAP = 1.5  # usual intervals; a longer one lacks a picture
@@ -34,7 +33,7 @@ class Timing:
     repeated_share: float
 
 
-def timing(times: Floats, repeats: NDArray[np.bool_]) -> Timing:
+def timing(times: Floats, repeats: Mask) -> Timing:
     """Of pictures at times (K,) [s], K of at least 2; repeats (J,) of some of them, in order."""
     intervals = np.diff(times)
     rate = stamp_rate(times) or 0.0
@@ -51,7 +50,7 @@ def timing(times: Floats, repeats: NDArray[np.bool_]) -> Timing:
     )
 
 
-def _repeated_share(repeats: NDArray[np.bool_], rate: float) -> float:
+def _repeated_share(repeats: Mask, rate: float) -> float:
     """Share of the repeats (J,) among pictures in motion: a scene in which nothing moves repeats itself for long."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], repeats, [False]]).astype(int)))
     length = edges[1::2] - edges[::2]

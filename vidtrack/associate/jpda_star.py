@@ -11,7 +11,7 @@ from vidtrack.scan import Floats, Ints
 
 
 @njit(cache=CACHE, nogil=True)
-def likeliest(
+def likeliest_events(
     tracks: Ints, measurements: Ints, rows: Side, columns: Side, place: Ints,
     factor: Floats, share: Floats, row_share: Floats, largest: int,
 ) -> bool:  # fmt: skip
