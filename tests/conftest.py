@@ -1,16 +1,10 @@
 """What all tests share."""
 
 import logging
-import os
 import signal
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-WORKER = os.environ.get("PYTEST_XDIST_WORKER")
-if WORKER:  # kernels that two processes compile at the same moment would overwrite each other
-    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).parent.parent / ".pytest_cache" / "kernels" / WORKER)
 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")

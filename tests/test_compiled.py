@@ -1,16 +1,18 @@
 """What the compiler owes a user: it can be stopped, and what it keeps is never out of date."""
 
+import errno
 import os
 import signal
+import sys
 from contextlib import contextmanager
 from threading import Thread
 
 import pytest
-from numba import njit
+from numba import config, njit
 from numba.core.event import Listener, install_listener
 
 from vidtrack.cli.signals import Terminated, terminate
-from vidtrack.compiled import forget_stale
+from vidtrack.compiled import forget_stale, kernel
 
 
 def kernels():
@@ -101,3 +103,50 @@ def test_kernels_of_a_source_that_is_gone_are_stale(tmp_path):
     kernel.touch()
     forget_stale(tmp_path)
     assert not kernel.exists()
+
+
+@pytest.fixture
+def add(tmp_path, monkeypatch):
+    """A kernel that is not compiled yet, and whose compiled form will be kept in `tmp_path`."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+
+    @kernel
+    def add(x, y):
+        return x + y
+
+    return add
+
+
+def test_kernels_are_kept(add, tmp_path):
+    assert add(1, 2) == 3
+    assert len(list(tmp_path.rglob("*.nbi"))) == len(list(tmp_path.rglob("*.nbc"))) == 1
+
+
+def test_a_full_disk_costs_a_warning_and_no_result(add, tmp_path, monkeypatch, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
+    assert add(1, 2) == 3
+    assert add(1.5, 2.0) == 3.5
+    assert len(caplog.messages) == 1
+    assert "No space left" in caplog.text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs file locks")
+def test_processes_take_turns_at_keeping(add, tmp_path):
+    import fcntl
+
+    add(1, 2)
+    (index,) = tmp_path.rglob("*.nbi")
+    other = os.open(index.parent, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    found = []
+    thread = Thread(target=lambda: found.append(add(1.5, 2.0)))
+    thread.start()
+    thread.join(0.5)
+    assert len(list(tmp_path.rglob("*.nbc"))) == 1
+    os.close(other)
+    thread.join()
+    assert found == [3.5]
+    assert len(list(tmp_path.rglob("*.nbc"))) == 2

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache, partial
 from pathlib import Path
 from threading import current_thread, main_thread
 from types import FrameType
 from typing import Any
 
 from numba import njit
+from numba.core.caching import FunctionCache
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import Event, Listener, register
 from numba.misc.appdirs import AppDirs
+
+if sys.platform != "win32":
+    import fcntl
+
+log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parent
 
@@ -54,6 +64,54 @@ def _older_than_source(kernel: Path) -> bool:
     return not source.exists() or source.stat().st_mtime > kernel.stat().st_mtime
 
 
+class KernelCache(FunctionCache):
+    """Compiled kernels of one function on the disk, for several processes at once; a full disk ends no run."""
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a kernel for later runs, or say that it could not be kept."""
+        folder = Path(self.cache_path)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with _one_writer(folder):
+                super().save_overload(sig, data)
+        except OSError as error:
+            _tell(f"compiled kernels cannot be kept in {folder} ({error.strerror}); the next run compiles them again")
+
+
+@contextmanager
+def _one_writer(folder: Path) -> Iterator[None]:
+    """Processes take turns: numba reads a function's index, adds a line and writes it back."""
+    if sys.platform == "win32":
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # no locks on this disk
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+@cache
+def _tell(what: str) -> None:
+    """A warning, once."""
+    log.warning(what)
+
+
+def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """Decorator: compiled when first called, kept for later runs, and without the lock of the interpreter.
+
+    options  of numba.njit
+    """
+    if function is None:
+        return partial(kernel, **options)
+    compiled = njit(nogil=True, **options)(function)
+    if CACHE:
+        compiled._cache = KernelCache(function)
+    return compiled
+
+
 def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., Any]:
     """A compiled closure over constants, under a name of its own.
 
@@ -61,7 +119,7 @@ def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., 
     """
     name = "_".join([function.__name__, *map(str, constants)])
     function.__name__ = function.__qualname__ = name
-    return njit(cache=CACHE, nogil=True, error_model="numpy")(function)
+    return kernel(function, error_model="numpy")
 
 
 class SignalsWait(Listener):

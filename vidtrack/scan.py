@@ -9,10 +9,9 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ScanError
 
 if TYPE_CHECKING:
@@ -136,7 +135,7 @@ class Scan:
         return weak
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _surely_usable(z: Floats, R: Floats) -> bool:
     """Whether all measurements in the plane are finite and their covariances clearly positive definite."""
     for i in range(len(z)):
@@ -189,7 +188,7 @@ def _refuse_no_covariance(R: Floats, name: str) -> None:
         raise ScanError(f"{name.format(i)} is not positive definite: {R[i].tolist()}; give it a variance above zero")
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def starts(row: Ints, rows: int) -> Ints:
     """(rows + 1,) index of each row's first entry in the sorted `row` (B,); the last element is B."""
     start = np.empty(rows + 1, np.int64)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def assign(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) -> Ints:
     """Column of each row, -1 for none, of least total cost.
 
@@ -19,7 +18,7 @@ def assign(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) 
     return solve(start, column, cost, miss, columns)[0]
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def solve(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) -> tuple[Ints, Floats, Floats]:
     """The columns that `assign` gives, with the potentials u (T,) and v (columns,) that prove them best.
 

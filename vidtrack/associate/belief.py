@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.events import Side
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
 
 CONVERGED = 1e-9
@@ -17,7 +16,7 @@ LEAST = 1e-100
 """Floor of all factors: messages stay finite where the exact weights have a limit."""
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def propagate(
     tracks: Ints, measurements: Ints, rows: Side, columns: Side, factor: Floats, share: Floats, row_share: Floats
 ) -> None:
@@ -76,7 +75,7 @@ def propagate(
                 share[k] /= total
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _others(value: Floats, n: int, base: float, rest: Floats) -> None:
     """rest[e] = base + the sum of the first n values but the e-th, without a difference that would cancel."""
     total = base

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Ints
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
     """(rows,) smallest row of each row's connected component in the gate graph; union-find with path halving."""
     root = np.arange(rows)
@@ -29,7 +28,7 @@ def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints
     return root
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def find(root: Ints, t: int) -> int:
     """Representative of t."""
     while root[t] != t:

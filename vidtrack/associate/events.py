@@ -12,9 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
 
 WIDEST = 30
@@ -48,13 +47,13 @@ class Frontier(NamedTuple):
     last: Ints
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def frontier(start: Ints) -> Frontier:
     """The frontier before the first step, for members with the edges start[i]..start[i + 1]."""
     return Frontier(np.diff(start), np.full(len(start) - 1, -1), np.full(len(start) - 1, -1))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def reverse(start: Ints, other: Ints, count: int) -> tuple[Ints, Ints, Ints]:
     """start, other and pair of the `count` members of the other side."""
     first = np.zeros(count + 1, np.int64)
@@ -71,7 +70,7 @@ def reverse(start: Ints, other: Ints, count: int) -> tuple[Ints, Ints, Ints]:
     return first, back, pair
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def plan(members: Ints, side: Side, other: Frontier, largest: int) -> tuple[Ints, int]:
     """An order of the members that keeps few of the other side contested at a time, and the bits that takes.
 
@@ -111,7 +110,7 @@ def plan(members: Ints, side: Side, other: Frontier, largest: int) -> tuple[Ints
     return order, width
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def exact(
     order: Ints, width: int, side: Side, other: Frontier, other_alone: Floats,
     factor: Floats, share: Floats, side_share: Floats, other_share: Floats,

@@ -8,11 +8,10 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numba import njit
 from scipy.special import gammainc, gammaincinv
 
 from vidtrack.associate.grid import cells
-from vidtrack.compiled import CACHE, specialised
+from vidtrack.compiled import kernel, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
 from vidtrack.scan import Floats, Ints, Mask, Scan, starts
@@ -172,7 +171,7 @@ def quantile(probability: float, dim: int) -> float:
     return float(2 * gammaincinv(dim / 2, probability))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
     """(T, 2) half sides of the box around each gate, on the first two axes."""
     axes = min(2, cov.shape[1])
@@ -279,7 +278,7 @@ def _gated(
     return specialised(gated, m, mode, *angles)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
     """(P,) the order by row, then measurement, of pairs that are ordered by row: two counting sorts."""
     first, begin = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
@@ -297,7 +296,7 @@ def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
     return order
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _grown(array: np.ndarray, size: int) -> np.ndarray:
     """The same numbers in a longer array of `size`."""
     wider = np.empty(size, array.dtype)

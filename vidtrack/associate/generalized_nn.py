@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.problem import Problem
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Decision, Floats, Ints
 
 
@@ -37,7 +36,7 @@ class GeneralizedNN:
         )
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _by_nearness(start: Ints, d2: Floats) -> Floats:
     """(N,) weights of the pairs, relative to the nearest of each row so that none overflows."""
     alpha = np.empty(len(d2))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
 
 
-@njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
     """Sort points z (M, m) into grid cells over their first two axes, by run (M,), row and column of the cell.
 
@@ -43,7 +42,7 @@ def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floa
     return order, first, origin, cell, shape
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _typical(reach: Floats) -> Floats:
     """(2,) mean of the finite half sides (T, 2), ones without any."""
     total, count = np.zeros(2), 0

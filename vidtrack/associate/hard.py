@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Decision, Floats, Ints
 
@@ -113,7 +112,7 @@ def one_hot(taken: Ints) -> Decision:
     return Decision(*_one_hot(taken))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _one_hot(taken: Ints) -> tuple[Ints, Ints, Ints, Floats, Floats]:
     row, measurement, beta0 = np.empty_like(taken), np.empty_like(taken), np.ones(len(taken))
     n = 0
@@ -124,7 +123,7 @@ def _one_hot(taken: Ints) -> tuple[Ints, Ints, Ints, Floats, Floats]:
     return np.arange(len(taken)), row[:n], measurement[:n], np.ones(n), beta0
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
     taken = np.full(len(start) - 1, -1)
     for t in range(len(taken)):
@@ -135,7 +134,7 @@ def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
     return taken
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
     """(T,) measurement of each row if the pairs are served in this order, -1 for none."""
     taken, free = np.full(rows, -1), np.ones(measurements, np.bool_)
@@ -146,7 +145,7 @@ def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measuremen
     return taken
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _assigned(
     row: Ints, start: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats,
     measurements: int, cardinal: bool,
@@ -159,7 +158,7 @@ def _assigned(
     return assign(start, measurement, cost, miss, measurements)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _never(cost: Floats, rows: int) -> float:
     """A cost larger than anything that a choice of pairs can save."""
     most = 0.0
@@ -168,7 +167,7 @@ def _never(cost: Floats, rows: int) -> float:
     return (1 + rows) * (1.0 + most)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _edge(row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, measurements: int) -> Floats:
     """(T,) cost of a measurement at the edge of each row's gate (T,), if its ln|S| were the largest of the cluster."""
     cluster = clusters(row, measurement, len(limit), measurements)

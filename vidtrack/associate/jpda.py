@@ -6,7 +6,6 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.assignment import solve
 from vidtrack.associate.belief import propagate
@@ -14,7 +13,7 @@ from vidtrack.associate.clusters import clusters
 from vidtrack.associate.events import Side, exact, frontier, plan, reverse
 from vidtrack.associate.jpda_star import likeliest_events
 from vidtrack.associate.problem import Problem
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Decision, Floats, Ints, Mask
 
 log = logging.getLogger(__name__)
@@ -74,7 +73,7 @@ class JPDA:
         )
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _marginals(
     start: Ints, row: Ints, measurement: Ints, factor: Floats, miss: Floats, unused: Floats, largest: int, star: bool
 ) -> tuple[Floats, Floats, Mask]:
@@ -115,7 +114,7 @@ def _marginals(
     return beta, beta0, approximate
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _met(tracks: Ints, rows: Side, met: Mask) -> Ints:
     """The measurements that a cluster's tracks can take, in the order met."""
     found, n = np.empty(rows.start[tracks + 1].sum() - rows.start[tracks].sum(), np.int64), 0

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.events import Side
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def likeliest_events(
     tracks: Ints, measurements: Ints, rows: Side, columns: Side, place: Ints,
     factor: Floats, share: Floats, row_share: Floats, largest: int,
@@ -61,7 +60,7 @@ def likeliest_events(
     return True
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _alone(alone: Floats) -> Floats:
     """(2^n,) product of the factors of those that are not in each set."""
     product = np.ones(1 << len(alone))
@@ -72,7 +71,7 @@ def _alone(alone: Floats) -> Floats:
     return product
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _by_size(sets: int) -> tuple[Ints, Ints]:
     """All sets, the smaller first, and where those of each size begin; no size beyond the whole set has any."""
     size = np.empty(sets, np.int64)
@@ -81,7 +80,7 @@ def _by_size(sets: int) -> tuple[Ints, Ints]:
     return np.argsort(size, kind="mergesort"), np.searchsorted(np.sort(size), np.arange(64))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _highest(d: int, tracks: Ints) -> tuple[int, int, int]:
     """The track of the highest bit of a set, that bit, and the size of the set."""
     i, size = 0, 0

@@ -5,17 +5,16 @@ from __future__ import annotations
 from heapq import heapify, heappop, heappush
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.assignment import solve
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints, Mask
 
 IMPOSSIBLE, FEASIBLE = 1e12, 1e11
 """Cost of a row that has no choice left, and what everything else stays below."""
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def k_best(
     offset: Floats, held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats, most: int, slack: float
 ) -> tuple[Ints, Ints, Floats]:
@@ -85,7 +84,7 @@ def k_best(
     return of, choice, total[:found]
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _complete(
     held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats,
     depth: int, fixed: Ints, bans: list[int], choice: Ints, gap: Floats,
@@ -140,7 +139,7 @@ def _complete(
     return total
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _doubled(array: np.ndarray) -> np.ndarray:
     """The same rows with room for as many again."""
     wider = np.empty((2 * len(array), array.shape[1]), array.dtype)

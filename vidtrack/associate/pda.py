@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.widening import widening
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Decision, Floats, Ints
 
 
@@ -41,7 +40,7 @@ class PDA:
         )
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _shared_out(start: Ints, log_pair: Floats, log_miss: Floats) -> tuple[Floats, Floats]:
     """(N,) and (T,) weights of the pairs and misses, which sum to one in each row."""
     beta, beta0 = np.empty(len(log_pair)), np.empty(len(log_miss))

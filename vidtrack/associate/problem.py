@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.gate import Gate, Pairs
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints, Mask, Scan
 
 VANISHING = 2000.0
@@ -119,7 +118,7 @@ class Problem:
         )
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _bounded(missed: Floats, detection: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
     """(T,) log_missed and (N,) log_ratio from the logarithms of the factors (T,); VANISHING for those of zero."""
     most = 0.0

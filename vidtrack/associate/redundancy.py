@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.clusters import find
 from vidtrack.associate.gate import Gate
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.estimate.sensor import wrapped
 from vidtrack.scan import Floats, Ints, Scan
 
@@ -77,7 +76,7 @@ def _around(box: Floats, place: Floats, z: Floats, order: Ints, begin: Ints) -> 
     return np.hstack([near - z[:, :2], far - near])
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _join(root: Ints, a: Ints, b: Ints) -> None:
     """Both ends of each pair get the smaller root."""
     for k in range(len(a)):
@@ -85,7 +84,7 @@ def _join(root: Ints, a: Ints, b: Ints) -> None:
         root[max(i, j)] = min(i, j)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _roots(root: Ints) -> Ints:
     """(M,) representative of each."""
     return np.array([find(root, i) for i in range(len(root))], np.int64)

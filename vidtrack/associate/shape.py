@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.gate import Pairs, quantile
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints, Mask
 
@@ -52,7 +51,7 @@ class Shape:
         return weighed.only(stays)
 
 
-@njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _compare(
     row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
     sigma: float, overlap: float,

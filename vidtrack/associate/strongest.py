@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.special import expit
 
 from vidtrack.associate.hard import one_hot
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.widening import widening
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.detection.amplitude import RAYLEIGH, Weibull, log_ratio, swerling1
 from vidtrack.detection.reduction import gate_volume
 from vidtrack.detection.strongest import Strongest
@@ -135,7 +134,7 @@ def _strength(scan: Scan) -> Floats:
     return strength
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _strongest(start: Ints, measurement: Ints, strength: Floats) -> Ints:
     """(T,) number of the pair with the strongest measurement of each row, the first of equals; -1 without."""
     best = np.full(len(start) - 1, -1)

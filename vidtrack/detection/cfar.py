@@ -8,12 +8,11 @@ P_FA is the same everywhere.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import gammaln
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats
 
@@ -81,7 +80,7 @@ def _levels(power: Floats, cells: int, guard: int, rank: int) -> Floats:
     return _reference_levels(rows, cells, guard, rank).reshape(power.shape)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _reference_levels(power: Floats, cells: int, guard: int, rank: int) -> Floats:
     """Mean (rank 0) or rank-th smallest of the reference cells of each cell; power (L, n)."""
     levels = np.empty_like(power)

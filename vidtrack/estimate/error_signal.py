@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.model import Motion
@@ -64,7 +63,7 @@ class ErrorSignalBank(ParticleBank):
         return chosen
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def keep_near(
     z: Floats, limit: Floats, wraps: Mask, seen: Floats, x: Floats, parent: Ints, start: Ints,
     measurement: Ints, log_weight: Floats, new: Floats,
@@ -95,7 +94,7 @@ def keep_near(
     return survivors
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def cycle(near: Mask, chosen: Ints) -> int:
     """Indices of the near (N,) particles in their order, over and over until chosen (N,) is full; how many are near.
 
@@ -112,7 +111,7 @@ def cycle(near: Mask, chosen: Ints) -> int:
     return survivors
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _within(z: Floats, seen: Floats, limit: Floats, wraps: Mask) -> bool:
     for a in range(len(z)):
         error = z[a] - seen[a]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.estimate.model import Columns, at_rest, check
 from vidtrack.scan import Floats, Ints
 
@@ -75,7 +74,7 @@ class ConstantVelocity(Columns):
         return at_rest(position, cov, np.repeat((self.speed * scale)[:, None], self.states, axis=1))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _moved_on(dim: int, dt: float) -> Floats:
     """(1, n, n) identity, plus dt from each velocity to its position."""
     F = np.zeros((1, 2 * dim, 2 * dim))
@@ -86,7 +85,7 @@ def _moved_on(dim: int, dt: float) -> Floats:
     return F
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _accelerations(
     x: Floats, P: Floats, hits: Ints, scale: Floats, accel: float, cross: float, time: tuple[float, float, float],
     warmup: int, heading: float,

@@ -9,9 +9,8 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE, specialised
+from vidtrack.compiled import kernel, specialised
 from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.resampling import choose
 from vidtrack.estimate.stream import normal
@@ -139,7 +138,7 @@ def moments(n: int) -> Kernel:
     return specialised(moments, n)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def resample(
     kind: int, threshold: float, weight: Floats, x: Floats, parent: Ints, stream: Ints, log_weight: Floats, new: Floats
 ) -> None:
@@ -161,7 +160,7 @@ def resample(
             new[k] = x[parent[k]]
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def copy(x: Floats, chosen: Ints, new: Floats) -> None:
     """new (N, n) becomes x (N, n) at the indices chosen (N,)."""
     for i in range(len(chosen)):
@@ -169,7 +168,7 @@ def copy(x: Floats, chosen: Ints, new: Floats) -> None:
             new[i, a] = x[chosen[i], a]
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _log_density(v: float, glint: float, factor: float) -> float:
     """ln of the density of one whitened component, up to a constant: (1 - glint) N(0, 1) + glint N(0, factor^2)."""
     half = min(0.5 * v * v, FARTHEST)
@@ -179,7 +178,7 @@ def _log_density(v: float, glint: float, factor: float) -> float:
     return np.log(glint / factor + (1.0 - glint) * np.exp(wide - half)) - wide
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def normalise(log_weight: Floats, weight: Floats) -> None:
     """Scale weights (N,), given by their logarithms, so that they sum to one; fill weight with them."""
     largest = -np.inf
@@ -196,7 +195,7 @@ def normalise(log_weight: Floats, weight: Floats) -> None:
         log_weight[i] -= log_total
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _root(Q: Floats, L: Floats) -> int:
     """Fill columns of L with L L' = Q (n, n), positive semidefinite; how many there are."""
     n = len(Q)

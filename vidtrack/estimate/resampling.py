@@ -9,9 +9,8 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.estimate.stream import exponential, uniform
 from vidtrack.scan import Floats, Ints
 
@@ -31,7 +30,7 @@ MULTINOMIAL, RESIDUAL, STRATIFIED = (
 )
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def choose(kind: int, weight: Floats, chosen: Ints, count: np.uint64) -> np.uint64:
     """Fill chosen (N,) with indices of particles of weight (N,) by one of the four schemes; the stream's next count."""
     number = len(chosen)
@@ -51,7 +50,7 @@ def choose(kind: int, weight: Floats, chosen: Ints, count: np.uint64) -> np.uint
     return count
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _one_in_each(weight: Floats, u: Floats, chosen: Ints) -> None:
     """The particle at (k + u_k) / N for each k when all lie one after the other in [0, 1), as long as their weights.
 
@@ -71,7 +70,7 @@ def _one_in_each(weight: Floats, u: Floats, chosen: Ints) -> None:
         chosen[k] = before
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _walk(weight: Floats, point: Floats, chosen: Ints) -> None:
     """The same at any ascending points of [0, 1)."""
     i, reached, total = 0, weight[0], weight.sum()
@@ -82,7 +81,7 @@ def _walk(weight: Floats, point: Floats, chosen: Ints) -> None:
         chosen[k] = i
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _sorted_uniforms(point: Floats, count: np.uint64) -> np.uint64:
     """Fill point with ascending uniform numbers: partial sums of exponential ones over their total."""
     total = 0.0
@@ -97,7 +96,7 @@ def _sorted_uniforms(point: Floats, count: np.uint64) -> np.uint64:
     return count
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _residual(weight: Floats, u: Floats, chosen: Ints, count: np.uint64) -> np.uint64:
     """floor(w N) of each particle, and the rest multinomially from what that leaves."""
     left = weight * (len(chosen) / weight.sum())

@@ -8,10 +8,9 @@ next one with what was drawn.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.special import erfc
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats
 
 STEP, MIX1, MIX2 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
@@ -36,7 +35,7 @@ EDGE = _edges()
 HEIGHT = np.exp(-(EDGE**2) / 2)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def bits(count: np.uint64) -> tuple[np.uint64, np.uint64]:
     """64 random bits, and the next count."""
     count += STEP
@@ -45,21 +44,21 @@ def bits(count: np.uint64) -> tuple[np.uint64, np.uint64]:
     return mixed ^ (mixed >> SHIFT3), count
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def uniform(count: np.uint64) -> tuple[float, np.uint64]:
     """Uniform in [0, 1)."""
     drawn, count = bits(count)
     return np.float64(drawn >> np.uint64(11)) * 2.0**-53, count
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def exponential(count: np.uint64) -> tuple[float, np.uint64]:
     """Exponential with mean one."""
     u, count = uniform(count)
     return -np.log1p(-u), count
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def normal(count: np.uint64) -> tuple[float, np.uint64]:
     """Standard normal."""
     while True:
@@ -75,7 +74,7 @@ def normal(count: np.uint64) -> tuple[float, np.uint64]:
             return x, count
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _tail(side: float, count: np.uint64) -> tuple[float, np.uint64]:
     """Normal beyond TAIL on the side of a number's sign."""
     while True:

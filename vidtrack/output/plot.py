@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import cv2
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Patch, Pen, draw_lines
 from vidtrack.output.folder import replacing
@@ -115,7 +114,7 @@ class TrajectoryPlot:
                     break
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _lay_over(layer: Image, picture: Image) -> None:
     """Blend a layer (h, w, 4), colours times opacity and the opacity, over the picture (h, w, 3); both uint8."""
     white = np.float32(255)

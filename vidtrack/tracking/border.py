@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Mask
 
 REACH = 2.0
@@ -50,7 +49,7 @@ class Border:
         return _reaching(box, sides, (self.width, self.height))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _sides(box: Floats, width: float, height: float) -> Mask:
     sides = np.zeros((len(box), 4), np.bool_)
     if np.isinf(width):
@@ -63,7 +62,7 @@ def _sides(box: Floats, width: float, height: float) -> Mask:
     return sides
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _cut(box: Floats, width: float, height: float) -> Mask:
     cut, sides = np.zeros(len(box), np.bool_), _sides(box, width, height)
     for i in range(len(box)):
@@ -71,7 +70,7 @@ def _cut(box: Floats, width: float, height: float) -> Mask:
     return cut
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _outside(xy: Floats, width: float, height: float) -> Mask:
     outside = np.zeros(len(xy), np.bool_)
     if np.isinf(width):
@@ -82,7 +81,7 @@ def _outside(xy: Floats, width: float, height: float) -> Mask:
     return outside
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _leaving(box: Floats, v: Floats, width: float, height: float) -> Mask:
     leaving, sides = np.zeros(len(box), np.bool_), _sides(box, width, height)
     for i in range(len(box)):
@@ -92,7 +91,7 @@ def _leaving(box: Floats, v: Floats, width: float, height: float) -> Mask:
     return leaving
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _reaching(box: Floats, sides: Mask, picture: tuple[float, float]) -> Floats:
     drawn = np.empty_like(box)
     for i in range(len(box)):

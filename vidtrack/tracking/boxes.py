@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ScanError
 from vidtrack.scan import Floats, Ints, Mask, Scan
 
@@ -38,7 +37,7 @@ def box_scan(t: float, box: ArrayLike, score: ArrayLike | None = None, jitter: f
     return Scan(t, boxes[:, :2] + size / 2, R, box=np.hstack([-size / 2, size]), score=scores)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def absolute(box: Floats, xy: Floats) -> Floats:
     """(N, 4) boxes in the picture, from boxes relative to points (N, d)."""
     placed = box.copy()
@@ -48,7 +47,7 @@ def absolute(box: Floats, xy: Floats) -> Floats:
     return placed
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, share: Floats) -> None:
     """Move boxes (T, 4), in place, by a share (T,) towards the boxes seen (M, 4) that they have `taken` (T,); -1: none.
 
@@ -63,7 +62,7 @@ def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, share: Floats)
             box[t, side] = seen[j, side] if jump else box[t, side] + share[t] * (seen[j, side] - box[t, side])
 
 
-@njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
     """For each inner box (T, 4) the outer box (M, 4) that covers the largest share of it: index or -1, share.
 

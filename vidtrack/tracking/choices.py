@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.gate import Pairs
 from vidtrack.associate.problem import Problem
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Choices, Decision, Floats, Ints
 
 LISTED = 10
@@ -34,7 +33,7 @@ def evidence(problem: Problem, decision: Decision, taken: Ints) -> tuple[Floats,
     return ratio - np.log(share), nis
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _heaviest(row: Ints, measurement: Ints, beta: Floats, beta0: Floats) -> Ints:
     best, most = np.full(len(beta0), -1), np.zeros(len(beta0))
     for b in range(len(row)):
@@ -43,7 +42,7 @@ def _heaviest(row: Ints, measurement: Ints, beta: Floats, beta0: Floats) -> Ints
     return best
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _of_taken(
     taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_ratio: Floats, log_missed: Floats,
     chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from vidtrack.associate.kbest import k_best
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.hypotheses import Hypotheses, log_sum
 
@@ -49,7 +48,7 @@ def children(
     )  # fmt: skip
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _children(
     first: Ints, log_p: Floats, start: Ints, leaf: Ints, begin: Ints, in_cluster: Ints,
     pairs: Ints, of_measurement: Ints, pair_row: Ints, log_ratio: Floats, log_missed: Floats, log_new: Floats,
@@ -106,7 +105,7 @@ def _children(
     return np.array(out_first), np.array(out_p), np.array(out_start), np.array(out_code)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, young: Mask) -> Mask:
     """(H,) hypotheses that agree with the likeliest of their cluster about one scan in the past.
 
@@ -135,7 +134,7 @@ def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, yo
     return agrees
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def likeliest(start: Ints, value: Floats, most: int) -> Mask:
     """(P,) the `most` pairs of largest value in each row, the first of equals; row t has start[t]..start[t + 1]."""
     chosen = np.ones(len(value), np.bool_)

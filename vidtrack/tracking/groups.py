@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.boxes import best_cover
@@ -71,7 +70,7 @@ class Groups:
         return _from_edges(predicted, box, var, blob, blobs, cut, hides, self.gate, self.edge)
 
 
-@njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _share(
     predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats,
     cover: float, growth: float, edge: float,
@@ -87,7 +86,7 @@ def _share(
     return shared, ~(explained >= 0.5 * blobs[:, 2] * blobs[:, 3])
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, cover: float) -> Ints:
     """(T,) the blob each track shares with others, or lies on without being assigned it; -1 for all others."""
     shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
@@ -106,7 +105,7 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, cov
     return shared
 
 
-@njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _changed(box: Floats, blob: Floats, growth: float, edge: float) -> bool:
     """Whether a blob (4,) has another size than the vehicle's box (4,), or one edge where it was and the other not."""
     ratio = blob[2] * blob[3] / (box[2] * box[3])
@@ -119,7 +118,7 @@ def _changed(box: Floats, blob: Floats, growth: float, edge: float) -> bool:
     return changed
 
 
-@njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _from_edges(
     predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: Mask, hides: Mask,
     gate: float, edge: float,

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints, Mask
 
 
@@ -70,7 +69,7 @@ class Hypotheses(NamedTuple):
         return Hypotheses(*_product(self.first, self.log_p, self.start, self.leaf, order, begin, most, slack))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def kept(log_p: Floats, threshold: float, most: int, mass: float) -> int:
     """How many of the hypotheses log_p (H,), likeliest first, survive pruning; at least one (SPEC 001, pruning).
 
@@ -86,7 +85,7 @@ def kept(log_p: Floats, threshold: float, most: int, mass: float) -> int:
     return max(1, n)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def surviving(first: Ints, log_p: Floats, threshold: float, most: int, mass: float) -> Mask:
     """(H,) hypotheses that survive pruning in their clusters."""
     stays = np.zeros(len(log_p), np.bool_)
@@ -95,7 +94,7 @@ def surviving(first: Ints, log_p: Floats, threshold: float, most: int, mass: flo
     return stays
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _normalised(first: Ints, log_p: Floats) -> Floats:
     """Logarithms (H,) of probabilities that sum to one in each cluster."""
     out = np.empty(len(log_p))
@@ -105,14 +104,14 @@ def _normalised(first: Ints, log_p: Floats) -> Floats:
     return out
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def log_sum(log_p: Floats) -> float:
     """ln of the sum of exp(log_p)."""
     most = log_p.max()
     return most + np.log(np.exp(log_p - most).sum())
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _hash(leaf: int) -> int:
     """A leaf's 64 bits; the sum over a hypothesis tells it from others."""
     bits = (leaf + 1) * 0x2545F4914F6CDD1D
@@ -121,7 +120,7 @@ def _hash(leaf: int) -> int:
     return bits ^ (bits >> 32)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _marginal(first: Ints, log_p: Floats, start: Ints, leaf: Ints, label: Ints) -> tuple[Ints, Floats, Ints, Ints]:
     slot = np.full(label.max() + 1 if len(label) else 0, -1)
     out_first, out_start = [0], [0]
@@ -166,7 +165,7 @@ def _marginal(first: Ints, log_p: Floats, start: Ints, leaf: Ints, label: Ints) 
     return np.array(out_first), np.array(out_p), np.array(out_start), np.array(out_leaf)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _product(
     first: Ints, log_p: Floats, start: Ints, leaf: Ints, order: Ints, begin: Ints, most: int, slack: float
 ) -> tuple[Ints, Floats, Ints, Ints]:

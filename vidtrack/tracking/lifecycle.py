@@ -7,10 +7,9 @@ from math import inf
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 from scipy.special import bdtrc
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 from vidtrack.scan import MERGED, TENTATIVE, Floats, Ints, Mask
 from vidtrack.tracking.register import Register
@@ -145,7 +144,7 @@ def scans_to_false_deletion(misses: int, detection: float) -> float:
     return sum(q**-i for i in range(1, misses + 1)) if q > 0 else inf
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _grown(status: np.ndarray, age: Floats, travel: Floats, old: float, least: Floats) -> Mask:
     grown = np.zeros(len(status), np.bool_)
     for t in range(len(status)):
@@ -153,7 +152,7 @@ def _grown(status: np.ndarray, age: Floats, travel: Floats, old: float, least: F
     return grown
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _unseen(status: np.ndarray, since: Floats, alone: float, hidden: float) -> Mask:
     unseen = np.zeros(len(status), np.bool_)
     for t in range(len(status)):
@@ -161,7 +160,7 @@ def _unseen(status: np.ndarray, since: Floats, alone: float, hidden: float) -> M
     return unseen
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _often(history: Ints, window: int, least: int) -> Mask:
     """(T,) rows with at least `least` hits within the window."""
     often = np.zeros(len(history), np.bool_)
@@ -170,7 +169,7 @@ def _often(history: Ints, window: int, least: int) -> Mask:
     return often
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> Mask:
     """(T,) tentative rows with more misses within the window than are allowed."""
     hopeless = np.zeros(len(history), np.bool_)
@@ -179,7 +178,7 @@ def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> M
     return hopeless
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _counts(history: int, window: int) -> tuple[int, int]:
     """Hits and misses of a row in its last `window` scans; its birth is the highest bit of its history."""
     hits, misses = 0, 0

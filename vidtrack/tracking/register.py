@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.special import expit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Floats, Ints, Mask
 
 BELIEF = 20.0
@@ -130,7 +129,7 @@ class Register:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _see(
     history: Ints, alone_s: Floats, updated_s: Floats, status: np.ndarray, hit: Mask, sure: Mask, t: float, dt: float
 ) -> None:
@@ -142,7 +141,7 @@ def _see(
         history[i] = (history[i] << 1 | counts) & SCANS
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats) -> None:
     for i in range(len(score)):
         score[i] = min(max(score[i] + log_ratio[i], -BELIEF), BELIEF)
@@ -150,7 +149,7 @@ def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats)
             best[i] = max(best[i], score[i])
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _settle(status: np.ndarray, history: Ints, group: Ints) -> None:
     for i in range(len(status)):
         if status[i] != TENTATIVE:
@@ -159,7 +158,7 @@ def _settle(status: np.ndarray, history: Ints, group: Ints) -> None:
             status[i] = MERGED
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _distance(a: Floats, b: Floats) -> Floats:
     """(T,) distances between points a and b (T, d)."""
     distance = np.empty(len(a))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
 from vidtrack.video.foreground import Foreground
@@ -109,7 +108,7 @@ def _joined(blobs: Blobs, group: Ints, count: int) -> Blobs:
     )
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _fragments(box: Floats, predicted: Floats, most: float, gap: float) -> tuple[Ints, int]:
     """Group of each box (B,) and the number of groups: close pieces of the same predicted vehicle are in one."""
     parent = np.arange(len(box))
@@ -124,7 +123,7 @@ def _fragments(box: Floats, predicted: Floats, most: float, gap: float) -> tuple
     return components(parent)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     """The predicted box in which most of this box (4,) lies; -1 if there is none, or others have a part in it."""
     vehicle, sharers = -1, 0
@@ -136,7 +135,7 @@ def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     return vehicle if sharers == 1 else -1
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _share_inside(box: Floats, other: Floats) -> float:
     """Share of a box's area that lies in the other one, spread."""
     common = 1.0
@@ -147,14 +146,14 @@ def _share_inside(box: Floats, other: Floats) -> float:
     return common / (box[2] * box[3])
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _gap(a: Floats, b: Floats) -> float:
     """Distance between two boxes along the axis that separates them more; negative where they overlap."""
     across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
     return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _measure(mask: Image, strength: NDArray, least: float) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Of each component of at least so many pixels: count (B,), mean (B, 2), covariance (B, 2, 2), box, strength."""
     row, start, stop = find_runs(mask, False)

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
 
 REACH, ALIKE = 0.5, 1.35
@@ -103,7 +102,7 @@ def _motion(
     return float(jitter), max(float(accel), LEAST_ACCEL)
 
 
-@njit(cache=CACHE, nogil=True)
+@kernel
 def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
     """(N,) nearest like of each box in the frame `step` away, -1 for none.
 

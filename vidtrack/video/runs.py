@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Ints
 from vidtrack.video.frame import Image
 
@@ -19,7 +18,7 @@ _HIGHS, _NONE = np.uint64(0x8080808080808080), np.uint64(0)  # the highest bit o
 _BYTE, _LAST = np.uint64(8), np.uint64(56)  # bits up to the next byte, and up to the last one
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
     """Maximal horizontal runs of pixels that are not 0, or for `background` those that are: row, start, stop.
 
@@ -35,7 +34,7 @@ def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
     return row[:n], start[:n], stop[:n]
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: Runs, start: Runs, stop: Runs) -> int:
     """Fill row, start, stop and return the number of runs.
 
@@ -68,7 +67,7 @@ def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: R
     return n
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _rest(pixels: Image, filler: bool) -> np.uint64:
     """The last pixels, fewer than eight, as a word that is filled up."""
     rest = np.full(8, filler, np.uint8)
@@ -77,13 +76,13 @@ def _rest(pixels: Image, filler: bool) -> np.uint64:
     return rest.view(np.uint64)[0]
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _not_zero(word: np.uint64) -> np.uint64:
     """The highest bit of each byte that is not 0."""
     return ((word & ~_HIGHS) + ~_HIGHS | word) & _HIGHS
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _lowest_byte(word: np.uint64) -> int:
     """Number of the lowest byte that is not 0, of a word that is not 0."""
     number = 0
@@ -94,7 +93,7 @@ def _lowest_byte(word: np.uint64) -> int:
     return number + 1 if word & np.uint64(0xFF) == 0 else number
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _after_zeros(words: Words, k: int) -> int:
     """Number of the first word from k on that is not 0, or of words if there is none."""
     while k + 8 <= len(words) and _all_zero(words, k):
@@ -104,7 +103,7 @@ def _after_zeros(words: Words, k: int) -> int:
     return k
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _all_zero(words: Words, k: int) -> bool:
     """Whether the eight words from k on are all 0."""
     total = _NONE
@@ -113,7 +112,7 @@ def _all_zero(words: Words, k: int) -> bool:
     return total == 0
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def connect(row: Runs, start: Runs, stop: Runs, diagonal: int) -> tuple[Ints, int]:
     """Component of each run and their number; runs of neighbouring rows touch if they overlap.
 
@@ -135,7 +134,7 @@ def connect(row: Runs, start: Runs, stop: Runs, diagonal: int) -> tuple[Ints, in
     return components(parent)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def components(parent: Ints) -> tuple[Ints, int]:
     """Component of each element (N,) after `join`, numbered by their first elements, and their number."""
     label = np.empty(len(parent), np.int64)
@@ -149,7 +148,7 @@ def components(parent: Ints) -> tuple[Ints, int]:
     return label, count
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def join(parent: Ints, a: int, b: int) -> None:
     """Make one component of those of a and b; parent (N,) int64 begins as 0, 1, 2, ..."""
     a, b = _root(parent, a), _root(parent, b)
@@ -159,7 +158,7 @@ def join(parent: Ints, a: int, b: int) -> None:
         parent[a] = b
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _root(parent: Ints, k: int) -> int:
     while parent[k] != k:
         parent[k] = parent[parent[k]]

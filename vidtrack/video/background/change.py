@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats
 from vidtrack.video.frame import Image
 
@@ -57,7 +56,7 @@ class Change:
         return 0.0
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _shares(mask: Image, columns: int, rows: int) -> tuple[float, float]:
     """Share of the pixels, and of the cells of a grid, that are foreground; mask (h, w) uint8, 0 and 255."""
     h, w = mask.shape

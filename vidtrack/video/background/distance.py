@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
@@ -13,7 +12,7 @@ from vidtrack.video.frame import Image
 _ONE = np.float32(1)
 
 
-@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def disturbance(
     picture: Picture,
     scene: Scene,

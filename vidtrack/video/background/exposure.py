@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
@@ -17,7 +16,7 @@ _STEP = np.float32(0.02)  # a smaller change is left to learning
 _LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covered, or the picture is missing
 
 
-@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
     """Multiply the scene's luminance by the camera's gain against it, if that is more than learning follows."""
     g = gain(picture.luma, scene, black)
@@ -27,13 +26,13 @@ def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
                 _amplify(plane[y], g, black)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _amplify(row: Levels, g: np.float32, black: np.float32) -> None:
     for x in range(len(row)):
         row[x] = min(black + g * (row[x] - black), np.float32(255))
 
 
-@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     """Median of (Y - black) / (B - black) over the points that were not covered before; 1 if they are too few.
 
@@ -55,7 +54,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     return g if 1 / _LARGEST < g < _LARGEST else np.float32(1)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _mostly_steady(ratio: Levels) -> bool:
     """Whether the median of ratio (N,) is so close to 1 that it needs no search."""
     above = below = 0

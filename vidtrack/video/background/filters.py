@@ -6,10 +6,9 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE, specialised
+from vidtrack.compiled import kernel, specialised
 from vidtrack.video.frame import Image
 
 LARGEST_STEP = 256  # a column of so many pixels still adds up in 16 bits
@@ -54,7 +53,7 @@ def _averaging(step: int) -> Callable[..., Any]:
     return specialised(average, step)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def _weigh(plane: Image, smooth: Image) -> None:
     """Fill smooth (h, w) from plane (h, w)."""
     h, w = plane.shape

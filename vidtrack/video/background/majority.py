@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.video.frame import Image
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def majority(hit: Image, window: int, mask: Image) -> None:
     """mask = 255 where more than half of the window x window pixels around have hit == 1, else 0.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.video.background.scene import Scene
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import Runs, connect, find_runs
@@ -17,14 +16,14 @@ _RETURNED = 0.6  # share of a blob's pixels that are as they were before
 _MARGIN = np.float32(1.3)  # against healing what is really there: a dark vehicle on a road with marks
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def paint(mask: Image, row: Runs, start: Runs, stop: Runs, value: int) -> None:
     """Set mask (h, w) uint8 to value on the runs."""
     for k in range(len(row)):
         mask[row[k], start[k] : stop[k]] = value
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def fill_holes(mask: Image) -> None:
     """Set to 255 the background regions (4-connected) that do not reach the picture's edge. mask (h, w) uint8."""
     h, w = mask.shape
@@ -38,7 +37,7 @@ def fill_holes(mask: Image) -> None:
     paint(mask, row[hole], start[hole], stop[hole], 255)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -> tuple[Runs, Runs, Runs]:
     """Runs (row, start, stop) of the ghosts: blobs of objects that are in the scene and no longer in the picture.
 
@@ -72,7 +71,7 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
     return row[chosen], start[chosen], stop[chosen]
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _contrast(luma: NDArray, y: int, x: int) -> np.float32:
     across = abs(np.float32(luma[y, x + _REACH]) - np.float32(luma[y, x - _REACH]))
     return across + abs(np.float32(luma[y + _REACH, x]) - np.float32(luma[y - _REACH, x]))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.shadow import SHADOW
@@ -53,7 +52,7 @@ def start(picture: Picture) -> Scene:
     return Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), np.zeros(shape, np.float32), np.full(shape, NEVER))
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def learn(
     picture: Picture,
     scene: Scene,
@@ -84,7 +83,7 @@ def learn(
                 scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def adopt(picture: Picture, scene: Scene, row: Runs, start: Runs, stop: Runs) -> None:
     """Take the picture for the scene on the runs (row, start, stop), as if it had just begun there."""
     for k in range(len(row)):
@@ -92,7 +91,7 @@ def adopt(picture: Picture, scene: Scene, row: Runs, start: Runs, stop: Runs) ->
             _adopt(picture, scene, row[k], x)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def absorb(picture: Picture, scene: Scene, hit: Image, absorb_s: np.float32, shadow_s: np.float32) -> None:
     """Take the picture for the scene where it was covered for absorb_s, or is shadow and was covered for shadow_s."""
     h, w = hit.shape
@@ -103,7 +102,7 @@ def absorb(picture: Picture, scene: Scene, hit: Image, absorb_s: np.float32, sha
                 _adopt(picture, scene, y, x)
 
 
-@numba.njit(cache=CACHE, nogil=True)
+@kernel
 def spare(covered_s: Levels, box: Floats, longest_s: np.float32) -> None:
     """Limit the seconds of cover inside boxes (K, 4) left, top, width, height to longest_s."""
     h, w = covered_s.shape
@@ -113,7 +112,7 @@ def spare(covered_s: Levels, box: Floats, longest_s: np.float32) -> None:
                 covered_s[y, x] = min(covered_s[y, x], longest_s)
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _adopt(picture: Picture, scene: Scene, y: int, x: int) -> None:
     scene.former[y, x] = scene.luma[y, x]
     scene.luma[y, x] = picture.luma[y, x]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numba
 import numpy as np
 
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import kernel
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import find_runs
 
@@ -24,7 +23,7 @@ _REACH = 1  # px to either side over which luminance differences are taken; fart
 _NEUTRAL = np.float32(128)  # chroma of grey
 
 
-@numba.njit(cache=CACHE, nogil=True, error_model="numpy")
+@kernel(error_model="numpy")
 def mark_shadow(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> None:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's, times one factor r.
 
@@ -44,14 +43,14 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, hit: Image) -
                 hit[y, x] = SHADOW
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _same_colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> bool:
     blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * (scene.cb[y, x] - _NEUTRAL)
     red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * (scene.cr[y, x] - _NEUTRAL)
     return max(abs(blue), abs(red)) < _CHROMA
 
 
-@numba.njit(cache=CACHE, nogil=True, inline="always")
+@kernel(inline="always")
 def _texture_error(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> np.float32:
     h, w = luma.shape
     up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
