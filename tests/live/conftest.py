@@ -10,9 +10,10 @@ from vidtrack.run import Run
 
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch):
-    """A slow machine gets the time that it needs to end a run: what is tested is what is there then."""
+    """A slow machine gets the time that it needs to answer and to end a run: what is tested is what comes then."""
     monkeypatch.setattr("vidtrack.live.run._END_S", 60.0)
     monkeypatch.setattr("vidtrack.live.many._END_S", 60.0)
+    monkeypatch.setattr("vidtrack.live.watched._ANSWER_S", 60.0)
     monkeypatch.setattr("vidtrack.video.live.source._END_S", 10.0)
 
 

@@ -2,18 +2,33 @@
 
 import subprocess
 import sys
+from threading import Timer
 
+from cameras import HANG_S
 from command_line import ENVIRONMENT
 
 _CODE = """
-import vidtrack.cli.signals, vidtrack.live.run
-vidtrack.cli.signals._PATIENCE_S = vidtrack.live.run._END_S = 60.0
+import vidtrack.cli.signals as signals, vidtrack.video.live.source as source
+import vidtrack.live.many as many, vidtrack.live.run as run
+signals._PATIENCE_S = many._END_S = run._END_S = 60.0
+source._END_S = 10.0
 from vidtrack.__main__ import main
 main()
 """
 
 
-def start(*arguments, cwd, stderr=subprocess.PIPE):
+def start(*arguments, cwd, stderr=subprocess.PIPE, **options):
     """A running `vidtrack` with its output in pipes."""
     command = [sys.executable, "-c", _CODE, *map(str, arguments)]
-    return subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=stderr, text=True, env=ENVIRONMENT)
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, cwd=cwd, stdout=pipe, stderr=stderr, text=True, env=ENVIRONMENT, **options)
+
+
+def line_with(words, process):
+    """The next line with these words that it tells; a process that tells none is killed."""
+    hang = Timer(HANG_S, process.kill)
+    hang.start()
+    try:
+        return next(line for line in process.stderr if words in line)
+    finally:
+        hang.cancel()

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from cameras import HANG_S, HttpCamera, crossing, wait_for
 from click.testing import CliRunner
-from command_line import start
+from patient import line_with, start
 
 import vidtrack.live.run
 from vidtrack.cli import cli
@@ -67,8 +67,7 @@ def test_one_camera_dies_and_the_other_goes_on(camera, other, tmp_path):
     process = start("live", "cameras.toml", "-o", "out", "--http", "0", cwd=tmp_path, start_new_session=True)
     wait_for(lambda: rows(out / "north") > 5 and rows(out / "south") > 5)
     other.__exit__()
-    line = next(line for line in process.stderr if "south" in line)
-    assert "warning: lost" in line
+    line = line_with("south: warning: lost", process)
     before = rows(out / "north")
     wait_for(lambda: rows(out / "north") > before + 5)
     shown = [path.read_bytes().decode() for path in process_arguments(process.pid)]
@@ -81,10 +80,8 @@ def test_one_camera_dies_and_the_other_goes_on(camera, other, tmp_path):
     assert summary["frames"] == sum(camera["frames"] for camera in summary["cameras"].values())
     assert list(summary["cameras"]["north"]["counts"]) == ["gate"]
     assert not any("error" in camera for camera in summary["cameras"].values())
-    texts = [*shown, output, line, talk] + [
-        p.read_bytes().decode(errors="replace") for p in out.rglob("*") if p.is_file()
-    ]
-    assert not any("pass%40word" in text for text in texts)
+    written = [path.read_bytes().decode(errors="replace") for path in out.rglob("*") if path.is_file()]
+    assert not any("pass%40word" in text for text in (*shown, output, line, talk, *written))
 
 
 def process_arguments(pid):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from cameras import HANG_S, wait_for
 from click.testing import CliRunner
-from patient import start
+from patient import line_with, start
 
 from vidtrack.cli import cli
 from vidtrack.errors import ConfigError
@@ -20,7 +20,7 @@ from vidtrack.errors import ConfigError
 def test_the_page_of_a_run(camera, tmp_path):
     options = ("-o", "out", "--http", "0", "--http-token", "sesame", "--line", "gate:160,0,160,240")
     process = start("live", camera.url(login="u:geheim@"), *options, cwd=tmp_path)
-    told = next(line for line in process.stderr if "the page is at" in line)
+    told = line_with("the page is at", process)
     url = re.search(r"http://127\.0\.0\.1:\d+/", told)[0]
 
     def ask(path):

@@ -17,6 +17,9 @@ import numpy as np
 from vidtrack.serve.camera import Camera
 from vidtrack.serve.page import Page
 
+HANG_S = 60.0
+"""What takes longer hangs. Nothing is measured by it."""
+
 READING = {
     "fps": 25.0,
     "fps_in": 24.97,
@@ -90,7 +93,7 @@ def page_over(cameras, token=None, place="0"):
         yield page.url
 
 
-def get(url, bearer=None, password=None, host=None, timeout=10):
+def get(url, bearer=None, password=None, host=None):
     """Status code, headers and body of an answer."""
     headers = {} if host is None else {"Host": host}
     if bearer is not None:
@@ -98,7 +101,7 @@ def get(url, bearer=None, password=None, host=None, timeout=10):
     if password is not None:
         headers["Authorization"] = "Basic " + base64.b64encode(f"anyone:{password}".encode()).decode()
     try:
-        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=timeout) as answer:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=HANG_S) as answer:
             return answer.status, answer.headers, answer.read()
     except urllib.error.HTTPError as error:
         return error.code, error.headers, error.read()
@@ -116,3 +119,11 @@ def connect(url, request=b""):
     client.connect((host, int(port)))
     client.sendall(request)
     return client
+
+
+def wait_for(condition):
+    """Wait until the condition holds."""
+    until = time.monotonic() + HANG_S
+    while not condition():
+        assert time.monotonic() < until, "waited in vain"
+        time.sleep(0.01)

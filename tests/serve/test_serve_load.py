@@ -1,16 +1,19 @@
 """Many, slow and dead clients cost little, and the tracker nothing."""
 
+import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from page_client import MadeUp, connect, get, page_over
+from page_client import HANG_S, MadeUp, connect, get, page_over, wait_for
+
+from vidtrack.serve.page import Page
 
 ASK = b"GET /%s HTTP/1.1\r\nHost: localhost\r\n\r\n"
 
 
 def answers(url):
-    return get(url + "healthz", timeout=2)[0] == 200
+    return get(url + "healthz")[0] == 200
 
 
 def test_pictures_are_made_once_for_all_and_not_too_often():
@@ -40,7 +43,7 @@ def test_a_client_that_never_reads_delays_nobody():
         deaf = [connect(url, ASK % path) for path in (b"tracks", b"tracks", b"picture/0.jpg", b"status")]
         assert answers(url)
         looks = -1
-        until_s = time.monotonic() + 10
+        until_s = time.monotonic() + HANG_S
         while looks != camera.looks:  # its streams stand still: they wait for the client, and keep nothing for it
             assert time.monotonic() < until_s
             looks = camera.looks
@@ -53,9 +56,11 @@ def test_a_client_that_never_reads_delays_nobody():
 
 def test_a_client_that_takes_nothing_is_cut_off(monkeypatch):
     monkeypatch.setattr("vidtrack.serve.door._GONE_S", 0.5)
-    with page_over({"gate": MadeUp(tracks=[{"track_id": number} for number in range(20000)])}) as url:
-        client = connect(url, ASK % b"tracks")
-        time.sleep(3.0)
+    camera = MadeUp(tracks=[{"track_id": number} for number in range(20000)])
+    with Page("0") as page:
+        page.show({"gate": camera.camera()})
+        client = connect(page.url, ASK % b"tracks")
+        wait_for(lambda: camera.looks and connections_of(page) == 0)
         with pytest.raises(ConnectionResetError):
             client.makefile("rb").read()
 
@@ -64,39 +69,44 @@ def test_who_connects_has_to_ask_soon(monkeypatch):
     monkeypatch.setattr("vidtrack.serve.page._ASK_S", 0.2)
     with page_over({"gate": MadeUp()}) as url:
         client = connect(url)
-        client.settimeout(5)
+        client.settimeout(HANG_S)
         assert client.recv(10) == b""
 
 
 def test_the_number_of_connections_is_bounded(monkeypatch):
     monkeypatch.setattr("vidtrack.serve.page._MOST", 5)
-    with page_over({"gate": MadeUp()}) as url:
-        silent = [connect(url, b"GET /") for _ in range(20)]
-        time.sleep(0.3)
-        for client in silent:
-            client.settimeout(0.1)
-        assert sum(_is_open(client) for client in silent) == 5
+    monkeypatch.setattr("vidtrack.serve.page._ASK_S", 2 * HANG_S)
+    with Page("0") as page:
+        page.show({"gate": MadeUp().camera()})
+        silent = [connect(page.url, b"GET /") for _ in range(20)]
+        wait_for(lambda: sum(map(is_open, silent)) == 5)
+        assert connections_of(page) == 5
         for client in silent:
             client.close()
-        time.sleep(0.1)
-        assert answers(url)
+        wait_for(lambda: connections_of(page) == 0)
+        assert answers(page.url)
 
 
-def _is_open(client):
+def connections_of(page):
+    return len(page._server.server_state.connections)
+
+
+def is_open(client):
     try:
-        return client.recv(1) != b""
-    except TimeoutError:
+        return client.recv(1, socket.MSG_DONTWAIT) != b""
+    except BlockingIOError:
         return True
     except ConnectionError:
         return False
 
 
 def test_the_page_ends_at_once_whoever_is_looking():
-    with page_over({"gate": MadeUp()}) as url:
+    camera = MadeUp()
+    with page_over({"gate": camera}) as url:
         clients = [connect(url, ASK % b"tracks") for _ in range(3)]
-        time.sleep(0.3)
+        wait_for(lambda: camera.looks > 3)
         began = time.monotonic()
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < HANG_S
     for client in clients:
         client.close()
 

@@ -5,7 +5,7 @@ import logging
 import urllib.request
 
 import pytest
-from page_client import MadeUp, connect, get, get_json, page_over
+from page_client import HANG_S, MadeUp, connect, get, get_json, page_over
 from prometheus_client.parser import text_string_to_metric_families
 
 WAITING = {"state": "waiting", "frame_age_s": 73.0}
@@ -90,7 +90,7 @@ def test_metrics_are_what_prometheus_reads(url):
 
 
 def test_tracks_are_a_stream_of_json(url):
-    with urllib.request.urlopen(url + "tracks", timeout=10) as stream:
+    with urllib.request.urlopen(url + "tracks", timeout=HANG_S) as stream:
         assert stream.headers["Content-Type"].startswith("application/x-ndjson")
         lines = [json.loads(stream.readline()) for _ in range(12)]
     assert {line["camera"] for line in lines} == {"gate", "yard"}
@@ -102,7 +102,7 @@ def test_tracks_are_a_stream_of_json(url):
 
 def test_a_frame_is_sent_once():
     cameras = {"gate": MadeUp(frame=3), "yard": MadeUp()}
-    with page_over(cameras) as url, urllib.request.urlopen(url + "tracks", timeout=10) as stream:
+    with page_over(cameras) as url, urllib.request.urlopen(url + "tracks", timeout=HANG_S) as stream:
         lines = [json.loads(stream.readline()) for _ in range(6)]
     assert [line["camera"] for line in lines] == ["gate"] + 5 * ["yard"]
 

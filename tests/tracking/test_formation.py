@@ -134,7 +134,7 @@ def test_empty_scans_and_the_end_of_a_group():
 def test_a_heap_is_one_group():
     tracker = groups()
     for k in range(2):
-        found = tracker.step(scan(k, np.zeros((3000, 2))))
+        found = tracker.step(scan(k, np.zeros((1500, 2))))
     assert len(found.tracks) == 1
 
 
