@@ -1,5 +1,7 @@
 """Recording pauses when the disk refuses, and goes on when there is room, whenever that happens."""
 
+from threading import Event, Thread
+
 import pytest
 from cameras import Picture, Script, grey
 
@@ -61,3 +63,30 @@ def test_a_part_that_ends_before_its_first_frame_is_tracked_ends_no_other(tape, 
     assert tape.lost == 3
     assert caplog.text.count("recording pauses") == 1  # not once for each try
     assert len((part / "frames.csv").read_text().splitlines()) == 1 + 3
+
+
+@pytest.mark.parametrize("in_time", [True, False])
+def test_a_film_is_never_closed_while_a_packet_is_written(tape, monkeypatch, caplog, in_time):
+    entered, answer, did = Event(), Event(), []
+
+    def take(*_):
+        entered.set()
+        answer.wait()
+        did.append("take")
+
+    receive(tape)
+    monkeypatch.setattr(tape._film, "take", take)
+    monkeypatch.setattr(tape._film, "close", lambda: did.append("close"))
+    monkeypatch.setattr(recorder, "_END_S", 60.0 if in_time else 0.0)
+    reader = Thread(target=receive, args=(tape,))
+    reader.start()
+    entered.wait()
+    ending = Thread(target=tape.close)
+    ending.start()
+    if not in_time:
+        ending.join()
+    answer.set()
+    reader.join()
+    ending.join()
+    assert did == (["take", "close"] if in_time else ["take"])
+    assert ("the disk does not answer" in caplog.text) is not in_time

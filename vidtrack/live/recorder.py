@@ -7,6 +7,7 @@ import shutil
 import time
 from collections import deque
 from pathlib import Path
+from threading import RLock
 from time import monotonic
 
 import av
@@ -27,6 +28,7 @@ log = logging.getLogger(__name__)
 
 _RETRY_S = 5.0  # after a failed write
 _TELL_S = 60.0  # a loss that lasts is told so often
+_END_S = 0.5  # that the reader gets at the end to finish a packet
 _NOWHERE: Place = (-1, 0)
 
 
@@ -65,6 +67,7 @@ class Recorder(NoRecorder):
         self._settings = settings.model_dump_json(indent=2)
         self._roll_s = roll_s
         self._keep = keep
+        self._writing = RLock()  # on a slow disk the reader still holds it when the run ends
         self._film: Film | None = None
         self._folders: dict[int, Path] = {}
         self._part = 0
@@ -81,11 +84,12 @@ class Recorder(NoRecorder):
         begins = self._film is None and monotonic() >= self._retry_s
         if not begins and not (self._film is not None and packet.is_keyframe and self._due(self._film)):
             return False
-        self.hang_up()
-        try:
-            self._begin(connection)
-        except (OSError, av.FFmpegError) as error:
-            self._pause(error.strerror or str(error))
+        with self._writing:
+            self.hang_up()
+            try:
+                self._begin(connection)
+            except (OSError, av.FFmpegError) as error:
+                self._pause(error.strerror or str(error))
         return True
 
     def place(self) -> Place:
@@ -94,27 +98,29 @@ class Recorder(NoRecorder):
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
         """Keep a packet, and what the tracker logged meanwhile."""
-        if self._film is None:
-            self.lost += 1
-            return
-        try:
-            self._film.take(packet, pictures, arrived_s)
-            self._write_log()
-        except (StoppedEarly, av.FFmpegError) as error:
-            self._pause(str(error))
-            return
-        if self._film.error is not None:
-            self._pause(self._film.error.strerror or str(self._film.error))
+        with self._writing:
+            if self._film is None:
+                self.lost += 1
+                return
+            try:
+                self._film.take(packet, pictures, arrived_s)
+                self._write_log()
+            except (StoppedEarly, av.FFmpegError) as error:
+                self._pause(str(error))
+                return
+            if self._film.error is not None:
+                self._pause(self._film.error.strerror or str(self._film.error))
 
     def hang_up(self) -> None:
         """End the part."""
-        film, self._film = self._film, None
-        if film is None:
-            return
-        try:
-            film.close()
-        except (OSError, av.FFmpegError) as error:
-            log.warning("the end of a recording is lost: %s", error.strerror)
+        with self._writing:
+            film, self._film = self._film, None
+            if film is None:
+                return
+            try:
+                film.close()
+            except (OSError, av.FFmpegError) as error:
+                log.warning("the end of a recording is lost: %s", error.strerror)
 
     def begins(self, place: Place) -> bool:
         """Whether the frame at this place is the first of its part that is tracked."""
@@ -131,13 +137,18 @@ class Recorder(NoRecorder):
         self._to_write.append((part, f"{frame.index},{frame.time_s!r},{packet}\n"))
 
     def close(self) -> None:
-        """Write what the tracker logged last; call it when the reader has stopped."""
-        self.hang_up()
+        """Write what the tracker logged last; call it when the reader was told to stop."""
+        if not self._writing.acquire(timeout=_END_S):
+            log.warning("the end of the recording is lost: the disk does not answer")
+            return
         try:
+            self.hang_up()
             self._write_log()
             self._end_list()
         except StoppedEarly as error:
             log.warning("%s", error)
+        finally:
+            self._writing.release()
 
     def _due(self, film: Film) -> bool:
         large = self._keep.part_size is not None and film.size > self._keep.part_size
