@@ -200,6 +200,7 @@ def test_a_video_of_one_frame_has_no_tracks(vidtrack, tmp_path):
         (("-o", "a_file/below"), ["a_file"]),
         (("--video", "a_file/annotated.mp4"), ["a_file"]),
         (("--video", "annotated.avi"), ["annotated.avi", "annotated.mp4"]),
+        (("--video", ""), ["FILE.mp4"]),
         (("--save-masks", "a_file"), ["a_file"]),
         (("--rerun", "swpan"), ["swpan", "spawn", ".rrd"]),
     ],

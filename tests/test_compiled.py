@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from contextlib import contextmanager
+from pathlib import Path
 from threading import Thread
 
 import pytest
@@ -72,6 +73,16 @@ def test_a_signal_that_is_ignored_stays_so():
         assert outer(1) == 4
 
 
+def test_a_handler_that_is_not_pythons_is_left_alone(monkeypatch):
+    """As in a program in C that has a Python inside: there is no way to put its handler back."""
+    _, outer = kernels()
+    taken = []
+    monkeypatch.setattr(signal, "getsignal", lambda number: None)
+    monkeypatch.setattr(signal, "signal", lambda *given: taken.append(given))
+    assert outer(1) == 4
+    assert taken == []
+
+
 def test_another_thread_compiles_without_touching_the_handlers():
     _, outer = kernels()
     found = []
@@ -103,6 +114,13 @@ def test_kernels_of_a_source_that_is_gone_are_stale(tmp_path):
     kernel.touch()
     forget_stale(tmp_path)
     assert not kernel.exists()
+
+
+def test_two_processes_may_delete_stale_kernels_at_once(tmp_path, monkeypatch):
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "find.py").touch()
+    monkeypatch.setattr(Path, "rglob", lambda *_: [tmp_path / "__pycache__" / "find.find-1.py311.nbi"])
+    forget_stale(tmp_path)
 
 
 @pytest.fixture

@@ -61,7 +61,9 @@ def forget_stale(package: Path) -> None:
 
 def _older_than_source(kernel: Path) -> bool:
     source = kernel.parent.parent / f"{kernel.name.split('.')[0]}.py"
-    return not source.exists() or source.stat().st_mtime > kernel.stat().st_mtime
+    with suppress(FileNotFoundError):  # another process has just deleted it
+        return not source.exists() or source.stat().st_mtime > kernel.stat().st_mtime
+    return False
 
 
 class KernelCache(FunctionCache):
@@ -136,7 +138,8 @@ class SignalsWait(Listener):
     def on_start(self, event: Event) -> None:
         """The main thread enters the compiler, perhaps for a kernel that another one calls."""
         if not self._handlers and current_thread() is main_thread():
-            self._handlers = {number: signal.signal(number, self._note) for number in (signal.SIGINT, signal.SIGTERM)}
+            ours = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not None]
+            self._handlers = {number: signal.signal(number, self._note) for number in ours}  # None: set by a host in C
 
     def on_end(self, event: Event) -> None:
         """It leaves the compiler; what was caught meanwhile comes now."""

@@ -163,26 +163,29 @@ def check_states(x: Floats, P: Floats) -> None:
     if not finite.all():
         i = int(np.argmin(finite))
         raise ScanError(f"state {i} is not finite: {x[i]}")
-    _refuse_no_covariance(P, "P of state {}")
+    _refuse_no_covariance(P, "P of state {}", least=-1e-9)  # a part of a state may be known exactly
 
 
-def _refuse_no_covariance(R: Floats, name: str) -> None:
-    """Raise ScanError for the first of R (B, m, m) that is not a covariance; {} in `name` becomes its index."""
+def _refuse_no_covariance(R: Floats, name: str, least: float = 1e-14) -> None:
+    """Raise ScanError for the first of R (B, m, m) that is not a covariance; {} in `name` becomes its index.
+
+    least  share of the largest element that every eigenvalue must exceed
+    """
     finite = np.isfinite(R).all(axis=(1, 2))
     if not finite.all():
         i = int(np.argmin(finite))
         raise ScanError(f"{name.format(i)} is not finite: {R[i].tolist()}")
-    scale = np.abs(R).max(axis=(1, 2), initial=0.0)
+    scale = np.abs(R).max(axis=(1, 2), initial=np.finfo(float).tiny)
     symmetric = np.abs(R - np.swapaxes(R, 1, 2)).max(axis=(1, 2), initial=0.0) <= 1e-9 * scale
     if not symmetric.all():
         i = int(np.argmin(symmetric))
         raise ScanError(f"{name.format(i)} is not symmetric: {R[i].tolist()}")
     if R.shape[1] == 2:  # the common case without a decomposition
         determinant = R[:, 0, 0] * R[:, 1, 1] - R[:, 0, 1] * R[:, 1, 0]
-        positive = (R[:, 0, 0] > 0) & (determinant > 1e-14 * scale**2)
+        positive = (R[:, 0, 0] > least * scale) & (determinant > least * scale**2)
     else:
         smallest = np.linalg.eigvalsh(R)[:, 0] if len(R) else np.empty(0)
-        positive = smallest > 1e-14 * scale
+        positive = smallest > least * scale
     if not positive.all():
         i = int(np.argmin(positive))
         raise ScanError(f"{name.format(i)} is not positive definite: {R[i].tolist()}; give it a variance above zero")

@@ -15,6 +15,7 @@ from vidtrack.video.live.connection import Connection
         ("rtsp://u:a/b?c#d@cam/x?y#z", "rtsp://u:a%2Fb%3Fc%23d@cam/x?y#z"),
         ("rtsp://u:a@b:c@cam/x", "rtsp://u:a@b:c@cam/x"),
         ("rtsp://u:a%2Fb@cam/x", "rtsp://u:a%2Fb@cam/x"),
+        ("http://u:a@cam/at/a@b.mjpg?to=http://c:d/@", "http://u:a@cam/at/a@b.mjpg?to=http://c:d/@"),
         ("rtsp://u:p w\u00e4@[::1]:554/x", "rtsp://u:p%20w%C3%A4@[::1]:554/x"),
         ("http://cam:80/at/a@b.mjpg?x=y/z#@", "http://cam:80/at/a@b.mjpg?x=y/z#@"),
     ],

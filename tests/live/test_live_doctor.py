@@ -18,5 +18,6 @@ def test_a_camera_is_watched_for_some_seconds(camera):
     assert found["source"].startswith("http://***@127.0.0.1")
     assert found["timing"]["pictures"] > 1
     assert found["timing"]["rate"] > 0
+    assert found["reception"]["gone"] is False
     assert found["speed"]["decode_s"] is None
     assert math.isfinite(found["blockiness"])

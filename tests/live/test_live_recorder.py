@@ -90,3 +90,10 @@ def test_a_film_is_never_closed_while_a_packet_is_written(tape, monkeypatch, cap
     ending.join()
     assert did == (["take", "close"] if in_time else ["take"])
     assert ("the disk does not answer" in caplog.text) is not in_time
+
+
+def test_a_packet_that_comes_after_the_end_begins_no_part(tape, tmp_path):
+    track(tape, 0, receive(tape))
+    tape.close()
+    receive(tape)
+    assert len(parts_of(tmp_path / "tape")) == 1

@@ -233,6 +233,16 @@ def test_a_state_that_is_none_is_not_added(x, P, words):
         Tracker().add(0.0, x, P)
 
 
+@pytest.mark.parametrize("P", [np.diag([1.0, 0.0, 1.0, 0.0]), np.zeros((4, 4))])
+def test_a_state_may_be_known_exactly_in_part_or_whole(P):
+    tracker = Tracker(ConstantVelocity(2, 1.0))
+    tracker.add(0.0, np.array([[0.0, 1.0, 0.0, 0.0]]), P[None])
+    tracks = tracker.step(Scan(1.0, np.array([[1.1, 0.0]]), np.eye(2)))
+    assert tracks.measurement.tolist() == [0]
+    assert np.linalg.eigvalsh(tracks.P[0]).min() > -1e-12
+
+
+
 def test_an_id_that_was_given_is_not_given_again():
     tracker = Tracker()
     tracker.add(0.0, np.zeros((1, 4)), np.eye(4)[None], ids=np.array([7]))

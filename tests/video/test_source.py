@@ -181,10 +181,13 @@ def test_a_span_behind_the_end_is_an_error_that_names_the_last_time(avi):
 ONE = 1 << 16  # 1 in the matrix of an MP4 track, which says how its pictures are to be turned
 UPRIGHT, HALF = (ONE, 0, 0, 0, ONE), (-ONE, 0, 0, 0, -ONE)
 CLOCKWISE, COUNTERCLOCKWISE = (0, ONE, 0, -ONE, 0), (0, -ONE, 0, ONE, 0)
+UNSET = (0, 0, 0, 0, 0)
 
 
 @pytest.mark.parametrize("pixels", ["yuv420p", "gray"])
-@pytest.mark.parametrize(("matrix", "turns"), [(UPRIGHT, 0), (COUNTERCLOCKWISE, 1), (HALF, 2), (CLOCKWISE, 3)])
+@pytest.mark.parametrize(
+    ("matrix", "turns"), [(UPRIGHT, 0), (UNSET, 0), (COUNTERCLOCKWISE, 1), (HALF, 2), (CLOCKWISE, 3)]
+)
 def test_a_turned_video_comes_upright(tmp_path, pixels, matrix, turns):
     path = write_clip(tmp_path / "phone.mp4", 1, "libx264", pixels, (66, 49) if pixels == "gray" else (66, 50))
     (before,), _ = read(path)

@@ -17,7 +17,7 @@ def _mp4(_context: click.Context, _option: click.Parameter, value: Path | None) 
     """Check the value of --video: players take a file for what its name says."""
     if value is None or value.suffix.lower() == ".mp4":
         return value
-    raise click.BadParameter(f"the annotated video is an MP4; name it {value.with_suffix('.mp4')}, not {value}.")
+    raise click.BadParameter(f"the annotated video is an MP4; name it {value.stem or 'FILE'}.mp4, not {value}.")
 
 
 _OPTIONS = (

@@ -54,6 +54,7 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
             opened = stack.enter_context(closing(open_pictures(source, settings)))
         watch = Watch(settings, (opened.height, opened.width))
         watch.all(looked_at(opened, span, patience_s, quiet_s))
+        reception = _reception(stats, dropped)  # before it is closed, and therefore gone
     if not watch.track_s:
         raise SourceError(f"{redact(source)} gave pictures, and then nothing for {quiet_s:g} s; look at the network")
     pace = timing(times, watch.samples.repeats) if len(times) > 1 else None
@@ -63,7 +64,7 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
         width=opened.width,
         height=opened.height,
         fps=opened.fps,
-        reception=_reception(stats, dropped),
+        reception=reception,
         timing=pace,
         light=light(watch.samples),
         flicker=flicker(watch.samples, pace.rate if pace else opened.fps),

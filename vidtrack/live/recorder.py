@@ -6,6 +6,7 @@ import logging
 import shutil
 import time
 from collections import deque
+from math import inf
 from pathlib import Path
 from threading import RLock
 from time import monotonic
@@ -81,20 +82,21 @@ class Recorder(NoRecorder):
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
         """Begin a new part with this packet if there is none, or it is time and the packet a key picture's."""
-        begins = self._film is None and monotonic() >= self._retry_s
-        if not begins and not (self._film is not None and packet.is_keyframe and self._due(self._film)):
-            return False
         with self._writing:
+            begins = self._film is None and monotonic() >= self._retry_s
+            if not begins and not (self._film is not None and packet.is_keyframe and self._due(self._film)):
+                return False
             self.hang_up()
             try:
                 self._begin(connection)
             except (OSError, av.FFmpegError) as error:
                 self._pause(error.strerror or str(error))
-        return True
+            return True
 
     def place(self) -> Place:
         """Number of the part, and of the next packet in it."""
-        return _NOWHERE if self._film is None else (self._part, self._film.packets)
+        with self._writing:
+            return _NOWHERE if self._film is None else (self._part, self._film.packets)
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
         """Keep a packet, and what the tracker logged meanwhile."""
@@ -143,6 +145,7 @@ class Recorder(NoRecorder):
             return
         try:
             self.hang_up()
+            self._retry_s = inf  # the reader may still have a packet in hand: it begins no part
             self._write_log()
             self._end_list()
         except StoppedEarly as error:

@@ -23,7 +23,7 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
     layouts) is converted: RGB to full-range BT.601, which `Frame.bgr` undoes; YUV keeps its range.
     A picture that says how it is to be turned, as a phone's does, comes upright.
     """
-    quarter_turns = round(picture.rotation / 90)
+    quarter_turns = round(picture.rotation / 90) if abs(picture.rotation) <= 180 else 0  # beyond: no rotation at all
     picture = planar(picture)
     y, *chroma = map(_view, picture.planes)
     if not chroma:

@@ -60,7 +60,8 @@ def parse_address(source: str, timeout_s: float) -> Address:
     if scheme.startswith("rtsp"):
         # TCP: lost UDP packets become grey smears that look like vehicles.
         options = {"rtsp_transport": "tcp", "timeout": microseconds, "allowed_media_types": "video"}
-    return Address(_escaped(source), shown, _host(shown), None, options)
+    url = _escaped(source)
+    return Address(url, shown, _host(url, shown), None, options)
 
 
 def redact(address: str) -> str:
@@ -73,23 +74,21 @@ def redact(address: str) -> str:
     return _SECRET_FIELD.sub(rf"\1{HIDDEN}", address)
 
 
-def _host(shown: str) -> str:
-    """Host and port. Raises SourceError where there is none, or no such port."""
+def _host(url: str, shown: str) -> str:
+    """Host and port as they may be shown. Raises SourceError where there is none, or no such port."""
     try:
-        parts = urlsplit(shown)
+        parts, visible = urlsplit(url), urlsplit(shown)
         named = parts.hostname and parts.port != 0
     except ValueError:  # the port is no number below 65536, or a bracket is missing
         named = False
     if not named:
         raise SourceError(f"cannot read {shown}: it names no host, or no such port; write it as rtsp://HOST:PORT/PATH")
-    return parts.netloc.rpartition("@")[2]
+    return visible.netloc.rpartition("@")[2] or visible.scheme
 
 
 def _escaped(address: str) -> str:
     """The address as FFmpeg reads it: without "/", "?" and "#" in the password."""
-    if not _USER.search(address):
-        return address
-    return re.sub("://.*@", lambda found: "://" + quote(found[0][3:], safe=_MAY_STAY), address)
+    return _USER.sub(lambda found: "://" + quote(found[1], safe=_MAY_STAY), address, count=1)
 
 
 def secrets(address: str) -> list[str]:
