@@ -242,7 +242,6 @@ def test_a_state_may_be_known_exactly_in_part_or_whole(P):
     assert np.linalg.eigvalsh(tracks.P[0]).min() > -1e-12
 
 
-
 def test_an_id_that_was_given_is_not_given_again():
     tracker = Tracker()
     tracker.add(0.0, np.zeros((1, 4)), np.eye(4)[None], ids=np.array([7]))
