@@ -14,11 +14,11 @@ SAMPLES = ROOT / "samples"
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
-def start(*arguments, cwd, **options):
-    """A running `vidtrack` with its output in pipes."""
-    command = [sys.executable, "-m", "vidtrack", *map(str, arguments)]
+def start(*arguments, cwd, program=("-m", "vidtrack"), stderr=subprocess.PIPE, **options):
+    """A running `vidtrack`, or another program of this Python, with its output in pipes."""
+    command = [sys.executable, *program, *map(str, arguments)]
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, cwd=cwd, stdout=pipe, stderr=pipe, text=True, env=ENVIRONMENT, **options)
+    return subprocess.Popen(command, cwd=cwd, stdout=pipe, stderr=stderr, text=True, env=ENVIRONMENT, **options)
 
 
 def first_frames(source, target, count):

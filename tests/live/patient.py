@@ -1,11 +1,10 @@
 """`vidtrack live` as a user runs it, with all the time that a slow machine needs to end a run well."""
 
-import subprocess
-import sys
+from functools import partial
 from threading import Timer
 
+import command_line
 from cameras import HANG_S
-from command_line import ENVIRONMENT
 
 _CODE = """
 import vidtrack.cli.signals as signals, vidtrack.video.live.source as source
@@ -17,11 +16,7 @@ main()
 """
 
 
-def start(*arguments, cwd, stderr=subprocess.PIPE, **options):
-    """A running `vidtrack` with its output in pipes."""
-    command = [sys.executable, "-c", _CODE, *map(str, arguments)]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, cwd=cwd, stdout=pipe, stderr=stderr, text=True, env=ENVIRONMENT, **options)
+start = partial(command_line.start, program=("-c", _CODE))
 
 
 def line_with(words, process):

@@ -63,7 +63,7 @@ def tell_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
     """Say on stderr how many tracks and crossings a finished run found; `none` is said where there are no tracks."""
     if quiet:
         return
-    from vidtrack.output.draw import counted
+    from vidtrack.traffic.lines import counted
 
     summary = json.loads((folder / "summary.json").read_text())
     tracks = summary["tracks"]

@@ -90,14 +90,15 @@ class StateFile(NoStateFile):
 
     def offer(self, memory: Memory) -> None:
         """Save if it is time, beside the tracker."""
-        next_id = memory.tracker.register.next_id
+        first, next_id = not self._reserved, memory.tracker.register.next_id
         scarce = self._reserved - next_id < _BLOCK // 2
         if not (scarce or self._due()) or (self._writing is not None and self._writing.is_alive()):
             return
         self._reserved = next_id + _BLOCK
         state = memory.gather() | {_NEXT_ID: self._reserved, _FRAME: memory.frame + _BLOCK}
-        if self._writing is None:
+        if first:
             self._reserve(state)
+            return
         self._writing = Thread(target=self._write, args=(state,), name="save-state", daemon=True)
         self._writing.start()
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from vidtrack.output.colours import Colour, colour
 from vidtrack.scan import Floats, Status, Tracks
-from vidtrack.traffic.lines import Line
+from vidtrack.traffic.lines import Line, counted
 from vidtrack.video.frame import Image
 
 BLACK: Colour = (0, 0, 0)
@@ -91,11 +91,6 @@ def draw_tracks(pen: Pen, tracks: Tracks) -> None:
         high = (boxes[members, :2] + boxes[members, 2:]).max(axis=0) + 2
         pen.box(np.concatenate([low, high - low]), WHITE)
         pen.label("+".join(map(str, np.sort(tracks.id[members]))), low[0], low[1], WHITE)
-
-
-def counted(line: str, ways: Mapping[str, int]) -> str:
-    """A line's counts in words: "ramp: 12 left, 3 right"."""
-    return f"{line}: {', '.join(f'{count} {way}' for way, count in ways.items())}" if ways else line
 
 
 def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str, int]] | None = None) -> list[Patch]:

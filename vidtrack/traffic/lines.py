@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -193,3 +193,8 @@ class LineCounter:
             )
         state.side = np.where(crossed, side, state.side)
         return crossings
+
+
+def counted(line: str, ways: Mapping[str, int]) -> str:
+    """A line's counts in words: "ramp: 12 left, 3 right"."""
+    return f"{line}: {', '.join(f'{count} {way}' for way, count in ways.items())}" if ways else line
