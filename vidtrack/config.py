@@ -112,6 +112,10 @@ class BlobSettings(_Group):
 
     min_area_share: float = Field(1e-4, ge=0, le=1)
     """share of the picture's area (8 pixels of 320x240); smaller blobs are left out"""
+    cut: bool = True
+    """regions too large for one vehicle, or hardly filling their box, are cut at their necks"""
+    divide: bool = True
+    """regions too large for one vehicle are divided among the vehicles predicted there"""
     join_overlap: float = Field(0.7, gt=0, le=1)
     """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
     join_gap: float = Field(0.05, ge=0, le=1)

@@ -17,13 +17,14 @@ from vidtrack.scan import TENTATIVE, Mask, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.methods import life, rule
+from vidtrack.tracking.road import Road
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video import background
-from vidtrack.video.blobs import find_blobs, join_fragments
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
 from vidtrack.video.source import open_source
+from vidtrack.video.vehicles.explain import explain
 
 
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
@@ -98,10 +99,12 @@ def build_tracker(
             coast_s=settings.coast_s,
             hidden_s=settings.hidden_s,
             coast_scans=None,
+            idle_s=None if whole else 3.0,
         ),
         groups=Groups(cover=settings.group_cover) if settings.merged_blobs and not whole else None,
         shape=Shape() if whole else None,
         trust=Trust(whole.sure_score) if whole and whole.sure_score is not None else None,
+        road=Road(*bounds) if bounds and not whole else None,
         bounds=bounds,
         detection_probability=(whole or settings).detection_probability,
         clutter_density=settings.clutter_density,
@@ -121,12 +124,10 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
     for frame in frames:
         clock = [ended, perf_counter()]
         expected = tracker.predict(frame.time_s)
-        vehicles = expected.box[expected.status != TENTATIVE]
         driven = expected.box[has_driven(expected)]
         foreground = detector.apply(frame, driven)
         clock.append(perf_counter())
-        blobs = join_fragments(find_blobs(foreground, settings.blobs), vehicles)
-        scan = blobs.scan(frame.time_s)
+        scan = explain(foreground, expected, tracker.road, settings.blobs).scan(frame.time_s)
         clock.append(perf_counter())
         tracks = tracker.step(scan)
         clock.append(perf_counter())

@@ -23,6 +23,7 @@ UNSURE = 0.01
 """Factor on the likelihood of a detection with a low score where decisions wait: more of these are false."""
 
 Claim = Callable[[Ints], tuple[Ints, Mask]]
+Catch = Callable[[Mask, Mask], Ints]
 
 
 class Association(NamedTuple):
@@ -42,11 +43,14 @@ class Association(NamedTuple):
     free: Mask
 
 
-def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, claim: Claim | None) -> Association:
+def at_once(
+    problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, claim: Claim | None, catch: Catch | None
+) -> Association:
     """Decide in this scan: confirmed tracks (T,) first, then the sharing of blobs, then tentative tracks.
 
     claim  maps the measurement of each track (T,) to the shared blob of each (T,) and the blobs (M,) that hide more;
            None where blobs are not shared
+    catch  maps tracks (T,) that got nothing and blobs (M,) that nobody took to the blob of each track, -1 for none
     """
     pairs, rows, count = problem.pairs, problem.rows, problem.measurements
     sure = trust.sure(problem.scan)
@@ -62,6 +66,10 @@ def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, c
         second = _starter(rule).decide(problem.only(open_to_all))
         free &= ~_claimed(second, count)
         decision = decision.joined(second)
+    if catch is not None:
+        caught = catch((heaviest(decision) < 0) & (shared < 0), free)
+        shared = np.where(caught >= 0, caught, shared)
+        free[caught[caught >= 0]] = False
     if not rule.gated_births:
         free[pairs.measurement] = False
     return Association(problem, decision, shared, hides, distinct(problem.scan, free))

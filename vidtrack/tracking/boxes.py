@@ -90,6 +90,33 @@ def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
     return index, share
 
 
+@kernel(error_model="numpy")
+def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: float) -> Ints:
+    """(T,) for each inner box the outer one that overlaps it most, if it does so most in turn; -1 for none.
+
+    Only inner boxes of the mask `one` (T,) and outer boxes of the mask `other` (M,) with an intersection over union of
+    at least `least` count.
+    """
+    index, best = np.full(len(inner), -1), np.full(len(inner), least)
+    partner, most = np.full(len(outer), -1), np.full(len(outer), least)
+    for t in np.flatnonzero(one):
+        for j in np.flatnonzero(other):
+            a, b = inner[t], outer[j]
+            wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+            high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+            if not (wide > 0 and high > 0):
+                continue
+            overlap = wide * high / (a[2] * a[3] + b[2] * b[3] - wide * high)
+            if overlap >= best[t]:
+                index[t], best[t] = j, overlap
+            if overlap >= most[j]:
+                partner[j], most[j] = t, overlap
+    for t in range(len(inner)):
+        if index[t] >= 0 and partner[index[t]] != t:
+            index[t] = -1
+    return index
+
+
 def longer(box: Floats) -> Floats:
     """(N,) longer sides of boxes (N, 4)."""
     return np.maximum(box[:, 2], box[:, 3])

@@ -36,6 +36,7 @@ class Groups:
            is not the vehicle alone or not all of it
     known_s, part_s   a member seen alone for less than known_s that stays in a group for part_s was never a vehicle
            but a part of one
+    overlap least intersection over union of a track with a blob that it continues on, whatever its shape
     """
 
     cover: float = 0.5
@@ -44,6 +45,7 @@ class Groups:
     growth: float = 2.5
     known_s: float = 0.4
     part_s: float = 1.0
+    overlap: float = 0.3
 
     def __post_init__(self) -> None:
         if not 0 < self.cover <= 1:

@@ -40,6 +40,9 @@ class Life(Protocol):
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long."""
 
+    def idle(self, register: Register, t: float) -> Mask:
+        """(T,) rows that were never seen to travel and no longer move."""
+
 
 @dataclass(frozen=True, slots=True)
 class LifeCycle:
@@ -53,6 +56,8 @@ class LifeCycle:
     coast_s         s; a confirmed track is deleted this long after its last evidence; None: by misses only
     hidden_s        s; the same for a track inside a blob that it shares, where nothing could be seen of it
     coast_scans     or after this many scans without evidence in a row; None: by time only
+    idle_s          s; a track that has stood still for so long and never travelled `idle_travel` ends; None: it stays
+    idle_travel     object sizes
     """
 
     confirm_hits: int = 3
@@ -62,6 +67,8 @@ class LifeCycle:
     coast_s: float | None = None
     hidden_s: float = 2.0
     coast_scans: int | None = 5
+    idle_s: float | None = None
+    idle_travel: float = 1.2
 
     def __post_init__(self) -> None:
         if not 1 <= self.confirm_hits <= self.confirm_window <= 63:
@@ -94,6 +101,13 @@ class LifeCycle:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
         allowed = self.confirm_window - self.confirm_hits
         return _hopeless(register.history, register.status, self.confirm_window, allowed)
+
+    def idle(self, register: Register, t: float) -> Mask:
+        """(T,) rows that were never seen to travel and no longer move: no vehicles, but what the scene got wrong."""
+        if self.idle_s is None:
+            return np.zeros(len(register), bool)
+        near = register.travelled < self.idle_travel * np.fmax(register.box[:, 2], register.box[:, 3])
+        return near & (t - register.rest_s > self.idle_s)
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""

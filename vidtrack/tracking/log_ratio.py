@@ -79,6 +79,10 @@ class LogRatio:
         """(T,) rows whose score has fallen too far."""
         return register.score <= register.best - self.drop
 
+    def idle(self, register: Register, t: float) -> Mask:
+        """(T,) none: the score alone tells."""
+        return np.zeros(len(register), bool)
+
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long."""
         return missed(register, self.coast_scans) | unseen(register, t, self.coast_s, self.hidden_s)

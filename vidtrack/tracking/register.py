@@ -10,6 +10,8 @@ from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Floats, Ints, 
 
 BELIEF = 20.0
 """Largest log-odds of a track's existence."""
+REST = 0.5
+"""Sizes; what moves less stands still."""
 SCANS = (1 << 63) - 1
 """Mask of the bits of a history that are kept: the 63 lowest."""
 
@@ -21,12 +23,13 @@ class Register:
     start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
     group and group_since_s (tracks on one blob), score (log-odds that it is a target), best (highest score since it
     was confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time
-    seen on a blob of its own). Where a smoother needs them also
+    seen on a blob of its own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when
+    it last moved on by REST of its size). Where a smoother needs them also
     prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "group", "group_since_s",
-             "score", "best", "run", "label", "alone_s")  # fmt: skip
+             "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
 
@@ -48,6 +51,9 @@ class Register:
         self.run = np.empty(0, np.int64)
         self.label = np.empty(0, np.int64)
         self.alone_s = np.empty(0)
+        self.travelled = np.empty(0)
+        self.rest = np.empty((0, dim))
+        self.rest_s = np.empty(0)
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
 
     def __len__(self) -> int:
@@ -69,6 +75,12 @@ class Register:
     def travel(self, xy: Floats) -> Floats:
         """(T,) distances of positions (T, d) from where the rows began."""
         return _distance(xy, self.start)
+
+    def move(self, xy: Floats, t: float) -> None:
+        """Note where the rows are at t: xy (T, d)."""
+        self.travelled = np.maximum(self.travelled, self.travel(xy))
+        moved = _distance(xy, self.rest) > REST * np.fmax(self.box[:, 2], self.box[:, 3])
+        self.rest[moved], self.rest_s[moved] = xy[moved], t
 
     def see(self, hit: Mask, sure: Mask, t: float, dt: float) -> None:
         """Note which rows (T,) the scan at t shows, dt seconds after the last, and which of them for sure.
@@ -106,6 +118,9 @@ class Register:
             "run": run,
             "label": -1 if label is None else label,
             "alone_s": 0.0,
+            "travelled": 0.0,
+            "rest": position,
+            "rest_s": t,
         }
         for name in self.columns:
             old = getattr(self, name)

@@ -9,7 +9,7 @@ from vidtrack.estimate.lasting import inflation
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Decision, Event, Floats, Ints, Mask, Scan
 from vidtrack.tracking.border import Border
-from vidtrack.tracking.boxes import absolute
+from vidtrack.tracking.boxes import absolute, overlapping
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.register import Register
 
@@ -39,6 +39,13 @@ class Sharing:
         whole = (hits > SETTLED) & ~self._border.cut(predicted)
         return self._groups.share(predicted, taken, confirmed, whole, blobs)
 
+    def catch(self, predicted: Floats, blobs: Floats, idle: Mask, free: Mask) -> Ints:
+        """(T,) the blob that a track (T,) without a measurement overlaps most, if that is free (M,); -1: none.
+
+        The blob's shape has changed so much that its centroid left the gate; it is still where the vehicle is.
+        """
+        return overlapping(predicted, blobs, idle, free, self._groups.overlap)
+
     def follow(
         self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
     ) -> None:
@@ -55,6 +62,10 @@ class Sharing:
         cut = self._border.sides(blobs)
         z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
 
+        lost = (own == 0) & (np.bincount(on, minlength=len(blobs))[on] == 1)
+        self._centre(predicted[lost], blobs[on[lost]], box[lost], z, R, lost)
+        own[lost] = 1
+
         beta0 = (~leans).astype(float)
         edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
         bank.update(edges, Scan(t, z, inflation(dt) * R[:, :, None] * np.eye(2)), POSITION)
@@ -68,6 +79,12 @@ class Sharing:
         alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box
+
+    @staticmethod
+    def _centre(predicted: Floats, blob: Floats, box: Floats, z: Floats, R: Floats, rows: Mask) -> None:
+        """Measure rows (G,) whose blob shows no edge of theirs by its middle, which is as wrong as its size is."""
+        z[rows] = blob[:, :2] + blob[:, 2:] / 2 - box[:, :2] - box[:, 2:] / 2
+        R[rows] = (0.5 * (blob[:, 2:] - predicted[:, 2:])) ** 2 + (0.1 * predicted[:, 2:]) ** 2 + 1.0
 
     def passengers(self, register: Register, t: float) -> Mask:
         """(T,) members that were hardly ever seen alone and do not leave their group: parts of another member."""

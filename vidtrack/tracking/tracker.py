@@ -34,6 +34,7 @@ from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import Life, LifeCycle
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
+from vidtrack.tracking.road import Road
 from vidtrack.tracking.sharing import Sharing
 
 EXIT_S = 0.2
@@ -50,6 +51,7 @@ class Tracker:
     groups     how tracks share merged blobs (scans with boxes only); None: they do not
     shape      how the size of boxes counts in the association; None: it does not
     trust      which scores may start a track; None: scores do not count
+    road       what traffic teaches about the scene, learnt scan by scan; None: nothing
     estimator  makes the bank of filters from the model
     bounds     (width, height) of the picture; a track that leaves it is deleted; None: no border
     births     whether measurements that belong to no track start one
@@ -65,7 +67,7 @@ class Tracker:
     Raises ConfigError for numbers out of range, or an association rule that is not an instance.
     """
 
-    STATE = ("t", "bank", "register", "sharing", "forest", "rates")
+    STATE = ("t", "bank", "register", "sharing", "forest", "rates", "road")
 
     def __init__(
         self,
@@ -76,6 +78,7 @@ class Tracker:
         groups: Groups | None = None,
         shape: Shape | None = None,
         trust: Trust | None = None,
+        road: Road | None = None,
         *,
         estimator: Callable[[Motion], Estimator] = KalmanBank,
         bounds: tuple[float, float] | None = None,
@@ -101,6 +104,7 @@ class Tracker:
         self.life: Life = life or LifeCycle()
         self.shape = shape
         self.trust = trust or EQUAL
+        self.road = road
         self.threshold = threshold
         self.births = births
         if surveyed is None and bounds:
@@ -142,7 +146,11 @@ class Tracker:
         taken = np.concatenate([np.where(shared >= 0, shared, taken)[kept], born])
         nis = np.concatenate([nis[kept], np.full(len(born), np.nan)])
         links = self.register.links() if self.smooth else {}
-        return self._snapshot(scan.t, self.bank.x, self.bank.P, taken, nis, events=tuple(events), choices=why, **links)
+        more: dict[str, Any] = {"events": tuple(events), "choices": why, **links}
+        tracks = self._snapshot(scan.t, self.bank.x, self.bank.P, taken, nis, **more)
+        if self.road:
+            self.road.learn(tracks)
+        return tracks
 
     def predict(self, t: float) -> Tracks:
         """All tracks predicted to time t; the tracker does not change. Raises ScanError for a time in the past."""
@@ -230,10 +238,12 @@ class Tracker:
         """Assign measurements to tracks, at once or by decisions that wait for later scans."""
         if self.forest:
             return deferred(problem, self.forest, self.trust, self.births, self.register, events)
-        claim, confirmed = None, self.register.status != TENTATIVE
+        claim = catch = None
+        confirmed = self.register.status != TENTATIVE
         if self.sharing and blobs is not None:
             claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, confirmed=confirmed, blobs=blobs)
-        return at_once(problem, self.associate, self.trust, confirmed, claim)
+            catch = partial(self.sharing.catch, self._boxes(), blobs)
+        return at_once(problem, self.associate, self.trust, confirmed, claim, catch)
 
     def _update(
         self, decision: Decision, taken: Ints, scan: Scan, sensor: Sensor, blobs: Floats | None, dt: float
@@ -286,12 +296,15 @@ class Tracker:
         """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         left = self._left(t)
         hopeless = self.life.hopeless(self.register)
+        self.register.move(self._xy(), t)
+        idle = self.life.idle(self.register, t)
         parts = self.sharing.passengers(self.register, t) if self.sharing else np.zeros(len(left), bool)
-        kept = ~(hopeless | left | parts)
+        kept = ~(hopeless | left | parts | idle)
         if np.count_nonzero(kept) < len(kept):
             for gone, why in (
                 (hopeless & ~left, self.life.ends),
                 (left, "left the picture"),
+                (idle & ~left & ~hopeless, "never travelled and stands still"),
                 (parts & ~left, "part of the vehicle that it never left"),
             ):
                 events.extend(Event.each(t, self._ends(~kept, gone), "delete", why))
@@ -335,6 +348,8 @@ class Tracker:
             self.forest.settle(register, t, events)
         if np.count_nonzero(register.status == TENTATIVE):
             size = np.fmax(longer(register.box), self.border.speck)  # NaN where there is no box
+            if self.road:
+                size = size * self.road.caution(self._xy())
             ready = self.life.confirmed(register, t, register.travel(self._xy()), size)
             if self.forest:
                 ready &= self.forest.sure & np.isin(np.arange(len(register)), self.forest.shown)

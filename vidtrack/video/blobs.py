@@ -1,8 +1,8 @@
-"""Blobs: the connected regions of a foreground, their moments, and which of them belong together."""
+"""Blobs: the regions of a foreground as measurements, with their moments."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,8 @@ from vidtrack.compiled import kernel
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
 from vidtrack.video.foreground import Foreground
-from vidtrack.video.frame import Image
-from vidtrack.video.runs import components, connect, find_runs, join
-
-_SPREAD = 1.2  # predicted boxes are taken this much larger about their centres before fragments are sought in them
+from vidtrack.video.regions import Regions, find_regions
+from vidtrack.video.runs import Runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +56,14 @@ class Blobs:
 
 def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
     """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel."""
-    mask, step = foreground.mask, foreground.step
-    n, mean, cov, box, amplitude = _measure(mask, foreground.strength, settings.min_area_share * mask.size)
+    regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
+    return measured(regions, foreground, settings)
+
+
+def measured(regions: Regions, foreground: Foreground, settings: BlobSettings) -> Blobs:
+    """Each region as one blob."""
+    step = foreground.step
+    n, mean, cov, box, amplitude = _measure(*regions, foreground.strength)
     return Blobs(
         centroid=(mean + 0.5) * step - 0.5,
         cov=cov * step**2,
@@ -71,93 +75,11 @@ def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
     )
 
 
-def join_fragments(blobs: Blobs, predicted: Floats) -> Blobs:
-    """Blobs whose boxes lie for the most part in the same one of the predicted boxes (K, 4), joined; moments exact.
-
-    A blob that touches no predicted box, or several, stays as it is. So do pieces farther apart than `join_gap`: two
-    vehicles that entered as one blob drift apart inside the box that was predicted for both.
-    """
-    most, gap = blobs.settings.join_overlap, blobs.settings.join_gap
-    group, count = _fragments(blobs.box, predicted, most, gap)
-    return blobs if count == len(blobs) else _joined(blobs, group, count)
-
-
-def _joined(blobs: Blobs, group: Ints, count: int) -> Blobs:
-    """One blob for each of `count` groups; group (B,) numbers them. Means and moments are weighted by area."""
-
-    def total(values: Floats) -> Floats:
-        weighted = np.zeros((count, *values.shape[1:]))
-        np.add.at(weighted, group, (values.T * blobs.area).T)
-        return weighted
-
-    area = total(np.ones(len(blobs)))
-    centroid = total(blobs.centroid) / area[:, None]
-    offset = blobs.centroid - centroid[group]
-    cov = total(blobs.cov + offset[:, :, None] * offset[:, None, :]) / area[:, None, None]
-    low = np.full((count, 2), np.inf)
-    high = np.full((count, 2), -np.inf)
-    np.minimum.at(low, group, blobs.box[:, :2])
-    np.maximum.at(high, group, blobs.box[:, :2] + blobs.box[:, 2:])
-    return replace(
-        blobs,
-        centroid=centroid,
-        cov=cov,
-        box=np.hstack([low, high - low]),
-        area=area,
-        amplitude=total(blobs.amplitude) / area,
-    )
-
-
 @kernel
-def _fragments(box: Floats, predicted: Floats, most: float, gap: float) -> tuple[Ints, int]:
-    """Group of each box (B,) and the number of groups: close pieces of the same predicted vehicle are in one."""
-    parent = np.arange(len(box))
-    vehicle = np.empty(len(box), np.int64)
-    for i in range(len(box)):
-        vehicle[i] = _only_vehicle(box[i], predicted, most)
-        for j in range(i):
-            if vehicle[i] >= 0 and vehicle[j] == vehicle[i]:
-                longer = max(predicted[vehicle[i], 2], predicted[vehicle[i], 3])
-                if _gap(box[i], box[j]) <= gap * longer:
-                    join(parent, i, j)
-    return components(parent)
-
-
-@kernel
-def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
-    """The predicted box in which most of this box (4,) lies; -1 if there is none, or others have a part in it."""
-    vehicle, sharers = -1, 0
-    for k in range(len(predicted)):
-        share = _share_inside(box, predicted[k])
-        sharers += share > 1 - most
-        if share >= most and vehicle < 0:
-            vehicle = k
-    return vehicle if sharers == 1 else -1
-
-
-@kernel(inline="always")
-def _share_inside(box: Floats, other: Floats) -> float:
-    """Share of a box's area that lies in the other one, spread."""
-    common = 1.0
-    for axis in range(2):
-        size = _SPREAD * other[axis + 2]
-        low = other[axis] - (size - other[axis + 2]) / 2
-        common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
-    return common / (box[2] * box[3])
-
-
-@kernel(inline="always")
-def _gap(a: Floats, b: Floats) -> float:
-    """Distance between two boxes along the axis that separates them more; negative where they overlap."""
-    across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
-    return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))
-
-
-@kernel
-def _measure(mask: Image, strength: NDArray, least: float) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Of each component of at least so many pixels: count (B,), mean (B, 2), covariance (B, 2, 2), box, strength."""
-    row, start, stop = find_runs(mask, False)
-    label, blobs = connect(row, start, stop, 1)
+def _measure(
+    row: Runs, start: Runs, stop: Runs, label: Ints, blobs: int, strength: NDArray
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Of each region: count (B,), mean (B, 2), covariance (B, 2, 2), box (B, 4), mean strength (B,)."""
     n = np.zeros(blobs)
     first = np.zeros((blobs, 2))
     second = np.zeros((blobs, 3))  # xx, xy, yy
@@ -178,16 +100,15 @@ def _measure(mask: Image, strength: NDArray, least: float) -> tuple[Floats, Floa
         high[i, 0], high[i, 1] = max(high[i, 0], b), max(high[i, 1], y + 1)
         for x in range(a, b):
             amplitude[i] += strength[y, x]
-    large = np.flatnonzero(n >= least)
-    mean = np.empty((len(large), 2))
-    cov = np.empty((len(large), 2, 2))
-    box = np.empty((len(large), 4))
-    for j, i in enumerate(large):
+    mean = np.empty((blobs, 2))
+    cov = np.empty((blobs, 2, 2))
+    box = np.empty((blobs, 4))
+    for i in range(blobs):
         mx, my = first[i, 0] / n[i], first[i, 1] / n[i]
-        mean[j, 0], mean[j, 1] = mx, my
-        cov[j, 0, 0] = second[i, 0] / n[i] - mx * mx + 1 / 12  # a pixel has an extent of its own
-        cov[j, 1, 1] = second[i, 2] / n[i] - my * my + 1 / 12
-        cov[j, 0, 1] = cov[j, 1, 0] = second[i, 1] / n[i] - mx * my
-        box[j, 0], box[j, 1] = low[i, 0], low[i, 1]
-        box[j, 2], box[j, 3] = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1]
-    return n[large], mean, cov, box, amplitude[large] / n[large]
+        mean[i, 0], mean[i, 1] = mx, my
+        cov[i, 0, 0] = second[i, 0] / n[i] - mx * mx + 1 / 12  # a pixel has an extent of its own
+        cov[i, 1, 1] = second[i, 2] / n[i] - my * my + 1 / 12
+        cov[i, 0, 1] = cov[i, 1, 0] = second[i, 1] / n[i] - mx * my
+        box[i, 0], box[i, 1] = low[i, 0], low[i, 1]
+        box[i, 2], box[i, 3] = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1]
+    return n, mean, cov, box, amplitude / n

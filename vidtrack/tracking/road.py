@@ -1,0 +1,34 @@
+"""What traffic teaches about a scene: how large vehicles are at each place, and where things move that are none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.scan import Floats, Tracks
+from vidtrack.tracking.restless import RestlessMap
+from vidtrack.tracking.sizes import SizeField
+
+_EDGE = 2.0  # px; a box this close to the border is cut by it
+
+
+class Road:
+    """Learnt from tracks, scan by scan; used to explain the blobs of the next one."""
+
+    STATE = ("sizes", "restless")
+
+    def __init__(self, width: float, height: float) -> None:
+        """width, height of the picture [px]."""
+        self._width, self._height = width, height
+        self.sizes = SizeField(width, height)
+        self.restless = RestlessMap(width, height)
+
+    def learn(self, tracks: Tracks) -> None:
+        """Take in the tracks of a scan."""
+        low, high = tracks.box[:, :2], tracks.box[:, :2] + tracks.box[:, 2:]
+        whole = (low > _EDGE).all(axis=1) & (high < [self._width - _EDGE, self._height - _EDGE]).all(axis=1)
+        self.sizes.learn(tracks, whole)
+        self.restless.learn(tracks)
+
+    def caution(self, xy: Floats) -> Floats:
+        """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""
+        return np.where(self.restless.restless(xy), 3.0, 1.0)

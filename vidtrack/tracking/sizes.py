@@ -1,0 +1,96 @@
+"""How large vehicles are at each place of the picture, learnt from those that drove there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.scan import CONFIRMED, Floats, Ints, Tracks
+from vidtrack.tracking.boxes import longer
+
+_SAMPLES = 400  # kept, the newest
+_STRIDE = 1 / 3  # sizes that a vehicle moves between two samples of it
+_TRACKS = 5  # different vehicles that make a field
+_SPREAD = (0.4, 0.5)  # largest standard deviations of ln width and ln height of a field that says anything
+_REFIT_S = 1.0
+_ROUNDS = 6  # of reweighting
+_FLAT = 0.3  # prior standard deviation of a slope: shares of the typical size over one picture width
+_LEAST = 0.5  # of the smallest sample: the field is not extrapolated to nothing
+
+
+class SizeField:
+    """Typical width and height, each a + b x + c y of a box's bottom centre, robustly fitted to ln size.
+
+    spread  (2,) standard deviations of ln width and ln height about the field; infinite before there is one
+    """
+
+    STATE = ("spread", "_extent", "_fit", "_floor", "_place", "_size", "_of", "_id", "_xy", "_fitted_s")
+
+    def __init__(self, width: float, height: float) -> None:
+        """width, height of the picture [px]."""
+        self.spread: Floats = np.full(2, np.inf)
+        self._extent = float(max(width, height))
+        self._fit: Floats = np.zeros((3, 2))
+        self._floor: Floats = np.zeros(2)
+        self._place: Floats = np.empty((0, 3))  # 1, x, y over the extent
+        self._size: Floats = np.empty((0, 2))
+        self._of: Ints = np.empty(0, np.int64)  # track of each sample
+        self._id: Ints = np.empty(0, np.int64)  # tracks that were sampled, and where last
+        self._xy: Floats = np.empty((0, 2))
+        self._fitted_s = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether vehicles have shown enough to tell what is typical."""
+        return bool((self.spread < _SPREAD).all())
+
+    def typical(self, box: Floats) -> Floats:
+        """(N, 2) width and height typical of vehicles whose bottom centre is that of boxes (N, 4); NaN if unknown."""
+        if not self.known:
+            return np.full((len(box), 2), np.nan)
+        return np.maximum(self._places(box) @ self._fit, self._floor)
+
+    def learn(self, tracks: Tracks, whole: np.ndarray) -> None:
+        """Take samples of tracks (T,) that are alone, `whole` (T,) and have driven; refit once a second."""
+        longest = longer(tracks.box)
+        good = (tracks.status == CONFIRMED) & (tracks.group < 0) & (tracks.travel > longest) & whole
+        rows = np.flatnonzero(good)
+        before = np.full((len(rows), 2), np.inf)
+        _, here, there = np.intersect1d(tracks.id[rows], self._id, assume_unique=True, return_indices=True)
+        before[here] = self._xy[there]
+        moved = np.linalg.norm(tracks.xy[rows] - before, axis=1) > _STRIDE * longest[rows]
+        rows = rows[moved]
+        alive = np.isin(self._id, tracks.id) & ~np.isin(self._id, tracks.id[rows])
+        self._id = np.concatenate([self._id[alive], tracks.id[rows]])
+        self._xy = np.concatenate([self._xy[alive], tracks.xy[rows]])
+        if len(rows):
+            self._place = np.concatenate([self._place, self._places(tracks.box[rows])])[-_SAMPLES:]
+            self._size = np.concatenate([self._size, tracks.box[rows, 2:]])[-_SAMPLES:]
+            self._of = np.concatenate([self._of, tracks.id[rows]])[-_SAMPLES:]
+        if tracks.t - self._fitted_s >= _REFIT_S:
+            self._fitted_s = tracks.t
+            if len(np.unique(self._of)) >= _TRACKS:
+                self._refit()
+
+    def _places(self, box: Floats) -> Floats:
+        """(N, 3) 1, x, y of the bottom centres."""
+        bottom = np.column_stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]])
+        return np.column_stack([np.ones(len(box)), bottom / self._extent - 0.5])
+
+    def _refit(self) -> None:
+        """Iteratively reweighted least squares of relative errors: Cauchy's weights, each vehicle counting alike."""
+        _, of, number = np.unique(self._of, return_inverse=True, return_counts=True)
+        vote = 1 / np.sqrt(number[of])
+        for axis in range(2):
+            size = self._size[:, axis]
+            median = float(np.median(size))
+            fit, scale = np.array([median, 0.0, 0.0]), 0.5
+            self._floor[axis] = _LEAST * size.min()
+            for _ in range(_ROUNDS):
+                expected = np.maximum(self._place @ fit, self._floor[axis])
+                error = np.log(size / expected)
+                scale = max(1.4826 * float(np.median(np.abs(error))), 0.02)
+                weight = vote / (1 + (error / (2 * scale)) ** 2) / expected**2
+                flat = np.diag([0.0, 1.0, 1.0]) * (scale / (_FLAT * 10 * median)) ** 2
+                normal = (self._place * weight[:, None]).T @ self._place + flat
+                fit = np.linalg.solve(normal, (self._place * weight[:, None]).T @ size)
+            self._fit[:, axis], self.spread[axis] = fit, scale
