@@ -17,7 +17,7 @@ from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
-from vidtrack.video.background.shadow import mark_shadow
+from vidtrack.video.background.shadow import mark_shadow, reclaim
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -101,6 +101,7 @@ class Disturbance:
         disturbance(seen, scene, floor, factor, chroma, strength, hit)
         if s.shadow:
             mark_shadow(seen, scene, np.float32(self._view.black), hit)
+            reclaim(hit)
         return strength, hit
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

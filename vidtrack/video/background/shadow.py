@@ -20,6 +20,9 @@ _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the f
 _TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light: soft edges
 _GREY_SHARE = np.float32(0.05)  # the same where no colour helps to tell shadow from dark paint
 _REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
+_LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
+_SIDES = np.array([bin(sides).count("1") for sides in range(16)])
+_AMID = 3  # sides on which the vehicle is seen from amid it
 _NEUTRAL = np.float32(128)  # chroma of grey
 
 
@@ -57,3 +60,31 @@ def _texture_error(luma: Image, scene: Levels, y: int, x: int, r: np.float32) ->
     across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - r * (scene[y, right] - scene[y, left])
     along = np.float32(luma[down, x]) - np.float32(luma[up, x]) - r * (scene[down, x] - scene[up, x])
     return abs(across) + abs(along)
+
+
+@kernel
+def reclaim(hit: Image) -> None:
+    """Set hit (h, w) uint8 from SHADOW back to 1 where the vehicle is seen on at least three of four sides.
+
+    Dark paint passes for shadow, but shadow lies beside a vehicle and not amid it. A side shows the vehicle if a line of
+    hits leads to a pixel that is not shadow.
+    """
+    row, start, stop = find_runs(hit, False)
+    h = len(hit)
+    side = np.zeros(hit.shape, np.uint8)
+    for k in range(len(row)):
+        y, seen = row[k], False
+        for x in range(start[k], stop[k]):
+            above = y > 0 and hit[y - 1, x] != 0 and (hit[y - 1, x] == 1 or side[y - 1, x] & _ABOVE != 0)
+            side[y, x] = np.uint8(seen) * _LEFT | np.uint8(above) * _ABOVE
+            seen |= hit[y, x] == 1
+    for k in range(len(row) - 1, -1, -1):
+        y, seen = row[k], False
+        for x in range(stop[k] - 1, start[k] - 1, -1):
+            below = y < h - 1 and hit[y + 1, x] != 0 and (hit[y + 1, x] == 1 or side[y + 1, x] & _BELOW != 0)
+            side[y, x] |= np.uint8(seen) * _RIGHT | np.uint8(below) * _BELOW
+            seen |= hit[y, x] == 1
+    for k in range(len(row)):
+        for x in range(start[k], stop[k]):
+            if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= _AMID:
+                hit[row[k], x] = 1
