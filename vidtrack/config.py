@@ -74,8 +74,10 @@ class DisturbanceSettings(_Group):
     """marks left in the scene by what was there in the first frames, or stood long, are found by their edges"""
     ghost_s: float = Field(1.0, ge=0)
     """s; time that a region must be covered before it can be such a mark (ghost)"""
-    absorb_s: float = Field(60.0, gt=0)
+    absorb_s: float = Field(20.0, gt=0)
     """s; what stands longer and is no tracked vehicle becomes scene; its departure is recognised all the same"""
+    steady_s: float = Field(4.0, gt=0)
+    """s; the same for what does not change while it stands"""
     relearn_share: float = Field(0.6, gt=0, le=1)
     """share of the picture; more foreground than that is no traffic but a change of light or view"""
     relearn_s: float = Field(1.0, ge=0)

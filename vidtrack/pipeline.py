@@ -142,4 +142,4 @@ def has_driven(tracks: Tracks) -> Mask:
 
     A ghost, the mark that a departed vehicle leaves in the scene, never does, and must not be kept from being absorbed.
     """
-    return (tracks.status != TENTATIVE) & (tracks.travel > 3 * longer(tracks.box))
+    return (tracks.status != TENTATIVE) & (tracks.travel > 1.5 * longer(tracks.box))

@@ -126,5 +126,6 @@ class Disturbance:
 
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
         """Absorb what has stood for absorb_s, and lasting shadow, into the scene."""
+        s = self._settings
         shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
-        absorb(picture, scene, hit, np.float32(self._settings.absorb_s), np.float32(shadow_s))
+        absorb(picture, scene, hit, np.float32(s.absorb_s), np.float32(s.steady_s), np.float32(shadow_s))

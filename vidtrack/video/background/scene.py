@@ -20,6 +20,7 @@ FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
 NEVER = np.float32(-1000)  # unlike any luminance
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
 _NONE = np.float32(0)
+_STEADY = np.float32(10)  # grey levels; what covers the scene is the same as long as it changes by less
 _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
 
 
@@ -30,6 +31,8 @@ class Scene(NamedTuple):
     noise         running average of |Y - luma|
     covered_s     seconds since it was last seen free
     former        luma before the picture was adopted last, NEVER if it was not
+    cover         running average of the luminance that covers it
+    steady_s      seconds for which that has hardly changed
     """
 
     luma: Levels
@@ -38,18 +41,21 @@ class Scene(NamedTuple):
     noise: Levels
     covered_s: Levels
     former: Levels
+    cover: Levels
+    steady_s: Levels
 
 
 def no_scene() -> Scene:
     """The scene before the first frame."""
-    return Scene(*np.empty((6, 0, 0), np.float32))
+    return Scene(*np.empty((8, 0, 0), np.float32))
 
 
 def start(picture: Picture) -> Scene:
     """The first frame is the scene: averaging for seconds would smear the traffic into it."""
     luma, cb, cr = (plane.astype(np.float32) for plane in picture)
     shape = luma.shape
-    return Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), np.zeros(shape, np.float32), np.full(shape, NEVER))
+    none = np.zeros(shape, np.float32)
+    return Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), none, np.full(shape, NEVER), none.copy(), none.copy())
 
 
 @kernel
@@ -76,6 +82,11 @@ def learn(
             scene.luma[y, x] += (weight if free else _NONE) * d
             scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
             scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + dt
+            if not free:
+                change = np.float32(picture.luma[y, x]) - scene.cover[y, x]
+                steady = abs(change) < max(_STEADY, _SURPRISE * noise)
+                scene.cover[y, x] += (weight if steady else np.float32(1)) * change
+                scene.steady_s[y, x] = scene.steady_s[y, x] + dt if steady else _NONE
         if len(picture.cb) > 0 and y % 2 == 0:
             for x in range((w + 1) // 2):
                 share = weight if covered[y, 2 * x] | hit[y, 2 * x] & SHADOW == 0 else _NONE
@@ -92,13 +103,19 @@ def adopt(picture: Picture, scene: Scene, row: Runs, start: Runs, stop: Runs) ->
 
 
 @kernel
-def absorb(picture: Picture, scene: Scene, hit: Image, absorb_s: np.float32, shadow_s: np.float32) -> None:
-    """Take the picture for the scene where it was covered for absorb_s, or is shadow and was covered for shadow_s."""
+def absorb(
+    picture: Picture, scene: Scene, hit: Image, absorb_s: np.float32, steady_s: np.float32, shadow_s: np.float32
+) -> None:
+    """Take the picture for the scene where it was covered for absorb_s, or for less by what did not change.
+
+    steady_s, shadow_s  seconds of cover that are enough where it was the same all the time, or is shadow
+    """
     h, w = hit.shape
     for y in range(h):
         for x in range(w):
             covered_s = scene.covered_s[y, x]
-            if covered_s >= absorb_s or (covered_s >= shadow_s and hit[y, x] == SHADOW):
+            steady = min(covered_s, scene.steady_s[y, x])
+            if covered_s >= absorb_s or steady >= steady_s or (covered_s >= shadow_s and hit[y, x] == SHADOW):
                 _adopt(picture, scene, y, x)
 
 
