@@ -186,9 +186,9 @@ class TrackerSettings(_Group):
     """probability with which two measurements of one target in a scan are combined before association; None: never"""
     confirm_s: float = Field(0.4, ge=0)
     """s; no track of a video is confirmed before this age; most ghosts of the first frame's vehicles are gone then"""
-    confirm_travel: float = Field(0.3, ge=0)
+    confirm_travel: float = Field(0.5, ge=0)
     """object sizes, at least 1/30 of the picture's; nor before it has moved this far from its start"""
-    coast_s: float = Field(1.0, ge=0)
+    coast_s: float = Field(0.6, ge=0)
     """s; a track is given up this long after its last evidence"""
     hidden_s: float = Field(2.0, ge=0)
     """s; the same for a vehicle inside a blob that it shares, where nothing could be seen of it"""
