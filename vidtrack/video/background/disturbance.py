@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vidtrack.config import DisturbanceSettings
 from vidtrack.scan import Floats
 from vidtrack.video.background.change import Change
-from vidtrack.video.background.distance import disturbance
+from vidtrack.video.background.distance import contrast, disturbance
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
@@ -32,7 +32,7 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
-    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames")
+    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames", "_contrast")
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
@@ -42,6 +42,7 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
+        self._contrast = np.float32(1)
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
@@ -74,6 +75,7 @@ class Disturbance:
             self._heal_ghosts(picture, scene, mask)
         self._learn(picture, scene, mask, hit, dt)
         if math.floor(frame.time_s) != math.floor(frame.time_s - dt):  # once a second is often enough
+            self._contrast = contrast(scene.luma)
             self._absorb(picture, scene, hit)
         return self._view.foreground(mask, strength)
 
@@ -85,7 +87,9 @@ class Disturbance:
         self._time_s = self._start_s = time_s
         self._frames = 0
         self._change.restart(time_s)
-        return start(picture)
+        scene = start(picture)
+        self._contrast = contrast(scene.luma)
+        return scene
 
     @property
     def _unsure(self) -> bool:
@@ -98,7 +102,7 @@ class Disturbance:
         hit = np.empty(picture.luma.shape, np.uint8)
         seen = picture if s.chroma else picture.grey()
         floor, factor, chroma = self._thresholds
-        disturbance(seen, scene, floor, factor, chroma, strength, hit)
+        disturbance(seen, scene, floor * self._contrast, factor, chroma, strength, hit)
         if s.shadow:
             mark_shadow(seen, scene, np.float32(self._view.black), hit)
             reclaim(hit)
