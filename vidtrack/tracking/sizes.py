@@ -14,6 +14,8 @@ _SPREAD = (0.4, 0.5)  # largest standard deviations of ln width and ln height of
 _REFIT_S = 1.0
 _ROUNDS = 6  # of reweighting
 _FLAT = 0.3  # prior standard deviation of a slope: shares of the typical size over one picture width
+_QUANTILE = 0.7  # what counts as typical: vehicles come in pieces more often than in pairs
+_SIGMAS = 1.95  # standard deviations of a normal variable in the median of what it exceeds that quantile by
 _LEAST = 0.5  # of the smallest sample: the field is not extrapolated to nothing
 
 
@@ -77,7 +79,7 @@ class SizeField:
         return np.column_stack([np.ones(len(box)), bottom / self._extent - 0.5])
 
     def _refit(self) -> None:
-        """Iteratively reweighted least squares of relative errors: Cauchy's weights, each vehicle counting alike."""
+        """Quantile regression of relative sizes by iteratively reweighted least squares, each vehicle counting alike."""
         _, of, number = np.unique(self._of, return_inverse=True, return_counts=True)
         vote = 1 / np.sqrt(number[of])
         for axis in range(2):
@@ -88,8 +90,9 @@ class SizeField:
             for _ in range(_ROUNDS):
                 expected = np.maximum(self._place @ fit, self._floor[axis])
                 error = np.log(size / expected)
-                scale = max(1.4826 * float(np.median(np.abs(error))), 0.02)
-                weight = vote / (1 + (error / (2 * scale)) ** 2) / expected**2
+                scale = max(_SIGMAS * float(np.median(np.abs(error[error > 0]))), 0.02) if (error > 0).any() else 0.02
+                side = np.where(error > 0, _QUANTILE, 1 - _QUANTILE)
+                weight = vote * side / np.maximum(np.abs(error), 0.1 * scale) * scale / expected**2
                 flat = np.diag([0.0, 1.0, 1.0]) * (scale / (_FLAT * 10 * median)) ** 2
                 normal = (self._place * weight[:, None]).T @ self._place + flat
                 fit = np.linalg.solve(normal, (self._place * weight[:, None]).T @ size)

@@ -41,13 +41,13 @@ def _together(
         vehicle[i] = _only_vehicle(box[i], predicted, overlap)
     for i in range(len(box)):
         for j in range(i):
-            if vehicle[i] != vehicle[j] or _both_vehicles(i, j, box, area, typical):
+            if _both_vehicles(i, j, box, area, typical):
                 continue
-            if vehicle[i] >= 0:
+            if vehicle[i] >= 0 and vehicle[i] == vehicle[j]:
                 longer = max(predicted[vehicle[i], 2], predicted[vehicle[i], 3])
                 if _gap(box[i], box[j]) <= gap * longer:
                     join(parent, i, j)
-            elif _whole(box[i], box[j], typical[i]):
+            if _whole(box[i], box[j], typical[i]):
                 join(parent, i, j)
     return components(parent)
 
