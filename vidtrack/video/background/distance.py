@@ -13,6 +13,8 @@ _ONE = np.float32(1)
 _CLEAR = 40.0  # grey levels over two pixels; one pixel in a hundred of a scene in clear light has a steeper edge
 _STEEP = 99.0  # percent
 _LEAST = 0.5  # of the threshold in clear light
+_DARKEST = 0.5  # percent of the pixels
+_DARK_PAINT = 10.0  # grey levels; tyres are not quite black
 _ROWS = 4  # every so many are looked at
 
 
@@ -21,6 +23,11 @@ def contrast(luma: Levels) -> np.float32:
     rows = luma[::_ROWS]
     edges = np.abs(rows[:, 2:] - rows[:, :-2])
     return np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, _LEAST), 1.0)) if edges.size else _ONE
+
+
+def veil(luma: Image) -> float:
+    """Luminance that haze adds to black: what is darkest in a picture (h, w) with traffic is black without it."""
+    return max(float(np.percentile(luma[::_ROWS], _DARKEST)) - _DARK_PAINT, 0.0)
 
 
 @kernel(error_model="numpy")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vidtrack.config import DisturbanceSettings
 from vidtrack.scan import Floats
 from vidtrack.video.background.change import Change
-from vidtrack.video.background.distance import contrast, disturbance
+from vidtrack.video.background.distance import contrast, disturbance, veil
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
@@ -25,6 +25,7 @@ _FIRST_S = 0.1  # after a start, while all frames weigh the same in the average
 _UNSURE_S = 10.0  # after a start, while ghosts are frequent
 _UNSURE_GHOST_S = 0.3  # cover that makes a ghost during that time
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
+_LIFT = 0.5  # grey levels a second by which the darkest luminance seen is forgotten
 _GAP_S = 2.0  # after a longer gap between frames the scene is as uncertain as after a start, and no cover is counted
 _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but not the 0 of pixels that were seen free
 
@@ -32,7 +33,7 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
-    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames", "_contrast")
+    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames", "_contrast", "_veil")
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
@@ -42,7 +43,7 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._contrast = np.float32(1)
+        self._contrast, self._veil = np.float32(1), 0.0
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
@@ -76,6 +77,7 @@ class Disturbance:
         self._learn(picture, scene, mask, hit, dt)
         if math.floor(frame.time_s) != math.floor(frame.time_s - dt):  # once a second is often enough
             self._contrast = contrast(scene.luma)
+            self._veil = min(self._veil + _LIFT, veil(picture.luma))
             self._absorb(picture, scene, hit)
         return self._view.foreground(mask, strength)
 
@@ -88,7 +90,7 @@ class Disturbance:
         self._frames = 0
         self._change.restart(time_s)
         scene = start(picture)
-        self._contrast = contrast(scene.luma)
+        self._contrast, self._veil = contrast(scene.luma), veil(picture.luma)
         return scene
 
     @property
@@ -104,7 +106,7 @@ class Disturbance:
         floor, factor, chroma = self._thresholds
         disturbance(seen, scene, floor * self._contrast, factor, chroma, strength, hit)
         if s.shadow:
-            mark_shadow(seen, scene, np.float32(self._view.black), hit)
+            mark_shadow(seen, scene, np.float32(max(self._view.black, self._veil)), hit)
             reclaim(hit)
         return strength, hit
 
