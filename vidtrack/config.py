@@ -100,10 +100,22 @@ class PaperSettings(_Group):
     """both darker and brighter than the average; false: brighter only"""
 
 
+class RegistrationSettings(_Group):
+    """How the disturbance map follows a camera that moves a little; pixels of the processed picture."""
+
+    enabled: bool = True
+    """pictures are laid on the scene where the camera sways, drifts or was knocked; false: it is taken to stand still"""
+    least_px: float = Field(0.75, gt=0)
+    """pixels; how far a corner of the picture must be off before pictures are laid on the scene"""
+    still_s: float = Field(10.0, gt=0)
+    """s; a camera that has stood still for so long is only watched again"""
+
+
 class DetectorSettings(_Group):
     kind: Literal["disturbance", "paper", "mog2", "knn"] = "disturbance"
     """how the foreground is found"""
     disturbance: DisturbanceSettings = DisturbanceSettings()
+    registration: RegistrationSettings = RegistrationSettings()
     paper: PaperSettings = PaperSettings()
 
 

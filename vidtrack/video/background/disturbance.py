@@ -8,15 +8,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.config import DisturbanceSettings
+from vidtrack import plane
+from vidtrack.config import DisturbanceSettings, RegistrationSettings
 from vidtrack.scan import Floats
+from vidtrack.video.background.camera import Camera
+from vidtrack.video.background.canvas import lay, settled
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import disturbance
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
+from vidtrack.video.background.scene import UNSEEN, Scene, absorb, adopt, learn, no_scene, spare, start
 from vidtrack.video.background.shadow import mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -32,10 +35,12 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
-    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames")
+    STATE = ("_view", "_change", "_camera", "_scene", "_time_s", "_start_s", "_frames")
 
-    def __init__(self, settings: DisturbanceSettings, view: View) -> None:
+    def __init__(self, settings: DisturbanceSettings, registration: RegistrationSettings, view: View) -> None:
         self._settings = settings
+        self._registers = registration.enabled
+        self._camera = Camera(registration)
         self._view = view
         self._thresholds = tuple(
             np.float32(level) for level in (settings.luma_threshold, settings.noise_factor, settings.chroma_threshold)
@@ -45,46 +50,70 @@ class Disturbance:
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
+        self._changed_s = 0.0  # how long the picture has been another one
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never absorbed into the scene."""
-        s = self._settings
+        """Foreground of `frame`; what covers a `known` box (K, 4) [scene px] is never absorbed into the scene."""
         picture = smooth(self._view.reduce(frame))
         if not self._scene.luma.size:
             self._scene = self._start(picture, frame.time_s)
-        scene = self._scene
         dt, self._time_s = frame.time_s - self._time_s, frame.time_s
         if dt > _GAP_S:
             self._start_s = frame.time_s
+        known = self._camera.on_canvas(known, self._view.step)
+        if self._registers:
+            self._scene = self._camera.follow(picture.luma, self._scene, known, frame.time_s)
+        if self._camera.lost:
+            self._changed_s = self._change.lost_s(frame.time_s)
+            mask, strength = np.zeros_like(picture.luma), np.zeros(picture.luma.shape, np.float32)
+        elif self._camera.moves:
+            laid, seen = lay(picture, self._camera.motion, self._scene)
+            mask, strength = self._map(laid, known, dt, seen)
+        else:
+            mask, strength = self._map(picture, known, dt)
+        place, motion = self._camera.place, self._camera.motion
+        if self._changed_s > self._settings.relearn_s:
+            self._scene = self._start(picture, frame.time_s)
+        return self._view.foreground(mask, strength, place, motion)
 
+    def _map(
+        self, picture: Picture, known: Floats, dt: float, seen: Image | None = None
+    ) -> tuple[Image, NDArray[np.float32]]:
+        """Mask and strength; what is free is learnt. The mask is empty while the whole picture changes.
+
+        seen  (h, w) 0 where the canvas lies outside the picture; None: nowhere
+        """
+        s, scene = self._settings, self._scene
         if s.exposure:
             follow_gain(picture, scene, np.float32(self._view.black))
         strength, hit = self._disturbed(picture, scene)
         mask = np.empty_like(hit)
         majority(hit, s.majority_px, mask)
-        changed_s = self._change.lasted_s(mask, frame.time_s)
-        if changed_s > 0:
-            if changed_s > s.relearn_s:
-                self._scene = self._start(picture, frame.time_s)
-            return self._view.foreground(np.zeros_like(mask), strength)
+        self._changed_s = self._change.lasted_s(mask, self._time_s, self._camera.fits)
+        if self._changed_s > 0:
+            return np.zeros_like(mask), strength
         if s.holes:
             fill_holes(mask)
-        spare(scene.covered_s, known / self._view.step, _KNOWN_S)
+        spare(scene.covered_s, known, _KNOWN_S)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
-        self._learn(picture, scene, mask, hit, dt)
-        if math.floor(frame.time_s) != math.floor(frame.time_s - dt):  # once a second is often enough
+        self._learn(picture, scene, mask, hit, dt, seen)
+        if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
             self._absorb(picture, scene, hit)
-        return self._view.foreground(mask, strength)
+        return mask, strength
 
     def scene(self) -> Image:
-        """(H, W, 3) the learnt scene in source size, blue-green-red."""
-        return self._view.enlarge(Picture(*self._scene[:3]))
+        """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
+        scene = self._scene
+        if not self._camera.at_home:
+            scene = settled(scene, plane.inverse(self._camera.place), self._view.reduced)
+        return self._view.enlarge(Picture(*scene[:3]))
 
     def _start(self, picture: Picture, time_s: float) -> Scene:
         self._time_s = self._start_s = time_s
         self._frames = 0
         self._change.restart(time_s)
+        self._camera.restart()
         return start(picture)
 
     @property
@@ -110,12 +139,16 @@ class Disturbance:
         adopt(picture, scene, row, begin, end)
         paint(mask, row, begin, end, 0)
 
-    def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float) -> None:
+    def _learn(
+        self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, seen: Image | None
+    ) -> None:
         """Average what is neither foreground, nor close to it, nor shadow."""
         s = self._settings
         covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask
         if not s.selective:
             covered = hit = np.zeros_like(mask)
+        if seen is not None:
+            covered = np.where(seen > 0, covered, UNSEEN)
         self._frames += 1
         weight = -math.expm1(-dt / s.learn_s)
         if self._time_s - self._start_s < _FIRST_S:

@@ -18,6 +18,8 @@ Levels = NDArray[np.float32]
 
 FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
 NEVER = np.float32(-1000)  # unlike any luminance
+UNKNOWN = np.float32(1e4)  # noise of what was never in the picture
+UNSEEN = np.uint8(1)  # value of what is covered by nothing, but outside the picture
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
 _NONE = np.float32(0)
 _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
@@ -64,6 +66,7 @@ def learn(
 ) -> None:  # fmt: skip
     """One step of the running averages where covered (h, w) uint8 is 0 and hit no SHADOW; else the seconds are counted.
 
+    Where covered is UNSEEN nothing changes.
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
     """
     h, w = covered.shape
@@ -75,7 +78,7 @@ def learn(
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
             scene.luma[y, x] += (weight if free else _NONE) * d
             scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
-            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + dt
+            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + (_NONE if covered[y, x] == UNSEEN else dt)
         if len(picture.cb) > 0 and y % 2 == 0:
             for x in range((w + 1) // 2):
                 share = weight if covered[y, 2 * x] | hit[y, 2 * x] & SHADOW == 0 else _NONE

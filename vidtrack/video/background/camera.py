@@ -1,0 +1,168 @@
+"""The camera's motion: each picture is laid on the learnt scene, cheaply while it stands still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack import plane
+from vidtrack.compiled import kernel
+from vidtrack.config import RegistrationSettings
+from vidtrack.scan import Floats, Mask
+from vidtrack.video.background.alignment import Fit, align, leap, pyramid
+from vidtrack.video.background.canvas import fitting, recut, settled
+from vidtrack.video.background.points import CELLS, Points, choose, no_points, shifted
+from vidtrack.video.background.scene import Levels, Scene
+from vidtrack.video.frame import Image
+
+_GOOD = 0.45  # share of the points that fit
+_EVERY = 5  # of the points at full size are enough to watch a camera that stands
+_CHOSEN_S, _HELD_S = 0.5, 10.0  # points are chosen anew that often while the camera moves, and while it stands
+_TRY_S = 0.3  # between two searches that find nothing
+_DRIFT_PX = 0.1  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
+_STILL_PX = 0.5
+_LARGEST = 0.25  # share of the picture's longer side by which it may be off; farther, the view is another
+
+
+class Camera:
+    """Where the picture is on the canvas, and the canvas in the scene; all in processed pixels.
+
+    motion  (2, 3) from canvas to picture; the identity while the camera stands
+    place   (2, 3) from canvas to scene, the first picture
+    moves   whether the picture has to be laid on the canvas
+    fits    whether the last picture could be
+    """
+
+    STATE = (
+        "motion", "place", "moves", "fits",
+        "_points", "_chosen_s", "_still", "_still_s", "_tried_s",
+    )  # fmt: skip
+
+    def __init__(self, settings: RegistrationSettings) -> None:
+        self._settings = settings
+        self.motion = self.place = plane.IDENTITY.copy()
+        self.moves = False
+        self.fits = True
+        self._points = no_points()
+        self._chosen_s = -np.inf
+        self._still = plane.IDENTITY.copy()  # where the camera last came to rest, and when
+        self._still_s = 0.0
+        self._tried_s = -np.inf  # last search without success
+
+    @property
+    def lost(self) -> bool:
+        """Whether the camera moves nobody knows where."""
+        return self.moves and not self.fits
+
+    @property
+    def at_home(self) -> bool:
+        """Whether canvas, scene and picture are the same, as they are until the camera moves."""
+        return np.array_equal(self.place, plane.IDENTITY) and not self.moves
+
+    def on_canvas(self, box: Floats, step: int) -> Floats:
+        """Boxes (K, 4) of the scene [source px] on the canvas [processed px]."""
+        return (box if self.at_home else plane.boxes(plane.inverse(plane.rescaled(self.place, step)), box)) / step
+
+    def restart(self) -> None:
+        """The last picture is the scene now."""
+        self.place = plane.after(self.place, plane.inverse(self.motion))
+        self.motion = plane.IDENTITY.copy()
+        self.moves = False
+        self._points = no_points()
+        self._chosen_s = -np.inf
+
+    def follow(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
+        """Find out how the picture (h, w) lies on the scene; returns the scene, on another canvas where it must be.
+
+        known  (K, 4) boxes of vehicles expected here, on the canvas
+        """
+        if not len(self._points.x) and time_s - self._chosen_s > _CHOSEN_S:
+            self._choose(scene, time_s)
+        free = _free(self._points, scene.covered_s, known)
+        return self._track(luma, scene, free, time_s) if self.moves else self._watch(luma, scene, free, time_s)
+
+    def _watch(self, luma: Image, scene: Scene, free: Mask, time_s: float) -> Scene:
+        """Is the camera where it was? A few points tell."""
+        fit = align([luma], self._points, free, plane.IDENTITY, _EVERY)
+        self.fits = fit.share > _GOOD
+        moved = self._off(fit, luma) > self._settings.least_px
+        if (moved or not self.fits) and time_s - self._tried_s > _TRY_S:
+            fit = self._search(luma, scene, free)
+            self.fits = fit.share > _GOOD
+            if self.fits and self._off(fit, luma) > self._settings.least_px:
+                self.moves = True
+                self._still_s = time_s
+                return self._moved(luma, scene, fit, time_s)
+            if not self.fits:
+                self._tried_s = time_s
+        if time_s - self._chosen_s > _HELD_S:
+            if self.fits and self._off(fit, luma) > _DRIFT_PX:
+                self.place = plane.after(self.place, plane.inverse(fit.motion))
+            self._choose(scene, time_s)
+        return scene
+
+    def _track(self, luma: Image, scene: Scene, free: Mask, time_s: float) -> Scene:
+        """Where has the camera moved to?"""
+        fit = self._search(luma, scene, free)
+        self.fits = fit.share > _GOOD
+        if self.fits:
+            scene = self._moved(luma, scene, fit, time_s)
+        if time_s - self._chosen_s > _CHOSEN_S:
+            self._choose(scene, time_s)
+        if self.fits and time_s - self._still_s > self._settings.still_s:
+            scene = settled(scene, self.motion, (luma.shape[0], luma.shape[1]))
+            self.restart()
+            self._choose(scene, time_s)
+        return scene
+
+    def _search(self, luma: Image, scene: Scene, free: Mask) -> Fit:
+        """The best fit from the last motion on, or from where phase correlation sees the picture."""
+        pictures = pyramid(luma, len(CELLS))
+        fit = self._sane(align(pictures, self._points, free, self.motion), luma)
+        if fit.share > _GOOD:
+            return fit
+        other = self._sane(align(pictures, self._points, free, leap(scene.luma, luma, self.motion)), luma)
+        return max(fit, other, key=lambda found: found.share)
+
+    def _moved(self, luma: Image, scene: Scene, fit: Fit, time_s: float) -> Scene:
+        """Take over a fit."""
+        self.motion = fit.motion
+        h, w = luma.shape
+        cut = fitting(scene, fit.motion, (h, w))
+        if cut is not None:
+            left, top = cut[:2]
+            scene = recut(scene, *cut)
+            self._points = shifted(self._points, -left, -top)
+            begin = plane.shift(left, top)
+            self.motion, self.place, self._still = (
+                plane.after(each, begin) for each in (self.motion, self.place, self._still)
+            )
+        if plane.displacement(self.motion, w, h, self._still) > _STILL_PX:
+            self._still, self._still_s = self.motion, time_s
+        return scene
+
+    def _off(self, fit: Fit, luma: Image) -> float:
+        return plane.displacement(fit.motion, luma.shape[1], luma.shape[0])
+
+    def _sane(self, fit: Fit, luma: Image) -> Fit:
+        """The fit, of no share if no camera jumps like that."""
+        h, w = luma.shape
+        jump = plane.displacement(fit.motion, w, h, self.motion)
+        return fit if jump < _LARGEST * max(h, w) else fit._replace(share=0.0)
+
+    def _choose(self, scene: Scene, time_s: float) -> None:
+        self._points = choose(scene)
+        self._chosen_s = time_s
+
+
+@kernel
+def _free(points: Points, covered_s: Levels, box: Floats) -> Mask:
+    """(N,) points that nothing covered when last seen, and none of the boxes (K, 4) covers."""
+    h, w = covered_s.shape
+    free = np.empty(len(points.x), np.bool_)
+    for k in range(len(free)):
+        x, y = points.x[k], points.y[k]
+        i, j = int(x + np.float32(0.5)), int(y + np.float32(0.5))
+        free[k] = 0 <= i < w and 0 <= j < h and covered_s[j, i] == 0
+        for left, top, width, height in box:
+            free[k] &= not (left <= x <= left + width and top <= y <= top + height)
+    return free
