@@ -104,7 +104,7 @@ class RegistrationSettings(_Group):
     """How the disturbance map follows a camera that moves a little; pixels of the processed picture."""
 
     enabled: bool = True
-    """pictures are laid on the scene where the camera sways, drifts or was knocked; false: it is taken to stand still"""
+    """pictures are laid on the scene where the camera sways, drifts or is knocked; false: it is taken to stand still"""
     least_px: float = Field(0.75, gt=0)
     """pixels; how far a corner of the picture must be off before pictures are laid on the scene"""
     still_s: float = Field(10.0, gt=0)

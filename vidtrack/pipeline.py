@@ -39,7 +39,7 @@ def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[
         tracker = build_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
-            yield step.frame, step.tracks
+            yield step.frame, step.shown
 
 
 def box_tracker(settings: Settings | None = None, bounds: tuple[float, float] | None = None) -> Tracker:
@@ -132,7 +132,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         clock.append(perf_counter())
         spans = (end - begin for begin, end in pairwise(clock))
         seconds = dict(zip(("read", "detect", "blobs", "track"), spans, strict=True))
-        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds)
+        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds, foreground.motion)
         ended = perf_counter()
 
 

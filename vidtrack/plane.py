@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.scan import Floats, Tracks
+from vidtrack.scan import Floats, Scan, Tracks
 
 IDENTITY: Floats = np.eye(2, 3)
 
@@ -72,3 +72,13 @@ def moved(tracks: Tracks, plane: Floats | None) -> Tracks:
     x = x @ turn.T
     x[:, list(tracks.position)] += plane[:, 2]
     return replace(tracks, x=x, P=turn @ tracks.P @ turn.T, box=boxes(plane, tracks.box))
+
+
+def seen(scan: Scan, plane: Floats) -> Scan:
+    """The measurements of positions as the map shows them."""
+    z = points(plane, scan.z)
+    box = scan.box
+    if box is not None:
+        box = boxes(plane, np.hstack([scan.z + box[:, :2], box[:, 2:]]))
+        box[:, :2] -= z
+    return replace(scan, z=z, R=plane[:, :2] @ scan.R @ plane[:, :2].T, box=box, lasting=None, surveyed=None)

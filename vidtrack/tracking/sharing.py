@@ -20,13 +20,16 @@ SLOW = 5.0
 
 
 class Sharing:
-    """Keeps tracks on the blobs they share. All blobs are (M, 4) boxes in the picture."""
+    """Keeps tracks on the blobs they share. All blobs are (M, 4) boxes in the picture.
+
+    border  of the picture in the newest scan
+    """
 
     STATE = ("_made",)
 
     def __init__(self, groups: Groups, border: Border, box_s: float) -> None:
         self._groups = groups
-        self._border = border
+        self.border = border
         self._box_s = box_s
         self._made = 0
 
@@ -36,8 +39,8 @@ class Sharing:
         predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
         Returns (T,) the blob or -1, and (M,) blobs that may hide a vehicle without a track.
         """
-        whole = (hits > SETTLED) & ~self._border.cut(predicted)
-        return self._groups.share(predicted, taken, confirmed, whole, blobs)
+        whole = (hits > SETTLED) & ~self.border.cut(predicted)
+        return self._groups.share(predicted, taken, confirmed, whole, blobs, self.border.pixel)
 
     def follow(
         self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
@@ -52,8 +55,8 @@ class Sharing:
         predicted = absolute(box, x.take(position, axis=1))
         before = absolute(predicted, -dt * x.take(velocity, axis=1))
         var = bank.P.diagonal(axis1=1, axis2=2)[rows].take(position, axis=1)
-        cut = self._border.sides(blobs)
-        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
+        cut = self.border.sides(blobs)
+        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides, self.border.pixel)
 
         beta0 = (~leans).astype(float)
         edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
@@ -64,7 +67,7 @@ class Sharing:
 
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
         xy = bank.x[rows].take(position, axis=1)
-        box = absolute(self._border.reaching(absolute(box, xy), self._border.sides(before) & cut[on]), -xy)
+        box = absolute(self.border.reaching(absolute(box, xy), self.border.sides(before) & cut[on]), -xy)
         alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box

@@ -123,6 +123,7 @@ class Tracker:
         Raises ScanError if the scan is older than the last one, or does not fit the sensor or model.
         """
         events: list[Event] = []
+        self._survey(scan)
         sensor = scan.sensor or POSITION
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
@@ -180,6 +181,13 @@ class Tracker:
         self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
         return self.register.id[first:].copy()
+
+    def _survey(self, scan: Scan) -> None:
+        """Take the border from the scan, if it says where it is."""
+        if scan.surveyed is not None:
+            self.border = Border.of(scan.surveyed, scan.pixel)
+        if self.sharing:
+            self.sharing.border = self.border
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
         """Move all rows to the scan's time and delete those unseen for too long; returns the time step [s]."""

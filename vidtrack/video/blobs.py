@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack import plane
 from vidtrack.compiled import kernel
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
@@ -28,6 +29,7 @@ class Blobs:
     amplitude  (B,) mean strength
     step       source pixels per processed pixel
     settings   what noise `scan` gives the centroids
+    surveyed   (4,) left, top, right, bottom of what the detector saw; None: not known
     """
 
     centroid: Floats
@@ -37,6 +39,7 @@ class Blobs:
     amplitude: Floats
     step: int
     settings: BlobSettings
+    surveyed: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.area)
@@ -53,11 +56,28 @@ class Blobs:
         R = lasting + (self.settings.jitter_px * self.step) ** 2 * np.eye(2)
         box = self.box.copy()
         box[:, :2] -= self.centroid
-        return Scan(time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting)
+        return Scan(
+            time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting,
+            surveyed=self.surveyed, pixel=self.step,
+        )  # fmt: skip
+
+    def moved(self, place: Floats | None) -> Blobs:
+        """The blobs elsewhere, by a map of the plane (2, 3); None is the identity."""
+        if place is None:
+            return self
+        return replace(
+            self,
+            centroid=plane.points(place, self.centroid),
+            cov=place[:, :2] @ self.cov @ place[:, :2].T,
+            box=plane.boxes(place, self.box),
+            area=self.area * plane.scale(place) ** 2,
+        )
 
 
 def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
-    """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel."""
+    """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel, where they
+    are in the scene.
+    """
     mask, step = foreground.mask, foreground.step
     n, mean, cov, box, amplitude = _measure(mask, foreground.strength, settings.min_area_share * mask.size)
     return Blobs(
@@ -68,7 +88,8 @@ def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
         amplitude=amplitude,
         step=step,
         settings=settings,
-    )
+        surveyed=foreground.surveyed,
+    ).moved(foreground.place)
 
 
 def join_fragments(blobs: Blobs, predicted: Floats) -> Blobs:

@@ -64,7 +64,7 @@ def fitting(scene: Scene, motion: Floats, shape: tuple[int, int]) -> tuple[int, 
 
 def recut(scene: Scene, left: int, top: int, right: int, bottom: int) -> Scene:
     """The scene from column left to right and row top to bottom, all even; nothing is known of what is added."""
-    fills = (0, 128, 128, UNKNOWN, 0, NEVER)
+    fills = (0.0, 128.0, 128.0, float(UNKNOWN), 0.0, float(NEVER))
     whole = (left, top, right, bottom)
     half = (left // 2, top // 2, right // 2, bottom // 2)
     planes = [

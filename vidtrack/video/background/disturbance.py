@@ -139,9 +139,7 @@ class Disturbance:
         adopt(picture, scene, row, begin, end)
         paint(mask, row, begin, end, 0)
 
-    def _learn(
-        self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, seen: Image | None
-    ) -> None:
+    def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, seen: Image | None) -> None:
         """Average what is neither foreground, nor close to it, nor shadow."""
         s = self._settings
         covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask

@@ -95,9 +95,9 @@ class View:
             return None, None, np.array([0.0, 0.0, w, h])
         to_scene = plane.rescaled(place, self.step)
         to_picture = plane.after(plane.rescaled(motion, self.step), plane.inverse(to_scene))
-        upper_left, upper_right, lower_left, lower_right = plane.points(
-            plane.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5
-        ) + 0.5
+        upper_left, upper_right, lower_left, lower_right = (
+            plane.points(plane.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
+        )
         inside = (
             max(upper_left[0], lower_left[0]), max(upper_left[1], upper_right[1]),
             min(upper_right[0], lower_right[0]), min(lower_left[1], lower_right[1]),

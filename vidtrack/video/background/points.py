@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Ints
 from vidtrack.video.background.scene import UNKNOWN, Levels, Scene
 from vidtrack.video.frame import Image
 
@@ -37,7 +37,8 @@ class Points(NamedTuple):
 
 def no_points() -> Points:
     """None chosen yet."""
-    return Points(*np.empty((5, 0), np.float32), np.zeros(len(CELLS) + 1, np.int64))
+    x, y, value, gx, gy = np.empty((5, 0), np.float32)
+    return Points(x, y, value, gx, gy, np.zeros(len(CELLS) + 1, np.int64))
 
 
 def choose(scene: Scene) -> Points:
@@ -54,7 +55,8 @@ def choose(scene: Scene) -> Points:
         known = np.asarray(cv2.erode(usable, near, borderType=cv2.BORDER_CONSTANT, borderValue=0), np.uint8)
         found.append(_steepest(luma, known, columns, rows, np.float32(2**level)))
         start.append(start[-1] + found[-1].shape[1])
-    return Points(*np.concatenate(found, axis=1), np.array(start, np.int64))
+    x, y, value, gx, gy = np.concatenate(found, axis=1)
+    return Points(x, y, value, gx, gy, np.array(start, np.int64))
 
 
 def shifted(points: Points, x: float, y: float) -> Points:
@@ -63,7 +65,7 @@ def shifted(points: Points, x: float, y: float) -> Points:
 
 
 @kernel
-def _steepest(luma: Levels, usable: Image, columns: int, rows: int, size: np.float32) -> Floats:
+def _steepest(luma: Levels, usable: Image, columns: int, rows: int, size: np.float32) -> Levels:
     """(5, N) x, y, value, gx, gy in pixels of full size: of each cell what is steepest across, and steepest down.
 
     luma, usable (h, w); size: pixels of full size per pixel.

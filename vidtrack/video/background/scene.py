@@ -78,7 +78,8 @@ def learn(
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
             scene.luma[y, x] += (weight if free else _NONE) * d
             scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
-            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + (_NONE if covered[y, x] == UNSEEN else dt)
+            passed = _NONE if covered[y, x] == UNSEEN else dt
+            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + passed
         if len(picture.cb) > 0 and y % 2 == 0:
             for x in range((w + 1) // 2):
                 share = weight if covered[y, 2 * x] | hit[y, 2 * x] & SHADOW == 0 else _NONE
