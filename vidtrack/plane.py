@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
+from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Scan, Tracks
 
 IDENTITY: Floats = np.eye(2, 3)
 
 
+@kernel
 def after(second: Floats, first: Floats) -> Floats:
     """The map that does `first`, then `second`."""
-    return np.hstack([second[:, :2] @ first[:, :2], second[:, :2] @ first[:, 2:] + second[:, 2:]])
+    both = np.empty((2, 3))
+    for i in range(2):
+        for j in range(3):
+            both[i, j] = second[i, 0] * first[0, j] + second[i, 1] * first[1, j]
+        both[i, 2] += second[i, 2]
+    return both
 
 
+@kernel
 def inverse(plane: Floats) -> Floats:
     """The map back."""
-    back = np.linalg.inv(plane[:, :2])
-    return np.hstack([back, -back @ plane[:, 2:]])
+    (a, b, x), (c, d, y) = plane
+    determinant = a * d - b * c
+    back = np.empty((2, 3))
+    back[0, 0], back[0, 1], back[0, 2] = d / determinant, -b / determinant, (b * y - d * x) / determinant
+    back[1, 0], back[1, 1], back[1, 2] = -c / determinant, a / determinant, (c * x - a * y) / determinant
+    return back
 
 
 def shift(x: float, y: float) -> Floats:
@@ -27,11 +40,14 @@ def shift(x: float, y: float) -> Floats:
     return np.array([[1.0, 0.0, x], [0.0, 1.0, y]])
 
 
+@kernel
 def rescaled(plane: Floats, factor: float) -> Floats:
     """The same map where each pixel is replaced by factor x factor smaller ones; pixels are unit squares."""
     offset = (factor - 1) / 2
-    moved = factor * plane[:, 2] + offset - plane[:, :2] @ np.full(2, offset)
-    return np.hstack([plane[:, :2], moved[:, None]])
+    fine = plane.copy()
+    for i in range(2):
+        fine[i, 2] = factor * plane[i, 2] + offset * (1 - plane[i, 0] - plane[i, 1])
+    return fine
 
 
 def points(plane: Floats, xy: Floats) -> Floats:
@@ -48,7 +64,7 @@ def boxes(plane: Floats, box: Floats) -> Floats:
 
 def scale(plane: Floats) -> float:
     """By how much lengths grow."""
-    return float(np.sqrt(abs(np.linalg.det(plane[:, :2]))))
+    return math.sqrt(abs(plane[0, 0] * plane[1, 1] - plane[0, 1] * plane[1, 0]))
 
 
 def corners(width: float, height: float) -> Floats:
@@ -56,10 +72,17 @@ def corners(width: float, height: float) -> Floats:
     return np.array([[0.0, 0.0], [width - 1, 0.0], [0.0, height - 1], [width - 1, height - 1]])
 
 
+@kernel
 def displacement(plane: Floats, width: float, height: float, since: Floats = IDENTITY) -> float:
     """px; how far the map moves that corner of a picture which it moves most, compared with another map."""
-    xy = corners(width, height)
-    return float(np.linalg.norm(points(plane, xy) - points(since, xy), axis=1).max())
+    off = plane - since
+    most = 0.0
+    for i in range(2):
+        for j in range(2):
+            x, y = i * (width - 1), j * (height - 1)
+            across, down = off[0, 0] * x + off[0, 1] * y + off[0, 2], off[1, 0] * x + off[1, 1] * y + off[1, 2]
+            most = max(most, across * across + down * down)
+    return np.sqrt(most)
 
 
 def moved(tracks: Tracks, plane: Floats | None) -> Tracks:

@@ -18,9 +18,14 @@ from vidtrack.video.frame import Image
 
 FEWEST = 24
 """Points; fewer say nothing."""
-_STEPS = (4, 4, 6)  # at full, half and quarter size
+_STEPS = (3, 3, 6)  # at full, half and quarter size
 _SIGMA = 1.0  # grey levels; the smallest assumed spread of residuals
 _TUKEY = 4.685
+_SAMPLED = 200  # points tell the spread
+_GREY = 64.0  # grey levels; luminance in this unit is of the size of gradients
+_GAIN = 5.0  # no exposure changes more
+_INSIDE = 0.3  # share of the points that must be in the picture
+_SETTLED_PX = 0.02  # a smaller step is the last one
 _FITS_LEVELS, _FITS_PX = 4.0, 0.3  # a point fits if its residual is less than this, and that much of its gradient
 
 
@@ -90,44 +95,37 @@ def _fit(
     count = len(x)
     middle_x, middle_y = np.float64(np.mean(x)), np.float64(np.mean(y))
     radius = np.sqrt(np.mean((x - middle_x) ** 2 + (y - middle_y) ** 2)) + 1.0
-    seen, weight = np.empty(count), np.empty(count)
+    rows = np.empty((count, 6))
+    for k in range(count):
+        dx, dy = (x[k] - middle_x) / radius, (y[k] - middle_y) / radius
+        rows[k, 0], rows[k, 1] = gx[k], gy[k]
+        rows[k, 2], rows[k, 3] = gx[k] * dx + gy[k] * dy, gy[k] * dx - gx[k] * dy
+        rows[k, 4], rows[k, 5] = value[k] / _GREY, 1.0
+    seen, shown, weighted = np.empty(count), np.empty(count), np.empty((count, 6))
     A = motion.copy()
     gain, bias = 1.0, 0.0
     inside = _sample(luma, size, x, y, A, seen)
     for _ in range(steps):
-        if inside < 0.3 * count:
+        if inside < _INSIDE * count:
             return A, 0.0, np.inf
-        residual = seen - (gain * value + bias)
-        known = residual[~np.isnan(residual)]
-        centre = np.median(known)
-        sigma = max(1.4826 * np.median(np.abs(known - centre)), _SIGMA)
-        normal, right = np.zeros((6, 6)), np.zeros(6)
-        row = np.empty(6)
+        centre, sigma = _spread(seen, gain, bias, value)
         for k in range(count):
-            r = (residual[k] - centre) / (_TUKEY * sigma)
-            weight[k] = (1 - r * r) ** 2 if abs(r) < 1 else 0.0
-            if not weight[k] > 0:
-                continue
-            dx, dy = (x[k] - middle_x) / radius, (y[k] - middle_y) / radius
-            row[0], row[1] = gx[k], gy[k]
-            row[2], row[3] = gx[k] * dx + gy[k] * dy, gy[k] * dx - gx[k] * dy
-            row[4], row[5] = value[k] / 64, 1.0
+            r = (seen[k] - gain * value[k] - bias - centre) / (_TUKEY * sigma)
+            weight = (1 - r * r) ** 2 if abs(r) < 1 else 0.0
+            shown[k] = seen[k] if weight > 0 else 0.0
             for i in range(6):
-                right[i] += weight[k] * row[i] * seen[k]
-                for j in range(i + 1):
-                    normal[i, j] += weight[k] * row[i] * row[j]
+                weighted[k, i] = weight * rows[k, i]
+        normal = weighted.T @ rows
         for i in range(6):
-            for j in range(i):
-                normal[j, i] = normal[i, j]
             normal[i, i] += 1e-6 * normal[i, i] + 1e-3
-        found = np.linalg.solve(normal, right)
-        gain, bias = found[4] / 64, found[5]
-        if not 0.2 < gain < 5:
+        found = np.linalg.solve(normal, weighted.T @ shown)
+        gain, bias = found[4] / _GREY, found[5]
+        if not 1 / _GAIN < gain < _GAIN:
             return A, 0.0, np.inf
         tx, ty, grow, turn = found[0] / gain, found[1] / gain, found[2] / gain / radius, found[3] / gain / radius
         A = _undone(A, tx, ty, 1 + grow, turn, middle_x, middle_y)
         inside = _sample(luma, size, x, y, A, seen)
-        if abs(tx) + abs(ty) + radius * (abs(grow) + abs(turn)) < 0.01 * size:
+        if abs(tx) + abs(ty) + radius * (abs(grow) + abs(turn)) < _SETTLED_PX * size:
             break
     fits, total = 0, 0.0
     for k in range(count):
@@ -136,6 +134,22 @@ def _fit(
             fits += 1
             total += (off / slope) ** 2
     return A, fits / max(inside, 1), np.sqrt(total / max(fits, 1))
+
+
+@kernel(error_model="numpy")
+def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[float, float]:
+    """Median and robust standard deviation of what the points are off, from some of them."""
+    stride = max(1, len(seen) // _SAMPLED)
+    off = np.empty(len(seen) // stride + 1)
+    n = 0
+    for k in range(0, len(seen), stride):
+        if not np.isnan(seen[k]):
+            off[n] = seen[k] - gain * value[k] - bias
+            n += 1
+    if not n:
+        return 0.0, _SIGMA
+    centre = np.median(off[:n])
+    return centre, max(1.4826 * np.median(np.abs(off[:n] - centre)), _SIGMA)
 
 
 @kernel

@@ -15,8 +15,9 @@ from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
 
 _GOOD = 0.45  # share of the points that fit
+_SURE = 0.65  # the same where the camera is sought close to where it was only
 _EVERY = 5  # of the points at full size are enough to watch a camera that stands
-_CHOSEN_S, _HELD_S = 0.5, 10.0  # points are chosen anew that often while the camera moves, and while it stands
+_CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the camera moves, and while it stands
 _TRY_S = 0.3  # between two searches that find nothing
 _DRIFT_PX = 0.1  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
 _STILL_PX = 0.5
@@ -117,6 +118,9 @@ class Camera:
     def _search(self, luma: Image, scene: Scene, free: Mask) -> Fit:
         """The best fit from the last motion on, or from where phase correlation sees the picture."""
         pictures = pyramid(luma, len(CELLS))
+        fit = self._sane(align(pictures[:2], self._points, free, self.motion), luma)
+        if fit.share > _SURE:
+            return fit
         fit = self._sane(align(pictures, self._points, free, self.motion), luma)
         if fit.share > _GOOD:
             return fit

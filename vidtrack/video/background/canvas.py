@@ -8,33 +8,42 @@ from numpy.typing import NDArray
 
 from vidtrack import plane
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Ints
 from vidtrack.video.background.picture import Picture
-from vidtrack.video.background.scene import NEVER, UNKNOWN, Levels, Scene
+from vidtrack.video.background.scene import NEVER, UNKNOWN, UNSEEN, Levels, Scene
 from vidtrack.video.frame import Image
 
 _NEW_NOISE = np.float32(6)  # grey levels assumed of what has just come into the picture
-_RIM = 1  # px at the picture's edge that are not used: filters have mirrored them
+_RIM, _CHROMA_RIM = 1.5, 0.5  # px at the picture's edge that are not used: filters have mirrored them
+_ALIKE_PX = 0.04  # by which what is taken from the picture together may differ in place
 _SPARE = 8  # px that the canvas grows beyond what is needed, at least
 _LARGEST = 0.15  # share of the picture's longer side that the canvas reaches beyond it on each side
 
 
-def lay(picture: Picture, motion: Floats, scene: Scene) -> tuple[Picture, Image]:
-    """The picture on the canvas, and (h, w) 255 where it is seen; what is seen first becomes scene, and elsewhere
-    the scene is repeated.
+def lay(picture: Picture, motion: Floats, scene: Scene) -> tuple[Picture, Ints]:
+    """The picture on the canvas, and (h, 2) the columns from which to which each row shows it.
+
+    What is seen for the first time becomes scene; outside the picture the scene is repeated.
 
     motion  (2, 3) from canvas to picture
     """
-    size = (scene.luma.shape[1], scene.luma.shape[0])
-    half = plane.rescaled(motion, 0.5)
-    frame = np.zeros(picture.luma.shape, np.uint8)
-    frame[_RIM:-_RIM, _RIM:-_RIM] = 255
-    seen = _warped(frame, motion, size)
-    chroma_size = (scene.cb.shape[1], scene.cb.shape[0])
-    cb, cr = (_warped(p, half, chroma_size, cv2.BORDER_REPLICATE) if p.size else p for p in (picture.cb, picture.cr))
-    laid = Picture(_warped(picture.luma, motion, size), cb, cr)
-    _complete(laid, scene, seen)
-    return laid, seen
+    laid = Picture(*(np.empty(p.shape, np.uint8) for p in scene[:3]))
+    span, half_span = (np.empty((len(p), 2), np.int64) for p in laid[:2])
+    _lay(picture.luma, motion, _RIM, scene.luma, laid.luma, span)
+    if picture.cb.size:
+        half = plane.rescaled(motion, 0.5)
+        _lay(picture.cb, half, _CHROMA_RIM, scene.cb, laid.cb, half_span)
+        _lay(picture.cr, half, _CHROMA_RIM, scene.cr, laid.cr, half_span)
+    _reveal(laid, scene, span)
+    return laid, span
+
+
+@kernel
+def mark_unseen(covered: Image, span: Ints) -> None:
+    """Set covered (h, w) to UNSEEN where the picture does not show it."""
+    for y in range(len(span)):
+        covered[y, : span[y, 0]] = UNSEEN
+        covered[y, span[y, 1] :] = UNSEEN
 
 
 def fitting(scene: Scene, motion: Floats, shape: tuple[int, int]) -> tuple[int, int, int, int] | None:
@@ -103,19 +112,61 @@ def _cut(old: Levels, cut: tuple[int, int, int, int], fill: float) -> Levels:
     return new
 
 
-@kernel
-def _complete(laid: Picture, scene: Scene, seen: Image) -> None:
-    h, w = seen.shape
-    coloured = len(laid.cb) > 0
+@kernel(error_model="numpy")
+def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, span: Ints) -> None:
+    """Fill laid (h, w) from source (H, W), bilinear; where it ends, from the scene. Sets span (h, 2).
+
+    Neighbours go together while the place within a pixel is the same to 1/50: along whole rows, where the camera
+    only shifts.
+    """
+    H, W = source.shape
+    h, w = laid.shape
+    (a, b, x_off), (c, d, y_off) = motion
+    change = max(abs(a - 1), abs(c), 1e-9)
+    block = int(min(max(_ALIKE_PX / change, 1.0), float(w)))
     for y in range(h):
-        for x in range(w):
-            if seen[y, x] < 255:
-                seen[y, x] = 0
-                laid.luma[y, x] = np.uint8(scene.luma[y, x] + np.float32(0.5))
-                if coloured:
-                    laid.cb[y // 2, x // 2] = np.uint8(scene.cb[y // 2, x // 2] + np.float32(0.5))
-                    laid.cr[y // 2, x // 2] = np.uint8(scene.cr[y // 2, x // 2] + np.float32(0.5))
-            elif scene.noise[y, x] >= UNKNOWN:
+        x0, y0 = b * y + x_off, d * y + y_off
+        low, high = _narrowed(0.0, w - 1.0, a, x0, rim, W - 1 - rim)
+        low, high = _narrowed(low, high, c, y0, rim, H - 1 - rim)
+        first, last = int(np.ceil(low)), int(np.floor(high)) + 1
+        if last <= first:
+            first = last = 0
+        span[y, 0], span[y, 1] = first, last
+        for x in range(first):
+            laid[y, x] = np.uint8(scene[y, x] + np.float32(0.5))
+        for x in range(last, w):
+            laid[y, x] = np.uint8(scene[y, x] + np.float32(0.5))
+        for x in range(first, last, block):
+            n = min(block, last - x)
+            reach = (n - 1) / 2
+            px, py = a * (x + reach) + x0 - reach, c * (x + reach) + y0
+            i, j = int(px), int(py)
+            u, v = px - i, py - j
+            ends = np.uint16(256 * u * v + 0.5)
+            right, below = np.uint16(256 * u + 0.5) - ends, np.uint16(256 * v + 0.5) - ends
+            own = np.uint16(256) - right - below - ends
+            upper, lower, out = source[j, i : i + n + 1], source[j + 1, i : i + n + 1], laid[y, x : x + n]
+            for k in range(n):
+                total = np.uint16(own * upper[k]) + np.uint16(right * upper[k + 1])
+                total += np.uint16(below * lower[k]) + np.uint16(ends * lower[k + 1])
+                out[k] = np.uint8((np.uint32(total) + 128) >> 8)
+
+
+@kernel(error_model="numpy")
+def _narrowed(low: float, high: float, slope: float, offset: float, least: float, most: float) -> tuple[float, float]:
+    """The part of low..high where slope x + offset lies in least..most."""
+    if abs(slope) < 1e-9:
+        return (low, high) if least <= offset <= most else (0.0, -1.0)
+    one, other = (least - offset) / slope, (most - offset) / slope
+    return max(low, min(one, other)), min(high, max(one, other))
+
+
+@kernel
+def _reveal(laid: Picture, scene: Scene, span: Ints) -> None:
+    coloured = len(laid.cb) > 0
+    for y in range(len(span)):
+        for x in range(span[y, 0], span[y, 1]):
+            if scene.noise[y, x] >= UNKNOWN:
                 scene.luma[y, x] = laid.luma[y, x]
                 scene.noise[y, x] = _NEW_NOISE
                 scene.covered_s[y, x] = 0

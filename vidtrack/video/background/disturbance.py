@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from vidtrack import plane
 from vidtrack.config import DisturbanceSettings, RegistrationSettings
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Ints
 from vidtrack.video.background.camera import Camera
-from vidtrack.video.background.canvas import lay, settled
+from vidtrack.video.background.canvas import lay, mark_unseen, settled
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import disturbance
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import UNSEEN, Scene, absorb, adopt, learn, no_scene, spare, start
+from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
 from vidtrack.video.background.shadow import mark_shadow
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -67,8 +67,8 @@ class Disturbance:
             self._changed_s = self._change.lost_s(frame.time_s)
             mask, strength = np.zeros_like(picture.luma), np.zeros(picture.luma.shape, np.float32)
         elif self._camera.moves:
-            laid, seen = lay(picture, self._camera.motion, self._scene)
-            mask, strength = self._map(laid, known, dt, seen)
+            laid, span = lay(picture, self._camera.motion, self._scene)
+            mask, strength = self._map(laid, known, dt, span)
         else:
             mask, strength = self._map(picture, known, dt)
         place, motion = self._camera.place, self._camera.motion
@@ -77,11 +77,11 @@ class Disturbance:
         return self._view.foreground(mask, strength, place, motion)
 
     def _map(
-        self, picture: Picture, known: Floats, dt: float, seen: Image | None = None
+        self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
     ) -> tuple[Image, NDArray[np.float32]]:
         """Mask and strength; what is free is learnt. The mask is empty while the whole picture changes.
 
-        seen  (h, w) 0 where the canvas lies outside the picture; None: nowhere
+        span  (h, 2) columns from which to which the picture shows each row of the canvas; None: all of it
         """
         s, scene = self._settings, self._scene
         if s.exposure:
@@ -97,7 +97,7 @@ class Disturbance:
         spare(scene.covered_s, known, _KNOWN_S)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
-        self._learn(picture, scene, mask, hit, dt, seen)
+        self._learn(picture, scene, mask, hit, dt, span)
         if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
             self._absorb(picture, scene, hit)
         return mask, strength
@@ -139,14 +139,14 @@ class Disturbance:
         adopt(picture, scene, row, begin, end)
         paint(mask, row, begin, end, 0)
 
-    def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, seen: Image | None) -> None:
+    def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, span: Ints | None) -> None:
         """Average what is neither foreground, nor close to it, nor shadow."""
         s = self._settings
-        covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask
+        covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask.copy()
         if not s.selective:
             covered = hit = np.zeros_like(mask)
-        if seen is not None:
-            covered = np.where(seen > 0, covered, UNSEEN)
+        if span is not None:
+            mark_unseen(covered, span)
         self._frames += 1
         weight = -math.expm1(-dt / s.learn_s)
         if self._time_s - self._start_s < _FIRST_S:
