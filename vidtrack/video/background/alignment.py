@@ -12,7 +12,7 @@ from vidtrack import plane
 from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Mask
 from vidtrack.video.background.filters import area_average
-from vidtrack.video.background.points import Points
+from vidtrack.video.background.points import CELLS, Points
 from vidtrack.video.background.scene import Levels
 from vidtrack.video.frame import Image
 
@@ -66,7 +66,8 @@ def align(pictures: Sequence[Image], points: Points, free: Mask, motion: Floats,
         x, y, value, gx, gy = (np.compress(chosen, column[part]) for column in points[:5])
         if len(x) < FEWEST:
             continue
-        fit = Fit(*_fit(pictures[level], 2.0**level, x, y, value, gx, gy, fit.motion, steps[level]))
+        stiff = level == len(CELLS) - 1
+        fit = Fit(*_fit(pictures[level], 2.0**level, x, y, value, gx, gy, fit.motion, steps[level], stiff))
     return fit
 
 
@@ -85,12 +86,21 @@ def leap(scene: Levels, luma: Image, motion: Floats) -> Floats:
 
 @kernel(error_model="numpy")
 def _fit(
-    luma: Image, size: float, x: Levels, y: Levels, value: Levels, gx: Levels, gy: Levels, motion: Floats, steps: int
+    luma: Image,
+    size: float,
+    x: Levels,
+    y: Levels,
+    value: Levels,
+    gx: Levels,
+    gy: Levels,
+    motion: Floats,
+    steps: int,
+    stiff: bool,
 ) -> tuple[Floats, float, float]:
     """Motion, share of the points that fit, and their residual.
 
     I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d, gain and bias by least squares with
-    Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the points' scale.
+    Tukey's weights, d a mere shift if it is stiff; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the points' scale.
     """
     count = len(x)
     middle_x, middle_y = np.float64(np.mean(x)), np.float64(np.mean(y))
@@ -118,6 +128,8 @@ def _fit(
         normal = weighted.T @ rows
         for i in range(6):
             normal[i, i] += 1e-6 * normal[i, i] + 1e-3
+        if stiff:
+            normal[2, 2], normal[3, 3] = 1e12, 1e12
         found = np.linalg.solve(normal, weighted.T @ shown)
         gain, bias = found[4] / _GREY, found[5]
         if not 1 / _GAIN < gain < _GAIN:

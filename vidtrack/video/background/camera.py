@@ -14,7 +14,7 @@ from vidtrack.video.background.points import CELLS, Points, choose, no_points, s
 from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
 
-_GOOD = 0.45  # share of the points that fit
+_GOOD = 0.5  # share of the points that fit
 _SURE = 0.65  # the same where the camera is sought close to where it was only
 _EVERY = 5  # of the points at full size are enough to watch a camera that stands
 _CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the camera moves, and while it stands
@@ -121,11 +121,9 @@ class Camera:
         fit = self._sane(align(pictures[:2], self._points, free, self.motion), luma)
         if fit.share > _SURE:
             return fit
-        fit = self._sane(align(pictures, self._points, free, self.motion), luma)
-        if fit.share > _GOOD:
-            return fit
-        other = self._sane(align(pictures, self._points, free, leap(scene.luma, luma, self.motion)), luma)
-        return max(fit, other, key=lambda found: found.share)
+        starts = (self.motion, leap(scene.luma, luma, self.motion))
+        fits = (self._sane(align(pictures, self._points, free, start), luma) for start in starts)
+        return max(fit, *fits, key=lambda found: found.share)
 
     def _moved(self, luma: Image, scene: Scene, fit: Fit, time_s: float) -> Scene:
         """Take over a fit."""

@@ -15,7 +15,7 @@ from vidtrack.video.frame import Image
 
 _NEW_NOISE = np.float32(6)  # grey levels assumed of what has just come into the picture
 _RIM, _CHROMA_RIM = 1.5, 0.5  # px at the picture's edge that are not used: filters have mirrored them
-_ALIKE_PX = 0.04  # by which what is taken from the picture together may differ in place
+_ALIKE_PX = 0.08  # by which what is taken from the picture together may differ in place
 _SPARE = 8  # px that the canvas grows beyond what is needed, at least
 _LARGEST = 0.15  # share of the picture's longer side that the canvas reaches beyond it on each side
 
@@ -122,6 +122,7 @@ def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, 
     H, W = source.shape
     h, w = laid.shape
     (a, b, x_off), (c, d, y_off) = motion
+    one, half = np.float32(1), np.float32(0.5)
     change = max(abs(a - 1), abs(c), 1e-9)
     block = int(min(max(_ALIKE_PX / change, 1.0), float(w)))
     for y in range(h):
@@ -141,15 +142,14 @@ def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, 
             reach = (n - 1) / 2
             px, py = a * (x + reach) + x0 - reach, c * (x + reach) + y0
             i, j = int(px), int(py)
-            u, v = px - i, py - j
-            ends = np.uint16(256 * u * v + 0.5)
-            right, below = np.uint16(256 * u + 0.5) - ends, np.uint16(256 * v + 0.5) - ends
-            own = np.uint16(256) - right - below - ends
-            upper, lower, out = source[j, i : i + n + 1], source[j + 1, i : i + n + 1], laid[y, x : x + n]
+            u, v = np.float32(px - i), np.float32(py - j)
+            ends = u * v
+            right, below = u - ends, v - ends
+            own = one - right - below - ends
             for k in range(n):
-                total = np.uint16(own * upper[k]) + np.uint16(right * upper[k + 1])
-                total += np.uint16(below * lower[k]) + np.uint16(ends * lower[k + 1])
-                out[k] = np.uint8((np.uint32(total) + 128) >> 8)
+                upper = own * np.float32(source[j, i + k]) + right * np.float32(source[j, i + k + 1])
+                lower = below * np.float32(source[j + 1, i + k]) + ends * np.float32(source[j + 1, i + k + 1])
+                laid[y, x + k] = np.uint8(upper + lower + half)
 
 
 @kernel(error_model="numpy")
