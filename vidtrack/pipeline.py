@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -24,6 +25,8 @@ from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
 from vidtrack.video.source import open_source
+
+log = logging.getLogger(__name__)
 
 
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
@@ -132,7 +135,10 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         clock.append(perf_counter())
         spans = (end - begin for begin, end in pairwise(clock))
         seconds = dict(zip(("read", "detect", "blobs", "track"), spans, strict=True))
-        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds, foreground.motion)
+        motion, warnings = foreground.motion, foreground.warnings
+        for warning in warnings:
+            log.warning("at %.1f s: %s", frame.time_s, warning)
+        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds, motion, warnings)
         ended = perf_counter()
 
 

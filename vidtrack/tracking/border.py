@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Mask
+from vidtrack.scan import Floats, Mask, Scan
 
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
@@ -29,11 +29,12 @@ class Border:
     top: float = 0.0
     pixel: float = 1.0
 
-    @classmethod
-    def of(cls, surveyed: Floats, pixel: float) -> Border:
-        """What a sensor surveyed (4,): left, top, right, bottom."""
-        left, top, right, bottom = surveyed.tolist()
-        return cls(right - left, bottom - top, left, top, pixel)
+    def of(self, scan: Scan) -> Border:
+        """The border of what a scan surveyed, this one if it does not say."""
+        if scan.surveyed is None:
+            return self
+        left, top, right, bottom = scan.surveyed.tolist()
+        return Border(right - left, bottom - top, left, top, scan.pixel)
 
     @property
     def _edges(self) -> tuple[float, float, float, float]:

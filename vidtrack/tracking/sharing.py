@@ -20,30 +20,36 @@ SLOW = 5.0
 
 
 class Sharing:
-    """Keeps tracks on the blobs they share. All blobs are (M, 4) boxes in the picture.
-
-    border  of the picture in the newest scan
-    """
+    """Keeps tracks on the blobs they share. All blobs are (M, 4) boxes in the picture."""
 
     STATE = ("_made",)
 
-    def __init__(self, groups: Groups, border: Border, box_s: float) -> None:
+    def __init__(self, groups: Groups, box_s: float) -> None:
         self._groups = groups
-        self.border = border
         self._box_s = box_s
         self._made = 0
 
-    def claim(self, predicted: Floats, hits: Ints, taken: Ints, confirmed: Mask, blobs: Floats) -> tuple[Ints, Mask]:
+    def claim(
+        self, predicted: Floats, hits: Ints, border: Border, taken: Ints, confirmed: Mask, blobs: Floats
+    ) -> tuple[Ints, Mask]:
         """Which tracks are updated by the edges of a blob, and which blobs are larger than their tracks account for.
 
         predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
         Returns (T,) the blob or -1, and (M,) blobs that may hide a vehicle without a track.
         """
-        whole = (hits > SETTLED) & ~self.border.cut(predicted)
-        return self._groups.share(predicted, taken, confirmed, whole, blobs, self.border.pixel)
+        whole = (hits > SETTLED) & ~border.cut(predicted)
+        return self._groups.share(predicted, taken, confirmed, whole, blobs, border.pixel)
 
     def follow(
-        self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
+        self,
+        shared: Ints,
+        hides: Mask,
+        bank: Estimator,
+        register: Register,
+        blobs: Floats,
+        border: Border,
+        t: float,
+        dt: float,
     ) -> None:
         """Update the tracks on shared blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
         leans = shared >= 0
@@ -55,8 +61,8 @@ class Sharing:
         predicted = absolute(box, x.take(position, axis=1))
         before = absolute(predicted, -dt * x.take(velocity, axis=1))
         var = bank.P.diagonal(axis1=1, axis2=2)[rows].take(position, axis=1)
-        cut = self.border.sides(blobs)
-        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides, self.border.pixel)
+        cut = border.sides(blobs)
+        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides, border.pixel)
 
         beta0 = (~leans).astype(float)
         edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
@@ -67,7 +73,7 @@ class Sharing:
 
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
         xy = bank.x[rows].take(position, axis=1)
-        box = absolute(self.border.reaching(absolute(box, xy), self.border.sides(before) & cut[on]), -xy)
+        box = absolute(border.reaching(absolute(box, xy), border.sides(before) & cut[on]), -xy)
         alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box

@@ -114,7 +114,7 @@ class Tracker:
         self.bank = estimator(self.model)
         self.register = Register(self.model.dim, smooth)
         self.border = Border(*bounds) if bounds else Border()
-        self.sharing = Sharing(groups, self.border, box_s) if groups and not self.forest else None
+        self.sharing = Sharing(groups, box_s) if groups and not self.forest else None
         self.t: float | None = None
 
     def step(self, scan: Scan) -> Tracks:
@@ -123,7 +123,7 @@ class Tracker:
         Raises ScanError if the scan is older than the last one, or does not fit the sensor or model.
         """
         events: list[Event] = []
-        self._survey(scan)
+        self.border = self.border.of(scan)
         sensor = scan.sensor or POSITION
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
@@ -132,7 +132,7 @@ class Tracker:
         taken = heaviest(decision)
         self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
-            self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
+            self.sharing.follow(shared, hides, self.bank, self.register, blobs, self.border, scan.t, dt)
         why = self._why(problem, decision, taken) if self.explain else None
         nis = self._weigh_evidence(problem, decision, taken, shared, dt)
         kept = self._delete(scan.t, events)
@@ -181,13 +181,6 @@ class Tracker:
         self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
         return self.register.id[first:].copy()
-
-    def _survey(self, scan: Scan) -> None:
-        """Take the border from the scan, if it says where it is."""
-        if scan.surveyed is not None:
-            self.border = Border.of(scan.surveyed, scan.pixel)
-        if self.sharing:
-            self.sharing.border = self.border
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
         """Move all rows to the scan's time and delete those unseen for too long; returns the time step [s]."""
@@ -240,7 +233,8 @@ class Tracker:
             return deferred(problem, self.forest, self.trust, self.births, self.register, events)
         claim, confirmed = None, self.register.status != TENTATIVE
         if self.sharing and blobs is not None:
-            claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, confirmed=confirmed, blobs=blobs)
+            known = self._boxes(), self.bank.hits, self.border
+            claim = partial(self.sharing.claim, *known, confirmed=confirmed, blobs=blobs)
         return at_once(problem, self.associate, self.trust, confirmed, claim)
 
     def _update(

@@ -23,6 +23,7 @@ class Foreground:
     step      source pixels per mask pixel
     place     (2, 3) from the mask, enlarged by `step`, to the scene [source px]; None: it lies on it
     motion    (2, 3) from the scene to the picture [source px]; None: the camera is where it was in the first one
+    warnings  what the user should know, each said once
     surveyed  (4,) left, top, right, bottom of what the mask can show [source px of the scene]; None: not known
     """
 
@@ -32,6 +33,7 @@ class Foreground:
     place: Floats | None = None
     motion: Floats | None = None
     surveyed: Floats | None = None
+    warnings: tuple[str, ...] = ()
 
     def full_size(self, shape: tuple[int, int]) -> Image:
         """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""

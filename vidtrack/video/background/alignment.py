@@ -99,8 +99,9 @@ def _fit(
 ) -> tuple[Floats, float, float]:
     """Motion, share of the points that fit, and their residual.
 
-    I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d, gain and bias by least squares with
-    Tukey's weights, d a mere shift if it is stiff; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the points' scale.
+    I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d (a mere shift if it is stiff), gain and
+    bias by least squares with Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the
+    points' scale.
     """
     count = len(x)
     middle_x, middle_y = np.float64(np.mean(x)), np.float64(np.mean(y))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vidtrack import plane
@@ -21,7 +23,16 @@ _CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the ca
 _TRY_S = 0.3  # between two searches that find nothing
 _DRIFT_PX = 0.1  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
 _STILL_PX = 0.5
+_HOLD_S = 0.5  # a camera that was lost must be seen standing, or be followed, for so long before it is trusted
+_LATELY_S, _RESTLESS_S = 10.0, 3.0  # one that was lost for so many of the last seconds never holds still
 _LARGEST = 0.25  # share of the picture's longer side by which it may be off; farther, the view is another
+
+
+_MOVED_AWAY = (
+    "the camera has moved by more than a quarter of the picture; nothing is reported until it stands still, "
+    "and tracks and counting lines begin anew where it looks then"
+)
+_RESTLESS = "the camera does not hold still and cannot be followed; nothing is reported while it moves like this"
 
 
 class Camera:
@@ -31,28 +42,46 @@ class Camera:
     place   (2, 3) from canvas to scene, the first picture
     moves   whether the picture has to be laid on the canvas
     fits    whether the last picture could be
+    lost_s  s for which nobody has known where the camera looks; 0 while it is known
     """
 
     STATE = (
-        "motion", "place", "moves", "fits",
-        "_points", "_chosen_s", "_still", "_still_s", "_tried_s",
-    )  # fmt: skip
+        *("motion", "place", "moves", "fits", "lost_s"),
+        *(
+            "_points",
+            "_chosen_s",
+            "_still",
+            "_still_s",
+            "_tried_s",
+            "_time_s",
+            "_lost_s",
+            "_lost_total_s",
+            "_away",
+            "_told",
+        ),
+    )
 
     def __init__(self, settings: RegistrationSettings) -> None:
         self._settings = settings
         self.motion = self.place = plane.IDENTITY.copy()
         self.moves = False
         self.fits = True
+        self.lost_s = 0.0
         self._points = no_points()
         self._chosen_s = -np.inf
         self._still = plane.IDENTITY.copy()  # where the camera last came to rest, and when
         self._still_s = 0.0
         self._tried_s = -np.inf  # last search without success
+        self._time_s = 0.0
+        self._trusted_s = -np.inf  # when it can be trusted again
+        self._lately_s = 0.0  # for how long it was lost lately
+        self._away = False  # whether it looks elsewhere now
+        self._told: tuple[str, ...] = ()
 
     @property
-    def lost(self) -> bool:
-        """Whether the camera moves nobody knows where."""
-        return self.moves and not self.fits
+    def trusted(self) -> bool:
+        """Whether it has been known for a while where the camera looks."""
+        return self._time_s >= self._trusted_s
 
     @property
     def at_home(self) -> bool:
@@ -64,10 +93,11 @@ class Camera:
         return (box if self.at_home else plane.boxes(plane.inverse(plane.rescaled(self.place, step)), box)) / step
 
     def restart(self) -> None:
-        """The last picture is the scene now."""
-        self.place = plane.after(self.place, plane.inverse(self.motion))
+        """The last picture is the scene now; of another view, it is a scene of its own."""
+        self.place = plane.IDENTITY.copy() if self._away else plane.after(self.place, plane.inverse(self.motion))
         self.motion = plane.IDENTITY.copy()
         self.moves = False
+        self.lost_s = 0.0
         self._points = no_points()
         self._chosen_s = -np.inf
 
@@ -79,7 +109,27 @@ class Camera:
         if not len(self._points.x) and time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
         free = _free(self._points, scene.covered_s, known)
-        return self._track(luma, scene, free, time_s) if self.moves else self._watch(luma, scene, free, time_s)
+        scene = self._track(luma, scene, free, time_s) if self.moves else self._watch(luma, scene, free, time_s)
+        self._notice_loss(luma, time_s)
+        return scene
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know and was not told yet."""
+        due = [text for text, holds in ((_MOVED_AWAY, self._away), (_RESTLESS, self._lately_s > _RESTLESS_S)) if holds]
+        new = tuple(text for text in due if text not in self._told)
+        self._told += new
+        return new
+
+    def _notice_loss(self, luma: Image, time_s: float) -> None:
+        """A camera that moves nobody knows where, or too far, is lost, and not trusted until it has held still."""
+        h, w = luma.shape
+        dt, self._time_s = min(time_s - self._time_s, 1.0), time_s
+        moved = plane.displacement(plane.after(self.motion, plane.inverse(self.place)), w, h)
+        self._away = self.moves and moved > _LARGEST * max(h, w)
+        lost = self._away or (not self.fits and (self.moves or not self.trusted))
+        self.lost_s = self.lost_s + dt if lost else 0.0
+        self._trusted_s = time_s + _HOLD_S if lost else self._trusted_s
+        self._lately_s = self._lately_s * math.exp(-dt / _LATELY_S) + dt * lost
 
     def _watch(self, luma: Image, scene: Scene, free: Mask, time_s: float) -> Scene:
         """Is the camera where it was? A few points tell."""

@@ -59,10 +59,9 @@ class Change:
         self._steady_s, self._steady_spread = time_s, least_recent
         return 0.0
 
-    def lost_s(self, time_s: float) -> float:
-        """Seconds since the picture was last steady, when it cannot be compared with the scene."""
-        self._time_s = time_s
-        return time_s - self._steady_s
+    def skip(self, time_s: float) -> None:
+        """A picture that cannot be compared with the scene says nothing."""
+        self._time_s = self._steady_s = time_s
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -63,18 +64,21 @@ class Disturbance:
         known = self._camera.on_canvas(known, self._view.step)
         if self._registers:
             self._scene = self._camera.follow(picture.luma, self._scene, known, frame.time_s)
-        if self._camera.lost:
-            self._changed_s = self._change.lost_s(frame.time_s)
+        if self._camera.lost_s > 0:
+            self._changed_s = self._camera.lost_s
+            self._change.skip(frame.time_s)
             mask, strength = np.zeros_like(picture.luma), np.zeros(picture.luma.shape, np.float32)
         elif self._camera.moves:
             laid, span = lay(picture, self._camera.motion, self._scene)
             mask, strength = self._map(laid, known, dt, span)
         else:
             mask, strength = self._map(picture, known, dt)
+        if not self._camera.trusted:
+            mask = np.zeros_like(mask)
         place, motion = self._camera.place, self._camera.motion
         if self._changed_s > self._settings.relearn_s:
             self._scene = self._start(picture, frame.time_s)
-        return self._view.foreground(mask, strength, place, motion)
+        return replace(self._view.foreground(mask, strength, place, motion), warnings=self._camera.warnings())
 
     def _map(
         self, picture: Picture, known: Floats, dt: float, span: Ints | None = None

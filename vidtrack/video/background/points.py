@@ -15,6 +15,7 @@ from vidtrack.video.frame import Image
 CELLS = ((32, 24), (24, 18), (16, 12))
 """Columns and rows of cells at full, half and quarter size; each gives two points."""
 _STEEP = np.float32(1.5)  # grey levels per pixel; flatter cells give none
+_SMALLEST = 32  # px; smaller pictures have no place for cells
 _REACH = 2  # px around a point that must be known
 
 
@@ -43,6 +44,8 @@ def no_points() -> Points:
 
 def choose(scene: Scene) -> Points:
     """The steepest places of a scene, of those that are known and free of traffic."""
+    if min(scene.luma.shape) < _SMALLEST:
+        return no_points()
     luma, usable = scene.luma, ((scene.noise < UNKNOWN) & (scene.covered_s == 0)).astype(np.uint8)
     found, start = [], [0]
     for level, (columns, rows) in enumerate(CELLS):
