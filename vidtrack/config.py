@@ -64,6 +64,10 @@ class DisturbanceSettings(_Group):
     """s; time constant of the scene's average"""
     noise_s: float = Field(4.0, gt=0)
     """s; time constant of the noise's average"""
+    registration: bool = True
+    """pictures are laid on the scene where the camera sways, drifts or is knocked; false: it is taken to stand still"""
+    still_s: float = Field(10.0, gt=0)
+    """s; a camera that has stood still for so long is only watched again, which costs next to nothing"""
     selective: bool = True
     """foreground is not learnt; false: it is, and leaves a tail"""
     guard_px: int = Field(3, ge=0, le=30)
@@ -100,22 +104,10 @@ class PaperSettings(_Group):
     """both darker and brighter than the average; false: brighter only"""
 
 
-class RegistrationSettings(_Group):
-    """How the disturbance map follows a camera that moves a little; pixels of the processed picture."""
-
-    enabled: bool = True
-    """pictures are laid on the scene where the camera sways, drifts or is knocked; false: it is taken to stand still"""
-    least_px: float = Field(0.75, gt=0)
-    """pixels; how far a corner of the picture must be off before pictures are laid on the scene"""
-    still_s: float = Field(10.0, gt=0)
-    """s; a camera that has stood still for so long is only watched again"""
-
-
 class DetectorSettings(_Group):
     kind: Literal["disturbance", "paper", "mog2", "knn"] = "disturbance"
     """how the foreground is found"""
     disturbance: DisturbanceSettings = DisturbanceSettings()
-    registration: RegistrationSettings = RegistrationSettings()
     paper: PaperSettings = PaperSettings()
 
 

@@ -30,7 +30,7 @@ class Sharing:
         self._made = 0
 
     def claim(
-        self, predicted: Floats, hits: Ints, border: Border, taken: Ints, confirmed: Mask, blobs: Floats
+        self, predicted: Floats, hits: Ints, border: Border, confirmed: Mask, blobs: Floats, taken: Ints
     ) -> tuple[Ints, Mask]:
         """Which tracks are updated by the edges of a blob, and which blobs are larger than their tracks account for.
 

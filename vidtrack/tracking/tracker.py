@@ -233,8 +233,7 @@ class Tracker:
             return deferred(problem, self.forest, self.trust, self.births, self.register, events)
         claim, confirmed = None, self.register.status != TENTATIVE
         if self.sharing and blobs is not None:
-            known = self._boxes(), self.bank.hits, self.border
-            claim = partial(self.sharing.claim, *known, confirmed=confirmed, blobs=blobs)
+            claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, self.border, confirmed, blobs)
         return at_once(problem, self.associate, self.trust, confirmed, claim)
 
     def _update(

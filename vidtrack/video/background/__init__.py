@@ -22,5 +22,5 @@ def create(settings: DetectorSettings, scale: float | None = None, keep: NDArray
     if settings.kind == "paper":
         return Paper(settings.paper, view)
     if settings.kind == "disturbance":
-        return Disturbance(settings.disturbance, settings.registration, view)
+        return Disturbance(settings.disturbance, view)
     return OpenCV(settings.kind, view)

@@ -8,9 +8,8 @@ import numpy as np
 
 from vidtrack import plane
 from vidtrack.compiled import kernel
-from vidtrack.config import RegistrationSettings
 from vidtrack.scan import Floats, Mask
-from vidtrack.video.background.alignment import Fit, align, leap, pyramid
+from vidtrack.video.background.alignment import FEWEST, Fit, align, leap, pyramid
 from vidtrack.video.background.canvas import fitting, recut, settled
 from vidtrack.video.background.points import CELLS, Points, choose, no_points, shifted
 from vidtrack.video.background.scene import Levels, Scene
@@ -18,6 +17,7 @@ from vidtrack.video.frame import Image
 
 _GOOD = 0.5  # share of the points that fit
 _SURE = 0.65  # the same where the camera is sought close to where it was only
+_LEAST_PX = 0.75  # that a corner of the picture is off, before it is laid on the scene
 _EVERY = 5  # of the points at full size are enough to watch a camera that stands
 _CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the camera moves, and while it stands
 _TRY_S = 0.3  # between two searches that find nothing
@@ -47,22 +47,13 @@ class Camera:
 
     STATE = (
         *("motion", "place", "moves", "fits", "lost_s"),
-        *(
-            "_points",
-            "_chosen_s",
-            "_still",
-            "_still_s",
-            "_tried_s",
-            "_time_s",
-            "_lost_s",
-            "_lost_total_s",
-            "_away",
-            "_told",
-        ),
+        *("_points", "_chosen_s", "_still", "_still_s", "_tried_s", "_time_s", "_trusted_s", "_lately_s"),
+        *("_away", "_told"),
     )
 
-    def __init__(self, settings: RegistrationSettings) -> None:
-        self._settings = settings
+    def __init__(self, still_s: float) -> None:
+        """still_s: a camera that has stood still for so long is only watched."""
+        self._rest_s = still_s
         self.motion = self.place = plane.IDENTITY.copy()
         self.moves = False
         self.fits = True
@@ -109,6 +100,9 @@ class Camera:
         if not len(self._points.x) and time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
         free = _free(self._points, scene.covered_s, known)
+        if not self.moves and np.count_nonzero(free) < FEWEST:  # nothing to hold on to
+            self.fits, self._time_s = False, time_s
+            return scene
         scene = self._track(luma, scene, free, time_s) if self.moves else self._watch(luma, scene, free, time_s)
         self._notice_loss(luma, time_s)
         return scene
@@ -135,11 +129,11 @@ class Camera:
         """Is the camera where it was? A few points tell."""
         fit = align([luma], self._points, free, plane.IDENTITY, _EVERY)
         self.fits = fit.share > _GOOD
-        moved = self._off(fit, luma) > self._settings.least_px
+        moved = self._off(fit, luma) > _LEAST_PX
         if (moved or not self.fits) and time_s - self._tried_s > _TRY_S:
             fit = self._search(luma, scene, free)
             self.fits = fit.share > _GOOD
-            if self.fits and self._off(fit, luma) > self._settings.least_px:
+            if self.fits and self._off(fit, luma) > _LEAST_PX:
                 self.moves = True
                 self._still_s = time_s
                 return self._moved(luma, scene, fit, time_s)
@@ -159,7 +153,7 @@ class Camera:
             scene = self._moved(luma, scene, fit, time_s)
         if time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
-        if self.fits and time_s - self._still_s > self._settings.still_s:
+        if self.fits and time_s - self._still_s > self._rest_s:
             scene = settled(scene, self.motion, (luma.shape[0], luma.shape[1]))
             self.restart()
             self._choose(scene, time_s)

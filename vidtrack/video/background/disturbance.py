@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack import plane
-from vidtrack.config import DisturbanceSettings, RegistrationSettings
+from vidtrack.config import DisturbanceSettings
 from vidtrack.scan import Floats, Ints
 from vidtrack.video.background.camera import Camera
 from vidtrack.video.background.canvas import lay, mark_unseen, settled
@@ -38,10 +38,9 @@ class Disturbance:
 
     STATE = ("_view", "_change", "_camera", "_scene", "_time_s", "_start_s", "_frames")
 
-    def __init__(self, settings: DisturbanceSettings, registration: RegistrationSettings, view: View) -> None:
+    def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
-        self._registers = registration.enabled
-        self._camera = Camera(registration)
+        self._camera = Camera(settings.still_s)
         self._view = view
         self._thresholds = tuple(
             np.float32(level) for level in (settings.luma_threshold, settings.noise_factor, settings.chroma_threshold)
@@ -62,7 +61,7 @@ class Disturbance:
         if dt > _GAP_S:
             self._start_s = frame.time_s
         known = self._camera.on_canvas(known, self._view.step)
-        if self._registers:
+        if self._settings.registration:
             self._scene = self._camera.follow(picture.luma, self._scene, known, frame.time_s)
         if self._camera.lost_s > 0:
             self._changed_s = self._camera.lost_s
