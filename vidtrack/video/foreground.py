@@ -35,13 +35,18 @@ class Foreground:
     surveyed: Floats | None = None
     warnings: tuple[str, ...] = ()
 
+    def reduced(self, shape: tuple[int, int]) -> Image:
+        """(h, w) the mask in the processed picture of that shape."""
+        if self.place is None or self.motion is None:
+            return self.mask
+        to_picture = plane.rescaled(plane.after(self.motion, self.place), 1 / self.step)
+        return _warped(self.mask, to_picture, shape)
+
     def full_size(self, shape: tuple[int, int]) -> Image:
         """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""
         if self.place is not None and self.motion is not None:
             to_picture = plane.after(plane.after(self.motion, self.place), _enlargement(self.step))
-            return np.asarray(
-                cv2.warpAffine(self.mask, to_picture, (shape[1], shape[0]), flags=cv2.INTER_NEAREST), np.uint8
-            )
+            return _warped(self.mask, to_picture, shape)
         mask = self.mask.repeat(self.step, axis=0).repeat(self.step, axis=1)
         rows, columns = (max(0, size - found) for size, found in zip(shape, mask.shape, strict=True))
         return np.pad(mask, ((0, rows), (0, columns)), mode="edge")[: shape[0], : shape[1]]
@@ -49,6 +54,11 @@ class Foreground:
 
 def _enlargement(step: int) -> Floats:
     return np.array([[step, 0, (step - 1) / 2], [0, step, (step - 1) / 2]])
+
+
+def _warped(mask: Image, to_picture: Floats, shape: tuple[int, int]) -> Image:
+    size = (shape[1], shape[0])
+    return np.asarray(cv2.warpAffine(mask, to_picture, size, flags=cv2.INTER_NEAREST), np.uint8)
 
 
 class Background(Protocol):

@@ -58,16 +58,11 @@ def align(pictures: Sequence[Image], points: Points, free: Mask, motion: Floats,
     free      (N,) points where no traffic is expected
     every     only each so many'th point is used
     """
-    steps = np.array(_STEPS)
     fit = Fit(motion, 0.0, np.inf)
     for level in reversed(range(len(pictures))):
-        part = slice(points.start[level], points.start[level + 1], every)
-        chosen = free[part]
-        x, y, value, gx, gy = (np.compress(chosen, column[part]) for column in points[:5])
-        if len(x) < FEWEST:
-            continue
+        part = (points.start[level], points.start[level + 1], every)
         stiff = level == len(CELLS) - 1
-        fit = Fit(*_fit(pictures[level], 2.0**level, x, y, value, gx, gy, fit.motion, steps[level], stiff))
+        fit = Fit(*_fit(pictures[level], 2.0**level, points, free, part, fit.motion, _STEPS[level], stiff))
     return fit
 
 
@@ -86,24 +81,21 @@ def leap(scene: Levels, luma: Image, motion: Floats) -> Floats:
 
 @kernel(error_model="numpy")
 def _fit(
-    luma: Image,
-    size: float,
-    x: Levels,
-    y: Levels,
-    value: Levels,
-    gx: Levels,
-    gy: Levels,
-    motion: Floats,
-    steps: int,
+    luma: Image, size: float, points: Points, free: Mask, part: tuple[int, int, int], motion: Floats, steps: int,
     stiff: bool,
-) -> tuple[Floats, float, float]:
+) -> tuple[Floats, float, float]:  # fmt: skip
     """Motion, share of the points that fit, and their residual.
 
     I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d (a mere shift if it is stiff), gain and
     bias by least squares with Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the
-    points' scale.
+    points' scale; part: from which to which point, and every how many'th.
     """
-    count = len(x)
+    used = np.arange(part[0], part[1], part[2])
+    used = used[free[part[0] : part[1] : part[2]]]
+    count = len(used)
+    if count < FEWEST:
+        return motion, 0.0, np.inf
+    x, y, value, gx, gy = points.x[used], points.y[used], points.value[used], points.gx[used], points.gy[used]
     middle_x, middle_y = np.float64(np.mean(x)), np.float64(np.mean(y))
     radius = np.sqrt(np.mean((x - middle_x) ** 2 + (y - middle_y) ** 2)) + 1.0
     rows = np.empty((count, 6))

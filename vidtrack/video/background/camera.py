@@ -23,7 +23,7 @@ _CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the ca
 _TRY_S = 0.3  # between two searches that find nothing
 _DRIFT_PX = 0.1  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
 _STILL_PX = 0.5
-_HOLD_S = 0.5  # a camera that was lost must be seen standing, or be followed, for so long before it is trusted
+_HOLD_S = 0.5  # a camera that was lost for longer must be followed, or stand, for so long before it is trusted
 _LATELY_S, _RESTLESS_S = 10.0, 3.0  # one that was lost for so many of the last seconds never holds still
 _LARGEST = 0.25  # share of the picture's longer side by which it may be off; farther, the view is another
 
@@ -122,7 +122,8 @@ class Camera:
         self._away = self.moves and moved > _LARGEST * max(h, w)
         lost = self._away or (not self.fits and (self.moves or not self.trusted))
         self.lost_s = self.lost_s + dt if lost else 0.0
-        self._trusted_s = time_s + _HOLD_S if lost else self._trusted_s
+        if self.lost_s > _HOLD_S:
+            self._trusted_s = time_s + _HOLD_S
         self._lately_s = self._lately_s * math.exp(-dt / _LATELY_S) + dt * lost
 
     def _watch(self, luma: Image, scene: Scene, free: Mask, time_s: float) -> Scene:

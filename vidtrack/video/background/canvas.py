@@ -122,7 +122,6 @@ def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, 
     H, W = source.shape
     h, w = laid.shape
     (a, b, x_off), (c, d, y_off) = motion
-    one, half = np.float32(1), np.float32(0.5)
     change = max(abs(a - 1), abs(c), 1e-9)
     block = int(min(max(_ALIKE_PX / change, 1.0), float(w)))
     for y in range(h):
@@ -142,14 +141,18 @@ def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, 
             reach = (n - 1) / 2
             px, py = a * (x + reach) + x0 - reach, c * (x + reach) + y0
             i, j = int(px), int(py)
-            u, v = np.float32(px - i), np.float32(py - j)
-            ends = u * v
-            right, below = u - ends, v - ends
-            own = one - right - below - ends
-            for k in range(n):
-                upper = own * np.float32(source[j, i + k]) + right * np.float32(source[j, i + k + 1])
-                lower = below * np.float32(source[j + 1, i + k]) + ends * np.float32(source[j + 1, i + k + 1])
-                laid[y, x + k] = np.uint8(upper + lower + half)
+            _blend(source[j, i : i + n + 1], source[j + 1, i : i + n + 1], px - i, py - j, laid[y, x : x + n])
+
+
+@kernel
+def _blend(upper: Image, lower: Image, u: float, v: float, out: Image) -> None:
+    """out (n,) between the pixels of two rows (n + 1,): u of the way to the right, v of the way down."""
+    ends = np.uint16(256 * u * v + 0.5)
+    right, below = np.uint16(256 * u + 0.5) - ends, np.uint16(256 * v + 0.5) - ends
+    own = np.uint16(256) - right - below - ends
+    for k in range(len(out)):
+        row = own * upper[k] + right * upper[k + 1]
+        out[k] = (row + below * lower[k] + ends * lower[k + 1] + 128) >> 8
 
 
 @kernel(error_model="numpy")
