@@ -25,7 +25,7 @@ _SAMPLED = 200  # points tell the spread
 _GREY = 64.0  # grey levels; luminance in this unit is of the size of gradients
 _GAIN = 5.0  # no exposure changes more
 _INSIDE = 0.3  # share of the points that must be in the picture
-_SETTLED_PX = 0.02  # a smaller step is the last one
+_SETTLED_PX = 0.03  # a smaller step is the last one
 _FITS_LEVELS, _FITS_PX = 4.0, 0.3  # a point fits if its residual is less than this, and that much of its gradient
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack import plane
 from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Mask
-from vidtrack.video.background.alignment import FEWEST, Fit, align, leap, pyramid
+from vidtrack.video.background.alignment import Fit, align, leap, pyramid
 from vidtrack.video.background.canvas import fitting, recut, settled
 from vidtrack.video.background.points import CELLS, Points, choose, no_points, shifted
 from vidtrack.video.background.scene import Levels, Scene
@@ -18,10 +18,11 @@ from vidtrack.video.frame import Image
 _GOOD = 0.5  # share of the points that fit
 _SURE = 0.65  # the same where the camera is sought close to where it was only
 _LEAST_PX = 0.75  # that a corner of the picture is off, before it is laid on the scene
-_EVERY = 5  # of the points at full size are enough to watch a camera that stands
+_EVERY = 7  # of the points at full size are enough to watch a camera that stands
 _CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the camera moves, and while it stands
 _TRY_S = 0.3  # between two searches that find nothing
-_DRIFT_PX = 0.1  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
+_FRESH = 0.8  # share of the points that fit, as long as they are those of this hour
+_DRIFT_PX = 0.3  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
 _STILL_PX = 0.5
 _HOLD_S = 0.5  # a camera that was lost for longer must be followed, or stand, for so long before it is trusted
 _LATELY_S, _RESTLESS_S = 10.0, 3.0  # one that was lost for so many of the last seconds never holds still
@@ -87,7 +88,7 @@ class Camera:
         """The last picture is the scene now; of another view, it is a scene of its own."""
         self.place = plane.IDENTITY.copy() if self._away else plane.after(self.place, plane.inverse(self.motion))
         self.motion = plane.IDENTITY.copy()
-        self.moves = False
+        self.moves = self._away = False
         self.lost_s = 0.0
         self._points = no_points()
         self._chosen_s = -np.inf
@@ -99,16 +100,17 @@ class Camera:
         """
         if not len(self._points.x) and time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
-        free = _free(self._points, scene.covered_s, known)
-        if not self.moves and np.count_nonzero(free) < FEWEST:  # nothing to hold on to
+        if not self.moves and not len(self._points.x):  # nothing to hold on to
             self.fits, self._time_s = False, time_s
             return scene
-        scene = self._track(luma, scene, free, time_s) if self.moves else self._watch(luma, scene, free, time_s)
+        scene = (self._track if self.moves else self._watch)(luma, scene, known, time_s)
         self._notice_loss(luma, time_s)
         return scene
 
     def warnings(self) -> tuple[str, ...]:
         """What the user should know and was not told yet."""
+        if not self._away and self._lately_s < _RESTLESS_S:
+            return ()
         due = [text for text, holds in ((_MOVED_AWAY, self._away), (_RESTLESS, self._lately_s > _RESTLESS_S)) if holds]
         new = tuple(text for text in due if text not in self._told)
         self._told += new
@@ -118,21 +120,23 @@ class Camera:
         """A camera that moves nobody knows where, or too far, is lost, and not trusted until it has held still."""
         h, w = luma.shape
         dt, self._time_s = min(time_s - self._time_s, 1.0), time_s
-        moved = plane.displacement(plane.after(self.motion, plane.inverse(self.place)), w, h)
-        self._away = self.moves and moved > _LARGEST * max(h, w)
+        if self.moves:
+            moved = plane.displacement(plane.after(self.motion, plane.inverse(self.place)), w, h)
+            self._away = moved > _LARGEST * max(h, w)
         lost = self._away or (not self.fits and (self.moves or not self.trusted))
         self.lost_s = self.lost_s + dt if lost else 0.0
         if self.lost_s > _HOLD_S:
             self._trusted_s = time_s + _HOLD_S
         self._lately_s = self._lately_s * math.exp(-dt / _LATELY_S) + dt * lost
 
-    def _watch(self, luma: Image, scene: Scene, free: Mask, time_s: float) -> Scene:
+    def _watch(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
         """Is the camera where it was? A few points tell."""
-        fit = align([luma], self._points, free, plane.IDENTITY, _EVERY)
+        some = _free(self._points, scene.covered_s, known, self._points.start[1], _EVERY)
+        fit = align([luma], self._points, some, plane.IDENTITY, _EVERY)
         self.fits = fit.share > _GOOD
         moved = self._off(fit, luma) > _LEAST_PX
         if (moved or not self.fits) and time_s - self._tried_s > _TRY_S:
-            fit = self._search(luma, scene, free)
+            fit = self._search(luma, scene, known)
             self.fits = fit.share > _GOOD
             if self.fits and self._off(fit, luma) > _LEAST_PX:
                 self.moves = True
@@ -141,14 +145,23 @@ class Camera:
             if not self.fits:
                 self._tried_s = time_s
         if time_s - self._chosen_s > _HELD_S:
-            if self.fits and self._off(fit, luma) > _DRIFT_PX:
-                self.place = plane.after(self.place, plane.inverse(fit.motion))
-            self._choose(scene, time_s)
+            self._check_drift(luma, scene, known, time_s)
         return scene
 
-    def _track(self, luma: Image, scene: Scene, free: Mask, time_s: float) -> Scene:
+    def _check_drift(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> None:
+        """Has the scene, which learns, crept along with the camera? The points have not."""
+        free = _free(self._points, scene.covered_s, known, self._points.start[1], 1)
+        fit = align([luma], self._points, free, plane.IDENTITY)
+        drifted = fit.share > _GOOD and self._off(fit, luma) > _DRIFT_PX
+        if drifted:
+            self.place = plane.after(self.place, plane.inverse(fit.motion))
+        if drifted or fit.share < _FRESH:
+            self._choose(scene, time_s)
+        self._chosen_s = time_s
+
+    def _track(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
         """Where has the camera moved to?"""
-        fit = self._search(luma, scene, free)
+        fit = self._search(luma, scene, known)
         self.fits = fit.share > _GOOD
         if self.fits:
             scene = self._moved(luma, scene, fit, time_s)
@@ -160,8 +173,9 @@ class Camera:
             self._choose(scene, time_s)
         return scene
 
-    def _search(self, luma: Image, scene: Scene, free: Mask) -> Fit:
+    def _search(self, luma: Image, scene: Scene, known: Floats) -> Fit:
         """The best fit from the last motion on, or from where phase correlation sees the picture."""
+        free = _free(self._points, scene.covered_s, known, len(self._points.x), 1)
         pictures = pyramid(luma, len(CELLS))
         fit = self._sane(align(pictures[:2], self._points, free, self.motion), luma)
         if fit.share > _SURE:
@@ -202,11 +216,13 @@ class Camera:
 
 
 @kernel
-def _free(points: Points, covered_s: Levels, box: Floats) -> Mask:
-    """(N,) points that nothing covered when last seen, and none of the boxes (K, 4) covers."""
+def _free(points: Points, covered_s: Levels, box: Floats, end: int, every: int) -> Mask:
+    """(N,) points that nothing covered when last seen, and none of the boxes (K, 4) covers; only every so many'th up
+    to the end is looked at.
+    """
     h, w = covered_s.shape
-    free = np.empty(len(points.x), np.bool_)
-    for k in range(len(free)):
+    free = np.zeros(len(points.x), np.bool_)
+    for k in range(0, end, every):
         x, y = points.x[k], points.y[k]
         i, j = int(x + np.float32(0.5)), int(y + np.float32(0.5))
         free[k] = 0 <= i < w and 0 <= j < h and covered_s[j, i] == 0
