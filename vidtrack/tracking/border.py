@@ -96,7 +96,7 @@ def _outside(xy: Floats, edges: tuple[float, float, float, float]) -> Mask:
     if np.isinf(edges[2]):
         return outside
     for i in range(len(xy)):
-        x, y = xy[i, 0], xy[i, 1]
+        x, y = xy[i, 0] + 0.5, xy[i, 1] + 0.5  # a pixel is a unit square around its integer position
         outside[i] = x < edges[0] or y < edges[1] or x > edges[2] or y > edges[3]
     return outside
 
