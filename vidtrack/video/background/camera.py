@@ -16,6 +16,7 @@ from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
 
 _GOOD = 0.5  # share of the points that fit
+_STRANGE = 0.3  # less is another view, and no vehicle before the camera
 _SURE = 0.65  # the same where the camera is sought close to where it was only
 _LEAST_PX = 0.75  # that a corner of the picture is off, before it is laid on the scene
 _EVERY = 7  # of the points at full size are enough to watch a camera that stands
@@ -49,7 +50,7 @@ class Camera:
     STATE = (
         *("motion", "place", "moves", "fits", "lost_s"),
         *("_points", "_chosen_s", "_still", "_still_s", "_tried_s", "_time_s", "_trusted_s", "_lately_s"),
-        *("_away", "_told"),
+        *("_away", "_strange", "_told"),
     )
 
     def __init__(self, still_s: float) -> None:
@@ -68,6 +69,7 @@ class Camera:
         self._trusted_s = -np.inf  # when it can be trusted again
         self._lately_s = 0.0  # for how long it was lost lately
         self._away = False  # whether it looks elsewhere now
+        self._strange = False  # whether the last search found nothing of the scene
         self._told: tuple[str, ...] = ()
 
     @property
@@ -123,7 +125,7 @@ class Camera:
         if self.moves:
             moved = plane.displacement(plane.after(self.motion, plane.inverse(self.place)), w, h)
             self._away = moved > _LARGEST * max(h, w)
-        lost = self._away or (not self.fits and (self.moves or not self.trusted))
+        lost = self._away or (not self.fits and (self.moves or self._strange or not self.trusted))
         self.lost_s = self.lost_s + dt if lost else 0.0
         if self.lost_s > _HOLD_S:
             self._trusted_s = time_s + _HOLD_S
@@ -143,7 +145,7 @@ class Camera:
                 self._still_s = time_s
                 return self._moved(luma, scene, fit, time_s)
             if not self.fits:
-                self._tried_s = time_s
+                self._tried_s, self._strange = time_s, fit.share < _STRANGE
         if time_s - self._chosen_s > _HELD_S:
             self._check_drift(luma, scene, known, time_s)
         return scene
