@@ -32,6 +32,7 @@ FLOORS = (
     "estimate",
     "detection",
     "formats",
+    "plane",
     "scan",
     "explain",
     "config",

@@ -7,12 +7,13 @@ import pytest
 from command_line import SAMPLES
 
 from vidtrack import formats, score
-from vidtrack.config import Settings, TrackerSettings, load
+from vidtrack.config import Settings, SourceSettings, TrackerSettings, load
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.pipeline import box_tracker, build_detector, build_tracker, has_driven, track, video_steps
 from vidtrack.run import Run
 from vidtrack.scan import Scan, Status
 from vidtrack.tracking.boxes import box_scan
+from vidtrack.video.frame import Frame
 from vidtrack.video.source import open_source
 
 CROSSING = SAMPLES / "crossing.avi"
@@ -121,3 +122,23 @@ def test_stored_detections_are_seen_with_a_probability_of_their_own():
     settings = load(assignments=["tracker.detection_probability=0.7", "detections.detection_probability=0.6"])
     assert build_tracker(settings.tracker).rates.detection_probability == 0.7
     assert build_tracker(settings.tracker, whole=settings.detections).rates.detection_probability == 0.6
+
+
+def test_a_mirrored_video_gives_mirrored_tracks():
+    def mirrored(frame):
+        y, u, v = (np.ascontiguousarray(plane[:, ::-1]) for plane in (frame.y, frame.u, frame.v))
+        return Frame(frame.index, frame.time_s, y, u, v, frame.full_range)
+
+    def tracks(frames):
+        bounds = frames[0].shape[::-1]
+        tracker = build_tracker(Settings().tracker, bounds)
+        return [step.tracks for step in video_steps(frames, build_detector(Settings()), tracker, Settings())]
+
+    with open_source(str(SAMPLES / "junction.avi"), SourceSettings()) as source:
+        frames = list(source)
+    width = frames[0].shape[1]
+    for a, b in zip(tracks(frames), tracks([mirrored(frame) for frame in frames]), strict=True):
+        seen, other = (t.only(t.status != Status.TENTATIVE) for t in (a, b))
+        assert len(seen) == len(other)
+        x = np.sort(seen.xy[:, 0])
+        assert np.abs(x - np.sort(width - 1 - other.xy[:, 0])).max(initial=0) < 0.5

@@ -64,6 +64,10 @@ class DisturbanceSettings(_Group):
     """s; time constant of the scene's average"""
     noise_s: float = Field(4.0, gt=0)
     """s; time constant of the noise's average"""
+    registration: bool = True
+    """pictures are laid on the scene where the camera sways, drifts or is knocked; false: it is taken to stand still"""
+    still_s: float = Field(10.0, gt=0)
+    """s; a camera that has stood still for so long is only watched again, which costs next to nothing"""
     selective: bool = True
     """foreground is not learnt; false: it is, and leaves a tail"""
     guard_px: int = Field(3, ge=0, le=30)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -26,6 +27,8 @@ from vidtrack.video.mask import read_mask
 from vidtrack.video.source import open_source
 from vidtrack.video.vehicles.explain import explain
 
+log = logging.getLogger(__name__)
+
 
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
     """Frames of a video (file, image folder or glob) with the tracks in each, lazily.
@@ -40,7 +43,7 @@ def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[
         tracker = build_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
-            yield step.frame, step.tracks
+            yield step.frame, step.shown
 
 
 def box_tracker(settings: Settings | None = None, bounds: tuple[float, float] | None = None) -> Tracker:
@@ -133,7 +136,10 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         clock.append(perf_counter())
         spans = (end - begin for begin, end in pairwise(clock))
         seconds = dict(zip(("read", "detect", "blobs", "track"), spans, strict=True))
-        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds)
+        motion, warnings = foreground.motion, foreground.warnings
+        for warning in warnings:
+            log.warning("at %.1f s: %s", frame.time_s, warning)
+        yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds, motion, warnings)
         ended = perf_counter()
 
 

@@ -51,6 +51,8 @@ class Scan:
     label      (M,) class, -1 unknown; a track whose class is known takes no measurement of another
     lasting    (M, m, m) the part of R due to errors that persist from scan to scan; None: all are independent
     run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form within equal runs only
+    surveyed   (4,) left, top, right, bottom of what the sensor could see; None: the tracker's own bounds
+    pixel      size of the sensor's pixel in the units of z, where there is one
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
     definite, boxes of negative size, and runs below 0.
@@ -67,6 +69,8 @@ class Scan:
     run: Ints | None = None
     noise: Floats | None = None
     lasting: Floats | None = None
+    surveyed: Floats | None = None
+    pixel: float = 1.0
 
     def __post_init__(self) -> None:
         z, R = np.asarray(self.z, dtype=float, order="C"), np.asarray(self.R, dtype=float, order="C")

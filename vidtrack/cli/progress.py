@@ -68,4 +68,6 @@ def tell_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
     summary = json.loads((folder / "summary.json").read_text())
     tracks = summary["tracks"]
     found = f"{tracks} track{'s' * (tracks != 1)}" if tracks else none
+    for warning in summary.get("warnings", ()):
+        click.echo(f"warning: {warning['what']} (at {warning['time_s']:.1f} s)", err=True)
     click.echo("; ".join([found, *(counted(line, ways) for line, ways in summary["counts"].items())]), err=True)

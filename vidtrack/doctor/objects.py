@@ -77,7 +77,7 @@ class ObjectMeter:
         self._watched_s = step.time_s - self._begun_s - _SETTLE_S
         if self._watched_s < 0:
             return
-        moving = step.foreground.mask > 0
+        moving = step.foreground.reduced(self._restless.shape) > 0
         self._frames += 1
         self._motion += float(moving.mean())
         moving &= ~_covered(step, moving.shape)
@@ -132,7 +132,7 @@ class ObjectMeter:
 def _covered(step: Step, shape: tuple[int, int]) -> Mask:
     """(h, w) the boxes of confirmed tracks, with a margin."""
     assert step.foreground is not None
-    boxes = widened(step.tracks.box[step.tracks.status != TENTATIVE], _MARGIN) / step.foreground.step
+    boxes = widened(step.shown.box[step.tracks.status != TENTATIVE], _MARGIN) / step.foreground.step
     covered = np.zeros(shape, bool)
     corners = np.column_stack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
     for left, top, right, bottom in np.maximum(corners, 0).astype(int):

@@ -58,7 +58,7 @@ class Part:
 
     def write(self, steps: Sequence[Step], crossings: str) -> None:
         """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
-        shown = [step for step in steps if len(step.tracks)]
+        shown = [step.in_picture() for step in steps if len(step.tracks)]
         if shown:
             _write(self._tracks, csv_text(track_rows(shown)))
         if self._counts is not None and crossings:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vidtrack import plane
 from vidtrack.output.colours import Colour, colour
 from vidtrack.scan import Floats, Status, Tracks
 from vidtrack.traffic.lines import Line, counted
@@ -98,6 +99,14 @@ def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str
     for line in lines:
         pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE)
     return [pen.label(counted(k.name, (totals or {}).get(k.name, {})), k.x1, k.y1, LINE) for k in lines]
+
+
+def moved_lines(lines: Sequence[Line], motion: Floats | None) -> list[Line]:
+    """The lines where the road is in a picture; motion (2, 3) from the scene to it, None: where it was."""
+    if motion is None:
+        return list(lines)
+    ends = [plane.points(motion, np.array([[k.x1, k.y1], [k.x2, k.y2]])).ravel().tolist() for k in lines]
+    return [Line(k.name, *end) for k, end in zip(lines, ends, strict=True)]
 
 
 def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:

@@ -32,7 +32,7 @@ class MotFile:
 
     def step(self, step: Step) -> None:
         """Take one frame's confirmed tracks."""
-        self._steps.append(step)
+        self._steps.append(step.in_picture())
         if self._due():
             self.flush()
 

@@ -43,11 +43,13 @@ class RerunSink(Recorder):
         if step.time_s >= self._next_picture_s:
             self._next_picture_s = step.time_s + self._output.rerun_picture_s
             self._pictures(step)
+        trails = self._trails.paths(step.motion)
+        step = step.in_picture()
         self._log("world/blobs", _blobs(step.scan))
         self._log("world/tracks", _boxes(step.tracks))
         ellipses = gates(step.scan, step.tracks, step.scan.R)
         self._log("world/gates", rr.LineStrips2D(ellipses, colors=(0, 255, 255), draw_order=25))
-        self._log("world/trails", _paths(self._trails.paths()))
+        self._log("world/trails", _paths(trails))
 
     def _pictures(self, step: Step) -> None:
         if step.frame is None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
-from vidtrack.scan import Scan, Tracks
+from vidtrack import plane
+from vidtrack.scan import Floats, Scan, Tracks
 
 if TYPE_CHECKING:  # radar runs have no pictures, and must not need OpenCV
     from vidtrack.video.foreground import Foreground
@@ -20,8 +21,11 @@ class Step:
     """One frame, or one scan of a radar, through the whole pipeline.
 
     index       frame number from 0, or the scan's number
+    scan, tracks   in pixels of the scene, which are those of the first picture, or in the radar's plane
     frame, foreground   None for stored detections and radar plots, which have no picture
     stage_s     seconds spent in each stage
+    motion      (2, 3) from the scene to this picture [px]; None: the camera is where it was in the first one
+    warnings    what the user should know, said for the first time
     """
 
     index: int
@@ -31,6 +35,19 @@ class Step:
     frame: Frame | None
     foreground: Foreground | None
     stage_s: Mapping[str, float]
+    motion: Floats | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def shown(self) -> Tracks:
+        """The tracks in pixels of this picture, as users see them."""
+        return plane.moved(self.tracks, self.motion)
+
+    def in_picture(self) -> Step:
+        """The step with scan and tracks where they are in this picture."""
+        if self.motion is None:
+            return self
+        return replace(self, scan=plane.seen(self.scan, self.motion), tracks=self.shown, motion=None)
 
 
 class Sink(Protocol):

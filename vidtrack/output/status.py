@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from vidtrack.config import OutputSettings
-from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks
+from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, moved_lines
 from vidtrack.output.sink import Step
 from vidtrack.scan import Status, Tracks
 from vidtrack.traffic.lines import LineCounter
@@ -116,8 +116,8 @@ class StatusBoard:
         picture = step.frame.bgr()
         pen = Pen(picture)
         if self._counter is not None:
-            draw_lines(pen, self._counter.lines, self._counter.totals())
-        draw_tracks(pen, step.tracks)
+            draw_lines(pen, moved_lines(self._counter.lines, step.motion), self._counter.totals())
+        draw_tracks(pen, step.shown)
         draw_clock(pen, step.time_s, [])
         return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, self._quality])[1].tobytes()
 
@@ -146,7 +146,7 @@ class StatusBoard:
             time_s=0.0 if step is None else step.time_s,
             frame_age_s=now_s - done[-1] if done else None,
             fps_out=sum(now_s - t < _RATE_S for t in done) / _RATE_S,
-            tracks=[] if step is None else as_rows(step.tracks),
+            tracks=[] if step is None else as_rows(step.shown),
             counts={} if self._counter is None else self._counter.totals(),
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -10,6 +11,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
+from vidtrack import plane
 from vidtrack.config import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
@@ -17,6 +19,40 @@ from vidtrack.scan import TENTATIVE
 from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
+
+
+class CameraAccount:
+    """How the camera moved, against the first picture."""
+
+    def __init__(self) -> None:
+        self._time_s: float | None = None
+        self._moved_s = 0.0
+        self._largest_px = 0.0
+        self._squares = 0.0
+        self._frames = 0
+
+    def step(self, step: Step) -> None:
+        """Add a picture."""
+        if step.frame is None:
+            return
+        dt = 0.0 if self._time_s is None else step.time_s - self._time_s
+        self._time_s = step.time_s
+        self._frames += 1
+        if step.motion is not None:
+            height, width = step.frame.shape
+            px = plane.displacement(step.motion, width, height)
+            self._moved_s += dt
+            self._largest_px = max(self._largest_px, px)
+            self._squares += px * px
+
+    def as_dict(self) -> dict[str, float]:
+        """Seconds away from where it was at first, and by how many pixels, of that corner which moved most."""
+        rms_px = math.sqrt(self._squares / max(self._frames, 1))
+        return {
+            "moved_s": round(self._moved_s, 3),
+            "largest_px": round(self._largest_px, 2),
+            "rms_px": round(rms_px, 2),
+        }
 
 
 class Summary:
@@ -54,6 +90,8 @@ class Summary:
         self._tracks = 0
         self._alive: set[int] = set()
         self._stage_s: dict[str, float] = {}
+        self._camera = CameraAccount()
+        self._warnings: list[dict[str, object]] = []
         self._due = Every(1.0)
         self._write(interrupted=True)
 
@@ -66,6 +104,8 @@ class Summary:
         self._media_s = step.time_s
         for stage, seconds in step.stage_s.items():
             self._stage_s[stage] = self._stage_s.get(stage, 0.0) + seconds
+        self._camera.step(step)
+        self._warnings += ({"time_s": round(step.time_s, 3), "what": what} for what in step.warnings)
         if self._due():
             self._write(interrupted=True)
 
@@ -82,6 +122,8 @@ class Summary:
             "media_s": round(self._media_s, 6),
             "tracks": self._tracks,
             "counts": {} if self._counter is None else self._counter.totals(),
+            "camera": self._camera.as_dict(),
+            "warnings": self._warnings,
             "seconds": round(time.monotonic() - self._start, 3),
             "stages": {stage: round(seconds, 4) for stage, seconds in self._stage_s.items()},
             "settings": self._settings,

@@ -131,7 +131,7 @@ class TrackTable:
     def step(self, step: Step) -> None:
         """Take one frame's confirmed tracks."""
         if len(step.tracks):
-            self._waiting.append(step)
+            self._waiting.append(step.in_picture())
         if self._due():
             self._write()
 

@@ -6,6 +6,7 @@ from collections import deque
 
 import numpy as np
 
+from vidtrack import plane
 from vidtrack.scan import Floats, Ints, Status, Tracks
 
 
@@ -23,13 +24,17 @@ class Trails:
         while tracks.t - self._scans[0][0] > self._seconds:
             self._scans.popleft()
 
-    def paths(self) -> dict[int, Floats]:
-        """(n, d) positions in order of time for each track of the last scan."""
+    def paths(self, motion: Floats | None = None) -> dict[int, Floats]:
+        """(n, d) positions in order of time for each track of the last scan.
+
+        motion  (2, 3) from the scene to the picture that they are drawn on; None: the identity
+        """
         if not self._scans:
             return {}
         alive = self._scans[-1][1]
         ids = np.concatenate([scan[1] for scan in self._scans])
         xy = np.concatenate([scan[2] for scan in self._scans])
+        xy = xy if motion is None else plane.points(motion, xy)
         order = np.argsort(ids, kind="stable")
         ids, xy = ids[order], xy[order]
         first, last = np.searchsorted(ids, alive), np.searchsorted(ids, alive, side="right")

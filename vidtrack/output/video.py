@@ -14,7 +14,7 @@ from av.video.stream import VideoStream
 from vidtrack.config import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.disk import Disk
-from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails
+from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails, moved_lines
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
@@ -77,9 +77,9 @@ class AnnotatedVideo:
         self._counter.step(step.index, step.tracks)
         self._trails.step(step.tracks)
         pen = Pen(picture)
-        draw_lines(pen, self._counter.lines, self._counter.totals())
-        draw_trails(pen, self._trails.paths())
-        draw_tracks(pen, step.tracks)
+        draw_lines(pen, moved_lines(self._counter.lines, step.motion), self._counter.totals())
+        draw_trails(pen, self._trails.paths(step.motion))
+        draw_tracks(pen, step.shown)
         vehicles = int(np.count_nonzero(step.tracks.status != Status.TENTATIVE))
         draw_clock(pen, step.time_s, [f"{vehicles} tracks"])
         return picture

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Mask
+from vidtrack.scan import Floats, Mask, Scan
 
 REACH = 2.0
-"""px; a box this close to the border is cut by it."""
+"""Pixels of the sensor; a box this close to the border is cut by it."""
 SPECK = 1 / 30
 """Share of the picture's longer side; a smaller object must travel as far as one of this size to be confirmed. The
 leaves of a swaying tree are small, and a track that jumps from leaf to leaf seems to travel."""
@@ -18,10 +18,31 @@ leaves of a swaying tree are small, and a track that jumps from leaf to leaf see
 
 @dataclass(frozen=True, slots=True)
 class Border:
-    """A picture of width x height pixels; infinite where a sensor has no border."""
+    """A picture of width x height px, from left and top on; infinite where a sensor has no border.
+
+    pixel  px per pixel of what the sensor looks at
+    """
 
     width: float = np.inf
     height: float = np.inf
+    left: float = 0.0
+    top: float = 0.0
+    pixel: float = 1.0
+
+    def of(self, scan: Scan) -> Border:
+        """The border of what a scan surveyed, this one if it does not say."""
+        if scan.surveyed is None:
+            return self
+        left, top, right, bottom = scan.surveyed.tolist()
+        return Border(right - left, bottom - top, left, top, scan.pixel)
+
+    @property
+    def _edges(self) -> tuple[float, float, float, float]:
+        return self.left, self.top, self.left + self.width, self.top + self.height
+
+    @property
+    def _reach(self) -> float:
+        return REACH * self.pixel
 
     @property
     def speck(self) -> float:
@@ -30,60 +51,59 @@ class Border:
 
     def sides(self, box: Floats) -> Mask:
         """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border cuts."""
-        return _sides(box, self.width, self.height)
+        return _sides(box, self._edges, self._reach)
 
     def cut(self, box: Floats) -> Mask:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""
-        return _cut(box, self.width, self.height)
+        return _cut(box, self._edges, self._reach)
 
     def outside(self, xy: Floats) -> Mask:
         """(N,) positions (N, d) beyond the border."""
-        return _outside(xy, self.width, self.height)
+        return _outside(xy, self._edges)
 
     def leaving(self, box: Floats, v: Floats) -> Mask:
         """(N,) boxes cut by the border they move towards with velocities v (N, 2)."""
-        return _leaving(box, v, self.width, self.height)
+        return _leaving(box, v, self._edges, self._reach)
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) extended to the border on the given sides (N, 4)."""
-        return _reaching(box, sides, (self.width, self.height))
+        return _reaching(box, sides, self._edges)
 
 
 @kernel
-def _sides(box: Floats, width: float, height: float) -> Mask:
+def _sides(box: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
     sides = np.zeros((len(box), 4), np.bool_)
-    if np.isinf(width):
+    if np.isinf(edges[2]):
         return sides
     for i in range(len(box)):
-        sides[i, 0] = box[i, 0] < REACH
-        sides[i, 1] = box[i, 1] < REACH
-        sides[i, 2] = box[i, 0] + box[i, 2] > width - REACH
-        sides[i, 3] = box[i, 1] + box[i, 3] > height - REACH
+        for axis in range(2):
+            sides[i, axis] = box[i, axis] < edges[axis] + reach
+            sides[i, axis + 2] = box[i, axis] + box[i, axis + 2] > edges[axis + 2] - reach
     return sides
 
 
 @kernel
-def _cut(box: Floats, width: float, height: float) -> Mask:
-    cut, sides = np.zeros(len(box), np.bool_), _sides(box, width, height)
+def _cut(box: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
+    cut, sides = np.zeros(len(box), np.bool_), _sides(box, edges, reach)
     for i in range(len(box)):
         cut[i] = sides[i].any()
     return cut
 
 
 @kernel
-def _outside(xy: Floats, width: float, height: float) -> Mask:
+def _outside(xy: Floats, edges: tuple[float, float, float, float]) -> Mask:
     outside = np.zeros(len(xy), np.bool_)
-    if np.isinf(width):
+    if np.isinf(edges[2]):
         return outside
     for i in range(len(xy)):
-        x, y = xy[i, 0], xy[i, 1]
-        outside[i] = x < 0 or y < 0 or x > width or y > height
+        x, y = xy[i, 0] + 0.5, xy[i, 1] + 0.5  # a pixel is a unit square around its integer position
+        outside[i] = x < edges[0] or y < edges[1] or x > edges[2] or y > edges[3]
     return outside
 
 
 @kernel
-def _leaving(box: Floats, v: Floats, width: float, height: float) -> Mask:
-    leaving, sides = np.zeros(len(box), np.bool_), _sides(box, width, height)
+def _leaving(box: Floats, v: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
+    leaving, sides = np.zeros(len(box), np.bool_), _sides(box, edges, reach)
     for i in range(len(box)):
         for axis in range(min(2, v.shape[1])):
             near, far = sides[i, axis] and v[i, axis] < 0, sides[i, axis + 2] and v[i, axis] > 0
@@ -92,14 +112,14 @@ def _leaving(box: Floats, v: Floats, width: float, height: float) -> Mask:
 
 
 @kernel
-def _reaching(box: Floats, sides: Mask, picture: tuple[float, float]) -> Floats:
+def _reaching(box: Floats, sides: Mask, edges: tuple[float, float, float, float]) -> Floats:
     drawn = np.empty_like(box)
     for i in range(len(box)):
         for axis in range(2):
             near, far = box[i, axis], box[i, axis] + box[i, axis + 2]
             if sides[i, axis]:
-                near = min(near, 0.0)
+                near = min(near, edges[axis])
             if sides[i, axis + 2]:
-                far = max(far, picture[axis])
+                far = max(far, edges[axis + 2])
             drawn[i, axis], drawn[i, axis + 2] = near, far - near
     return drawn

@@ -51,17 +51,28 @@ class Groups:
         if not 0 < self.cover <= 1:
             raise ConfigError(f"group cover is {self.cover}; it must lie in 0..1")
 
-    def share(self, predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats) -> tuple[Ints, Mask]:
+    def share(
+        self, predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats, pixel: float = 1.0
+    ) -> tuple[Ints, Mask]:
         """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.
 
         The edges count where a track shares its blob with others, lies on a blob that it was not assigned, or where
         its blob no longer fits the vehicle. predicted (T, 4) boxes, taken (T,) measurement of each track or -1,
-        confirmed (T,), whole (T,) tracks whose box is reliable and inside the picture, blobs (M, 4) boxes.
+        confirmed (T,), whole (T,) tracks whose box is reliable and inside the picture, blobs (M, 4) boxes, whose edges
+        are uncertain by a pixel.
         """
-        return _share(predicted, taken, confirmed, whole, blobs, self.cover, self.growth, self.edge)
+        return _share(predicted, taken, confirmed, whole, blobs, self.cover, self.growth, self.edge, pixel)
 
     def measure(
-        self, predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: Mask, hides: Mask
+        self,
+        predicted: Floats,
+        box: Floats,
+        var: Floats,
+        blob: Ints,
+        blobs: Floats,
+        cut: Mask,
+        hides: Mask,
+        pixel: float = 1.0,
     ) -> tuple[Floats, Floats, Ints]:
         """Position (G, 2), variances (G, 2) and count of own edges (G,) for tracks on blobs.
 
@@ -69,19 +80,19 @@ class Groups:
         blob (G,) index of each track's blob, blobs (M, 4), cut (M, 4) sides of blobs that are the picture's
         border and no edge of a vehicle, hides (M,) blobs that the tracks on them do not account for.
         """
-        return _from_edges(predicted, box, var, blob, blobs, cut, hides, self.gate, self.edge)
+        return _from_edges(predicted, box, var, blob, blobs, cut, hides, self.gate, self.edge, pixel)
 
 
 @kernel(error_model="numpy")
 def _share(
     predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats,
-    cover: float, growth: float, edge: float,
+    cover: float, growth: float, edge: float, pixel: float,
 ) -> tuple[Ints, Mask]:  # fmt: skip
     shared = _blob_of(predicted, taken, confirmed, blobs, cover)
     explained = np.zeros(len(blobs))
     for t in range(len(shared)):
         own = shared[t] < 0 and taken[t] >= 0
-        if own and confirmed[t] and whole[t] and _changed(predicted[t], blobs[taken[t]], growth, edge):
+        if own and confirmed[t] and whole[t] and _changed(predicted[t], blobs[taken[t]], growth, edge, pixel):
             shared[t] = taken[t]
         if shared[t] >= 0:
             explained[shared[t]] += predicted[t, 2] * predicted[t, 3]
@@ -108,12 +119,12 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, cov
 
 
 @kernel(error_model="numpy")
-def _changed(box: Floats, blob: Floats, growth: float, edge: float) -> bool:
+def _changed(box: Floats, blob: Floats, growth: float, edge: float, pixel: float) -> bool:
     """Whether a blob (4,) has another size than the vehicle's box (4,), or one edge where it was and the other not."""
     ratio = blob[2] * blob[3] / (box[2] * box[3])
     changed = ratio > growth or ratio < 1 / growth
     for axis in range(2):
-        sigma = np.hypot(edge * box[2 + axis], 1.0)
+        sigma = np.hypot(edge * box[2 + axis], pixel)
         near = abs(blob[axis] - box[axis]) / sigma
         far = abs(blob[axis] + blob[2 + axis] - box[axis] - box[2 + axis]) / sigma
         changed |= min(near, far) < 1 and max(near, far) > ONE_SIDED
@@ -123,7 +134,7 @@ def _changed(box: Floats, blob: Floats, growth: float, edge: float) -> bool:
 @kernel(error_model="numpy")
 def _from_edges(
     predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: Mask, hides: Mask,
-    gate: float, edge: float,
+    gate: float, edge: float, pixel: float,
 ) -> tuple[Floats, Floats, Ints]:  # fmt: skip
     """Each member's position from the four edges of its blob.
 
@@ -136,7 +147,7 @@ def _from_edges(
     for i in range(count):
         for axis in range(2):
             weight, total = 0.0, 0.0
-            noise = (edge * predicted[i, 2 + axis]) ** 2 + 1.0
+            noise = (edge * predicted[i, 2 + axis]) ** 2 + pixel**2
             for far in range(2):  # near: left or top, far: right or bottom
                 if cut[blob[i], axis + 2 * far]:
                     continue

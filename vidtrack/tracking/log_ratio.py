@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, log
 
+import numpy as np
+
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats, Mask
 from vidtrack.tracking.lifecycle import grown, missed, refuse_immortal, unseen

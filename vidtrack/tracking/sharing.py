@@ -24,20 +24,21 @@ class Sharing:
 
     STATE = ("_made",)
 
-    def __init__(self, groups: Groups, border: Border, box_s: float) -> None:
+    def __init__(self, groups: Groups, box_s: float) -> None:
         self._groups = groups
-        self._border = border
         self._box_s = box_s
         self._made = 0
 
-    def claim(self, predicted: Floats, hits: Ints, taken: Ints, confirmed: Mask, blobs: Floats) -> tuple[Ints, Mask]:
+    def claim(
+        self, predicted: Floats, hits: Ints, border: Border, confirmed: Mask, blobs: Floats, taken: Ints
+    ) -> tuple[Ints, Mask]:
         """Which tracks are updated by the edges of a blob, and which blobs are larger than their tracks account for.
 
         predicted (T, 4) boxes, hits (T,) updates so far, taken (T,) measurement of each track or -1.
         Returns (T,) the blob or -1, and (M,) blobs that may hide a vehicle without a track.
         """
-        whole = (hits > SETTLED) & ~self._border.cut(predicted)
-        return self._groups.share(predicted, taken, confirmed, whole, blobs)
+        whole = (hits > SETTLED) & ~border.cut(predicted)
+        return self._groups.share(predicted, taken, confirmed, whole, blobs, border.pixel)
 
     def catch(self, predicted: Floats, blobs: Floats, idle: Mask, free: Mask) -> Ints:
         """(T,) the blob that a track (T,) without a measurement overlaps most, if that is free (M,); -1: none.
@@ -47,7 +48,15 @@ class Sharing:
         return overlapping(predicted, blobs, idle, free, self._groups.overlap)
 
     def follow(
-        self, shared: Ints, hides: Mask, bank: Estimator, register: Register, blobs: Floats, t: float, dt: float
+        self,
+        shared: Ints,
+        hides: Mask,
+        bank: Estimator,
+        register: Register,
+        blobs: Floats,
+        border: Border,
+        t: float,
+        dt: float,
     ) -> None:
         """Update the tracks on shared blobs (T,) by the edges they can claim; hides (M,) as `claim` gave it."""
         leans = shared >= 0
@@ -59,8 +68,8 @@ class Sharing:
         predicted = absolute(box, x.take(position, axis=1))
         before = absolute(predicted, -dt * x.take(velocity, axis=1))
         var = bank.P.diagonal(axis1=1, axis2=2)[rows].take(position, axis=1)
-        cut = self._border.sides(blobs)
-        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides)
+        cut = border.sides(blobs)
+        z, R, own = self._groups.measure(predicted, box, var, on, blobs, cut, hides, border.pixel)
 
         lost = (own == 0) & (np.bincount(on, minlength=len(blobs))[on] == 1)
         self._centre(predicted[lost], blobs[on[lost]], box[lost], z, R, lost)
@@ -75,7 +84,7 @@ class Sharing:
 
         # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
         xy = bank.x[rows].take(position, axis=1)
-        box = absolute(self._border.reaching(absolute(box, xy), self._border.sides(before) & cut[on]), -xy)
+        box = absolute(border.reaching(absolute(box, xy), border.sides(before) & cut[on]), -xy)
         alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
         box[alone] += -np.expm1(-dt / (SLOW * self._box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box

@@ -118,7 +118,7 @@ class Tracker:
         self.bank = estimator(self.model)
         self.register = Register(self.model.dim, smooth)
         self.border = Border(*bounds) if bounds else Border()
-        self.sharing = Sharing(groups, self.border, box_s) if groups and not self.forest else None
+        self.sharing = Sharing(groups, box_s) if groups and not self.forest else None
         self.t: float | None = None
 
     def step(self, scan: Scan) -> Tracks:
@@ -127,6 +127,7 @@ class Tracker:
         Raises ScanError if the scan is older than the last one, or does not fit the sensor or model.
         """
         events: list[Event] = []
+        self.border = self.border.of(scan)
         sensor = scan.sensor or POSITION
         blobs = None if scan.box is None else absolute(scan.box, scan.z)
         dt = self._predict(scan, events)
@@ -135,7 +136,7 @@ class Tracker:
         taken = heaviest(decision)
         self._update(decision, taken, scan, sensor, blobs, dt)
         if self.sharing and blobs is not None:
-            self.sharing.follow(shared, hides, self.bank, self.register, blobs, scan.t, dt)
+            self.sharing.follow(shared, hides, self.bank, self.register, blobs, self.border, scan.t, dt)
         why = self._why(problem, decision, taken) if self.explain else None
         nis = self._weigh_evidence(problem, decision, taken, shared, dt)
         kept = self._delete(scan.t, events)
@@ -241,7 +242,7 @@ class Tracker:
         claim = catch = None
         confirmed = self.register.status != TENTATIVE
         if self.sharing and blobs is not None:
-            claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, confirmed=confirmed, blobs=blobs)
+            claim = partial(self.sharing.claim, self._boxes(), self.bank.hits, self.border, confirmed, blobs)
             catch = partial(self.sharing.catch, self._boxes(), blobs)
         return at_once(problem, self.associate, self.trust, confirmed, claim, catch)
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack import plane
 from vidtrack.compiled import kernel
 from vidtrack.config import BlobSettings
 from vidtrack.scan import Floats, Ints, Scan
@@ -26,6 +27,7 @@ class Blobs:
     amplitude  (B,) mean strength
     step       source pixels per processed pixel
     settings   what noise `scan` gives the centroids
+    surveyed   (4,) left, top, right, bottom of what the detector saw; None: not known
     """
 
     centroid: Floats
@@ -35,6 +37,7 @@ class Blobs:
     amplitude: Floats
     step: int
     settings: BlobSettings
+    surveyed: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.area)
@@ -51,17 +54,34 @@ class Blobs:
         R = lasting + (self.settings.jitter_px * self.step) ** 2 * np.eye(2)
         box = self.box.copy()
         box[:, :2] -= self.centroid
-        return Scan(time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting)
+        return Scan(
+            time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting,
+            surveyed=self.surveyed, pixel=self.step,
+        )  # fmt: skip
+
+    def moved(self, place: Floats | None) -> Blobs:
+        """The blobs elsewhere, by a map of the plane (2, 3); None is the identity."""
+        if place is None:
+            return self
+        return replace(
+            self,
+            centroid=plane.points(place, self.centroid),
+            cov=place[:, :2] @ self.cov @ place[:, :2].T,
+            box=plane.boxes(place, self.box),
+            area=self.area * plane.scale(place) ** 2,
+        )
 
 
 def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
-    """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel."""
+    """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel, where they
+    are in the scene.
+    """
     regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
     return measured(regions, foreground, settings)
 
 
 def measured(regions: Regions, foreground: Foreground, settings: BlobSettings) -> Blobs:
-    """Each region as one blob."""
+    """Each region as one blob, where it is in the scene."""
     step = foreground.step
     n, mean, cov, box, amplitude = _measure(*regions, foreground.strength)
     return Blobs(
@@ -72,7 +92,8 @@ def measured(regions: Regions, foreground: Foreground, settings: BlobSettings) -
         amplitude=amplitude,
         step=step,
         settings=settings,
-    )
+        surveyed=foreground.surveyed,
+    ).moved(foreground.place)
 
 
 @kernel

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack import plane
 from vidtrack.scan import Floats
 from vidtrack.video.frame import Frame, Image
 
@@ -19,17 +21,44 @@ class Foreground:
     mask      (h, w) 0 background, 255 foreground
     strength  (h, w) disturbance in units of its threshold (1 is just detected)
     step      source pixels per mask pixel
+    place     (2, 3) from the mask, enlarged by `step`, to the scene [source px]; None: it lies on it
+    motion    (2, 3) from the scene to the picture [source px]; None: the camera is where it was in the first one
+    warnings  what the user should know, each said once
+    surveyed  (4,) left, top, right, bottom of what the mask can show [source px of the scene]; None: not known
     """
 
     mask: Image
     strength: NDArray
     step: int
+    place: Floats | None = None
+    motion: Floats | None = None
+    surveyed: Floats | None = None
+    warnings: tuple[str, ...] = ()
+
+    def reduced(self, shape: tuple[int, int]) -> Image:
+        """(h, w) the mask in the processed picture of that shape."""
+        if self.place is None or self.motion is None:
+            return self.mask
+        to_picture = plane.rescaled(plane.after(self.motion, self.place), 1 / self.step)
+        return _warped(self.mask, to_picture, shape)
 
     def full_size(self, shape: tuple[int, int]) -> Image:
         """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""
+        if self.place is not None and self.motion is not None:
+            to_picture = plane.after(plane.after(self.motion, self.place), _enlargement(self.step))
+            return _warped(self.mask, to_picture, shape)
         mask = self.mask.repeat(self.step, axis=0).repeat(self.step, axis=1)
         rows, columns = (max(0, size - found) for size, found in zip(shape, mask.shape, strict=True))
         return np.pad(mask, ((0, rows), (0, columns)), mode="edge")[: shape[0], : shape[1]]
+
+
+def _enlargement(step: int) -> Floats:
+    return np.array([[step, 0, (step - 1) / 2], [0, step, (step - 1) / 2]])
+
+
+def _warped(mask: Image, to_picture: Floats, shape: tuple[int, int]) -> Image:
+    size = (shape[1], shape[0])
+    return np.asarray(cv2.warpAffine(mask, to_picture, size, flags=cv2.INTER_NEAREST), np.uint8)
 
 
 class Background(Protocol):
@@ -38,8 +67,8 @@ class Background(Protocol):
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; what covers a `known` box is never absorbed into the scene, however long it stands.
 
-        known (K, 4): left, top, width, height [source px] of vehicles the tracker predicts here.
+        known (K, 4): left, top, width, height [source px of the scene] of vehicles the tracker predicts here.
         """
 
     def scene(self) -> Image:
-        """(H, W, 3) the learnt scene in source size, blue-green-red."""
+        """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""

@@ -39,8 +39,12 @@ class Change:
         """The scene is new."""
         self._start_s = time_s
 
-    def lasted_s(self, mask: Image, time_s: float) -> float:
-        """Seconds since the picture was last steady, 0 while it is; mask (h, w)."""
+    def lasted_s(self, mask: Image, time_s: float, match: bool = False) -> float:
+        """Seconds since the picture was last steady, 0 while it is.
+
+        mask   (h, w)
+        match  whether most of the scene was found in the picture: what spreads then is a large vehicle
+        """
         share, spread = _shares(mask, *_CELLS)
         changing = self._steady_s < self._time_s
         unseen = time_s - self._time_s > _UNSEEN_S
@@ -50,10 +54,14 @@ class Change:
         least = self._steady_spread if changing or unseen else least_recent
         self._time_s = time_s
         sudden = spread - least > _SUDDEN and time_s - self._start_s > _SETTLED_S
-        if share > self._largest_share or sudden:
+        if share > self._largest_share or (sudden and not match):
             return time_s - self._steady_s
         self._steady_s, self._steady_spread = time_s, least_recent
         return 0.0
+
+    def skip(self, time_s: float) -> None:
+        """A picture that cannot be compared with the scene says nothing."""
+        self._time_s = self._steady_s = time_s
 
 
 @kernel

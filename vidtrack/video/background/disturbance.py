@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack import plane
 from vidtrack.config import DisturbanceSettings
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Ints
+from vidtrack.video.background.camera import Camera
+from vidtrack.video.background.canvas import lay, mark_unseen, settled
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, veil
 from vidtrack.video.background.exposure import follow_gain
@@ -33,10 +37,11 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
-    STATE = ("_view", "_change", "_scene", "_time_s", "_start_s", "_frames", "_contrast", "_veil")
+    STATE = ("_view", "_change", "_camera", "_scene", "_time_s", "_start_s", "_frames", "_contrast", "_veil")
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
+        self._camera = Camera(settings.still_s)
         self._view = view
         self._thresholds = tuple(
             np.float32(level) for level in (settings.luma_threshold, settings.noise_factor, settings.chroma_threshold)
@@ -47,48 +52,75 @@ class Disturbance:
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
+        self._changed_s = 0.0  # how long the picture has been another one
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box (K, 4) [source px] is never absorbed into the scene."""
-        s = self._settings
+        """Foreground of `frame`; what covers a `known` box (K, 4) [scene px] is never absorbed into the scene."""
         picture = smooth(self._view.reduce(frame))
         if not self._scene.luma.size:
             self._scene = self._start(picture, frame.time_s)
-        scene = self._scene
         dt, self._time_s = frame.time_s - self._time_s, frame.time_s
         if dt > _GAP_S:
             self._start_s = frame.time_s
+        known = self._camera.on_canvas(known, self._view.step)
+        if self._settings.registration:
+            self._scene = self._camera.follow(picture.luma, self._scene, known, frame.time_s)
+        if self._camera.lost_s > 0:
+            self._changed_s = self._camera.lost_s
+            self._change.skip(frame.time_s)
+            mask, strength = np.zeros_like(picture.luma), np.zeros(picture.luma.shape, np.float32)
+        elif self._camera.moves:
+            laid, span = lay(picture, self._camera.motion, self._scene)
+            mask, strength = self._map(laid, known, dt, span)
+        else:
+            mask, strength = self._map(picture, known, dt)
+        if not self._camera.trusted:
+            mask = np.zeros_like(mask)
+        place, motion = self._camera.place, self._camera.motion
+        if self._changed_s > self._settings.relearn_s:
+            self._scene = self._start(picture, frame.time_s)
+        return replace(self._view.foreground(mask, strength, place, motion), warnings=self._camera.warnings())
 
+    def _map(
+        self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
+    ) -> tuple[Image, NDArray[np.float32]]:
+        """Mask and strength; what is free is learnt. The mask is empty while the whole picture changes.
+
+        span  (h, 2) columns from which to which the picture shows each row of the canvas; None: all of it
+        """
+        s, scene = self._settings, self._scene
         if s.exposure:
             follow_gain(picture, scene, np.float32(self._view.black))
         strength, hit = self._disturbed(picture, scene)
         mask = np.empty_like(hit)
         majority(hit, s.majority_px, mask)
-        changed_s = self._change.lasted_s(mask, frame.time_s)
-        if changed_s > 0:
-            if changed_s > s.relearn_s:
-                self._scene = self._start(picture, frame.time_s)
-            return self._view.foreground(np.zeros_like(mask), strength)
+        self._changed_s = self._change.lasted_s(mask, self._time_s, self._camera.fits)
+        if self._changed_s > 0:
+            return np.zeros_like(mask), strength
         if s.holes:
             fill_holes(mask)
-        spare(scene.covered_s, known / self._view.step, _KNOWN_S)
+        spare(scene.covered_s, known, _KNOWN_S)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
-        self._learn(picture, scene, mask, hit, dt)
-        if math.floor(frame.time_s) != math.floor(frame.time_s - dt):  # once a second is often enough
+        self._learn(picture, scene, mask, hit, dt, span)
+        if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
             self._contrast = contrast(scene.luma)
             self._veil = min(self._veil + _LIFT, veil(picture.luma))
             self._absorb(picture, scene, hit)
-        return self._view.foreground(mask, strength)
+        return mask, strength
 
     def scene(self) -> Image:
-        """(H, W, 3) the learnt scene in source size, blue-green-red."""
-        return self._view.enlarge(Picture(*self._scene[:3]))
+        """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
+        scene = self._scene
+        if not self._camera.at_home:
+            scene = settled(scene, plane.inverse(self._camera.place), self._view.reduced)
+        return self._view.enlarge(Picture(*scene[:3]))
 
     def _start(self, picture: Picture, time_s: float) -> Scene:
         self._time_s = self._start_s = time_s
         self._frames = 0
         self._change.restart(time_s)
+        self._camera.restart()
         scene = start(picture)
         self._contrast, self._veil = contrast(scene.luma), veil(picture.luma)
         return scene
@@ -117,12 +149,14 @@ class Disturbance:
         adopt(picture, scene, row, begin, end)
         paint(mask, row, begin, end, 0)
 
-    def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float) -> None:
+    def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, span: Ints | None) -> None:
         """Average what is neither foreground, nor close to it, nor shadow."""
         s = self._settings
-        covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask
+        covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask.copy()
         if not s.selective:
             covered = hit = np.zeros_like(mask)
+        if span is not None:
+            mark_unseen(covered, span)
         self._frames += 1
         weight = -math.expm1(-dt / s.learn_s)
         if self._time_s - self._start_s < _FIRST_S:

@@ -9,7 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack import plane
 from vidtrack.errors import Error
+from vidtrack.scan import Floats
 from vidtrack.video.background.filters import LARGEST_STEP, area_average, smoothed
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -54,6 +56,11 @@ class View:
             raise Error("there is no scene before the first frame; call apply first")
         return self._shape
 
+    @property
+    def reduced(self) -> tuple[int, int]:
+        """(h, w) of the processed picture. Raises Error before the first frame."""
+        return reduced_shape(self.shape, self.step)
+
     def reduce(self, frame: Frame) -> Picture:
         """The frame's planes as area averages of step x step pixels."""
         if self._shape is None:
@@ -63,13 +70,39 @@ class View:
             self.black = 0 if frame.full_range else _VIDEO_BLACK
         return reduce(frame, self.step)
 
-    def foreground(self, mask: Image, strength: NDArray) -> Foreground:
-        """The mask (h, w), 0 and 255, cleared where `keep` is dark, with strength (h, w) and step."""
+    def foreground(
+        self, mask: Image, strength: NDArray, place: Floats = plane.IDENTITY, motion: Floats = plane.IDENTITY
+    ) -> Foreground:
+        """The mask (h, w), 0 and 255, cleared where `keep` is dark, with strength (h, w), and where both are.
+
+        place, motion  (2, 3) from the mask to the scene and to the picture [processed px]
+        """
         if self._keep is not None:
-            h, w = mask.shape
+            h, w = self.reduced
             keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)
+            if keep.shape != mask.shape or not np.array_equal(place, plane.IDENTITY):
+                back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
+                keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
             mask = np.where(keep > 127, mask, np.uint8(0))
-        return Foreground(mask, strength, self.step)
+        return Foreground(mask, strength, self.step, *self._views(place, motion))
+
+    def _views(self, place: Floats, motion: Floats) -> tuple[Floats | None, Floats | None, Floats]:
+        """From the mask to the scene and from there to the picture, None where they are the same, and where in the
+        scene the picture is (4,): left, top, right, bottom; all in source px.
+        """
+        h, w = (side * self.step for side in self.reduced)
+        if np.array_equal(place, plane.IDENTITY) and np.array_equal(motion, plane.IDENTITY):
+            return None, None, np.array([0.0, 0.0, w, h])
+        to_scene = plane.rescaled(place, self.step)
+        to_picture = plane.after(plane.rescaled(motion, self.step), plane.inverse(to_scene))
+        upper_left, upper_right, lower_left, lower_right = (
+            plane.points(plane.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
+        )
+        inside = (
+            max(upper_left[0], lower_left[0]), max(upper_left[1], upper_right[1]),
+            min(upper_right[0], lower_right[0]), min(lower_left[1], lower_right[1]),
+        )  # fmt: skip
+        return to_scene, to_picture, np.array(inside)
 
     def enlarge(self, picture: Picture) -> Image:
         """(H, W, 3) the picture in blue, green, red at source size. Raises Error before the first frame."""
@@ -87,6 +120,13 @@ def reduction(rows: int, scale: float | None) -> int:
     return max(1, math.ceil(rows / FULL_SIZE_ROWS))
 
 
+def reduced_shape(shape: tuple[int, int], step: int) -> tuple[int, int]:
+    """(h, w) of a picture (H, W) after a reduction by step: even, if anything is reduced."""
+    if step == 1:
+        return shape
+    return 2 * (shape[0] // (2 * step)), 2 * (shape[1] // (2 * step))
+
+
 def reduce(frame: Frame, step: int) -> Picture:
     """The frame's planes as area averages of step x step pixels.
 
@@ -96,7 +136,7 @@ def reduce(frame: Frame, step: int) -> Picture:
     cb, cr = (np.empty((0, 0), np.uint8) if plane is None else plane for plane in (frame.u, frame.v))
     if step == 1:
         return Picture(frame.y, cb, cr)
-    h, w = (2 * (size // (2 * step)) for size in frame.shape)
+    h, w = reduced_shape(frame.shape, step)
     half = (h // 2, w // 2)
     cb, cr = (area_average(plane, half, step) if plane.size else plane for plane in (cb, cr))
     return Picture(area_average(frame.y, (h, w), step), cb, cr)

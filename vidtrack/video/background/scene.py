@@ -18,6 +18,8 @@ Levels = NDArray[np.float32]
 
 FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
 NEVER = np.float32(-1000)  # unlike any luminance
+UNKNOWN = np.float32(1e4)  # noise of what was never in the picture
+UNSEEN = np.uint8(1)  # value of what is covered by nothing, but outside the picture
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
 _NONE = np.float32(0)
 _STEADY = np.float32(10)  # grey levels; what covers the scene is the same as long as it changes by less
@@ -70,6 +72,7 @@ def learn(
 ) -> None:  # fmt: skip
     """One step of the running averages where covered (h, w) uint8 is 0 and hit no SHADOW; else the seconds are counted.
 
+    Where covered is UNSEEN nothing changes.
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
     """
     h, w = covered.shape
@@ -81,8 +84,9 @@ def learn(
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
             scene.luma[y, x] += (weight if free else _NONE) * d
             scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
-            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + dt
-            if not free:
+            passed = _NONE if covered[y, x] == UNSEEN else dt
+            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + passed
+            if not free and covered[y, x] != UNSEEN:
                 change = np.float32(picture.luma[y, x]) - scene.cover[y, x]
                 steady = abs(change) < max(_STEADY, _SURPRISE * noise)
                 scene.cover[y, x] += (weight if steady else np.float32(1)) * change

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack import plane
 from vidtrack.config import BlobSettings
 from vidtrack.scan import TENTATIVE, Floats, Ints, Tracks
 from vidtrack.video.blobs import Blobs, measured
@@ -26,48 +27,74 @@ _PART, _CUT_PART = 0.26, 0.11  # share of the typical box area that is a vehicle
 _OPEN = 0.72  # before a typical size is known: a region that fills less of its box may be several vehicles
 _EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
 _LEAST_PX = 60  # pixels of the mask; smaller regions have no shape
+_AT_EDGE = 1.0  # px of the mask; a region this close to the picture's edge is cut by it
 _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
+
+
+class _Measure:
+    """What the mask's pixels are in the scene, and what is typical of vehicles there."""
+
+    def __init__(self, foreground: Foreground, sizes: SizeField) -> None:
+        place = plane.IDENTITY if foreground.place is None else foreground.place
+        self._to_scene = plane.after(place, np.diag([foreground.step, foreground.step, 1.0])[:2])
+        self._to_mask = plane.inverse(self._to_scene)
+        self.sizes = sizes
+        h, w = foreground.mask.shape
+        self.edges = np.array([0.0, 0.0, w, h])
+        if foreground.surveyed is not None and foreground.place is not None:
+            self.edges = plane.points(self._to_mask, foreground.surveyed.reshape(2, 2)).ravel()
+
+    def typical(self, box: Ints | Floats) -> Floats:
+        """(N, 2) width and height [px of the mask] typical of vehicles at boxes (N, 4) there; NaN if unknown."""
+        return self.sizes.typical(plane.boxes(self._to_scene, box.astype(float))) * plane.scale(self._to_mask)
+
+    def predicted(self, box: Floats) -> Floats:
+        """Boxes (K, 4) of the scene in pixels of the mask."""
+        return plane.boxes(self._to_mask, box)
+
+    def border(self, box: Ints) -> tuple[int, int, int, int]:
+        """Which sides (left, top, right, bottom) of a box (4,) [px of the mask] the picture ends at."""
+        left, top, width, height = box
+        low, high = self.edges[:2] + _AT_EDGE, self.edges[2:] - _AT_EDGE
+        return (left < low[0], top < low[1], left + width > high[0], top + height > high[1])
 
 
 def explain(foreground: Foreground, expected: Tracks, road: Road | None, settings: BlobSettings) -> Blobs:
     """The foreground as blobs that are one vehicle each, as far as shapes, sizes and predictions tell.
 
-    expected  tracks predicted to the time of the foreground
+    expected  tracks predicted to the time of the foreground, in the scene
     """
-    step = foreground.step
-    sizes = road.sizes if road else SizeField(1, 1)
+    measure = _Measure(foreground, road.sizes if road else SizeField(1, 1))
     regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
     known = expected.status != TENTATIVE
-    vehicles = expected.box[known] / step
-    dividing = expected.box[known | (expected.age_s > _YOUNG_S)] / step
     if settings.cut:
-        regions = cut_at_necks(regions, sizes, step, foreground.mask.shape)
-    if settings.divide and sizes.known:
-        regions = divided(regions, dividing, sizes, step)
+        regions = cut_at_necks(regions, measure)
+    if settings.divide and measure.sizes.known:
+        dividing = expected.box[known | (expected.age_s > _YOUNG_S)]
+        regions = divided(regions, measure.predicted(dividing), measure)
     box = regions.boxes().astype(float)
     group, count = together(
-        box, regions.areas().astype(float), vehicles, sizes.typical(box * step) / step,
+        box, regions.areas().astype(float), measure.predicted(expected.box[known]), measure.typical(box),
         settings.join_overlap, settings.join_gap,
     )  # fmt: skip
     return measured(regions.joined(group, count), foreground, settings)
 
 
-def cut_at_necks(regions: Regions, sizes: SizeField, step: int, shape: tuple[int, ...]) -> Regions:
+def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
     """The regions, those cut that are large enough for several vehicles and have necks between them."""
     box, area = regions.boxes(), regions.areas()
-    typical = sizes.typical(box.astype(float) * step) / step
+    typical = measure.typical(box)
     large = (box[:, 2:] > _LARGE * typical).any(axis=1)
     hollow = np.isnan(typical[:, 0]) & (area < _OPEN * box[:, 2] * box[:, 3])
     for i in np.flatnonzero((large | hollow) & (area >= _LEAST_PX)):
-        left, top, width, height = box[i]
-        border = (left == 0, top == 0, left + width == shape[1], top + height == shape[0])
+        border = measure.border(box[i])
         inside = patch(regions, i, box[i])
         if large[i]:
             least = typical[i] * np.sqrt(_CUT_PART if any(border) else _PART)
             cut = _cut(inside, border, _NECK, least, box[i])
             if cut.count < 2:
                 cut = _cut(inside, border, _SHALLOW, least, box[i])
-                if not _likelier(cut, box[i], typical[i], sizes):
+                if not _likelier(cut, box[i], typical[i], measure.sizes):
                     continue
         else:
             cut = _cut(inside, border, _NECK, np.ones(2), box[i])
@@ -101,14 +128,13 @@ def _alike(cut: Regions) -> bool:
     return bool((whole >= _EQUAL * whole.max()).all() and (cut.areas() > _FULL * whole).all())
 
 
-def divided(regions: Regions, predicted: Floats, sizes: SizeField, step: int) -> Regions:
+def divided(regions: Regions, predicted: Floats, measure: _Measure) -> Regions:
     """The regions, those divided among predicted boxes (K, 4) [px of the mask] that are too large for one vehicle.
 
     Vehicles nose to tail have no neck between them; each pixel goes to the box that it is nearest to.
     """
     box = regions.boxes()
-    typical = sizes.typical(box.astype(float) * step) / step
-    for i in np.flatnonzero((box[:, 2:] > _LARGE * typical).any(axis=1)):
+    for i in np.flatnonzero((box[:, 2:] > _LARGE * measure.typical(box)).any(axis=1)):
         label, count = nearest_box(patch(regions, i, box[i]), box[i], predicted)
         if count > 1:
             regions = regions.parted(i, of_labels(label, count, box[i]))
