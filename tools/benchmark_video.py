@@ -3,10 +3,10 @@
     VIDTRACK_DATA=... python tools/benchmark_video.py --clips DIR [--peers-in DIR] [--rows NAME ...] [--set KEY=VALUE]
 
 Rows: clips with crossings found by eye (hit/missed/false, and pooled), CDnet traffic (F of the masks, MOTA and IDF1),
-CDnet highway and PETS09 (MOTA, IDF1, switches), the simulated junction under shake (mean IDF1 at IoU 0.3; four times
-the shake at 960x720). vidtrack runs with its defaults but for --set. The scripts are MOG2 with SORT and KNN
-with ByteTrack (peers/count_lines.py) in an environment that pip makes in --peers-in, where their results are kept too;
-without --peers-in they are left out. The junctions are drawn once into --clips.
+CDnet highway and PETS09 (MOTA, IDF1, switches), the simulated junction under shake and in weather (mean IDF1 at IoU
+0.3; four times the shake at 960x720). vidtrack runs with its defaults but for --set. The scripts are MOG2 with SORT and
+KNN with ByteTrack (peers/count_lines.py) in an environment that pip makes in --peers-in, where their results are kept
+too; without --peers-in they are left out. The junctions are drawn once into --clips.
 """
 
 from __future__ import annotations
@@ -29,13 +29,26 @@ SHAKES = (0.0, 0.3, 1.0, 2.0, 4.0)
 LARGE = (960, 720)
 LOOSE = 0.3  # IoU for the simulated junction, whose people are six pixels wide
 
+CONDITIONS: dict[str, dict[str, object]] = {
+    "rain": {"weather": "rain"},
+    "snow": {"weather": "snow"},
+    "fog": {"weather": "fog"},
+    "low-sun": {"light": "low-sun"},
+    "dusk": {"light": "dusk"},
+    "night": {"light": "night"},
+    "wet-night": {"light": "night", "wet": True},
+    "rainy-night": {"weather": "rain", "light": "night"},
+    "leaves-4": {"leaves": 4.0},
+    "clock": {"clock": True},
+}
+
 Cells = dict[str, str]
 """The text of a row for each contender."""
 
 
 def main() -> None:
     """Print the table, row by row."""
-    names = (*FILES, "traffic", "highway", "pets", "junction", "junction-large")
+    names = (*FILES, "traffic", "highway", "pets", "junction", "junction-large", "conditions")
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", nargs="+", choices=(*names, "events"), default=["events", *names[len(FILES) :]])
     add_options(parser)
@@ -52,6 +65,9 @@ def main() -> None:
     for name, size in (("junction", None), ("junction-large", LARGE)):
         if name in options.rows:
             junction_rows(name, size, options, rivals)
+    for label, knobs in CONDITIONS.items() if "conditions" in options.rows else ():
+        clips = simulated(options.clips, label, range(options.seeds), **knobs)
+        print_row(label, f"IDF1, mean of {options.seeds}", mean_idf1(clips, rivals))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
