@@ -70,12 +70,13 @@ def main() -> None:
         print_row(label, f"IDF1, mean of {options.seeds}", mean_idf1(clips, rivals))
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options that the video benchmarks share."""
+def add_options(parser: argparse.ArgumentParser, *, peers: bool = True) -> None:
+    """The options that the video benchmarks share; those about the scripts where these take part."""
     parser.add_argument("--clips", type=Path, required=True, metavar="DIR", help="folder of clips that are made once")
-    parser.add_argument("--peers-in", type=Path, metavar="DIR", help="folder of the scripts' environment and results")
     parser.add_argument("--set", dest="assignments", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--events", action="store_true", help=f"print single events of {', '.join(DEVELOPMENT)}")
+    if peers:
+        parser.add_argument("--peers-in", type=Path, metavar="DIR", help="folder of the scripts' environment, results")
+        parser.add_argument("--events", action="store_true", help=f"print single events of {', '.join(DEVELOPMENT)}")
 
 
 def data_folder(parser: argparse.ArgumentParser) -> Path:
