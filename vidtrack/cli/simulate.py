@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
 RADAR = ("radar-tws", "radar-incoming", "radar-altitude", "radar-speed", "radar-crossing", "radar-unresolved")
-VIDEO_ONLY = ("fps", "size", "noise", "shake", "light_steps")
+VIDEO_ONLY = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "leaves", "clock")
+WEATHER = ("clear", "rain", "snow", "fog")
+LIGHT = ("day", "low-sun", "dusk", "night")
 RADAR_ONLY = ("snr_db", "pfa", "weibull", "glint")
 
 
@@ -42,6 +44,7 @@ Examples:
   vidtrack simulate junction -o junction
   vidtrack simulate crossing-45 -o crossing --seed 7 --fps 25
   vidtrack simulate junction -o hard --size 1280x720 --noise 5 --shake 1.5 --light-steps 2
+  vidtrack simulate junction -o rainy-night --weather rain --light night --clock
   vidtrack simulate radar-tws -o tws --seed 3 --snr-db 16""",
 )
 @click.argument("scenario", type=click.Choice(VIDEO + RADAR), metavar="SCENARIO")
@@ -51,6 +54,17 @@ Examples:
 @click.option("--noise", default=2.0, show_default=True, help="Sensor noise, standard deviation in grey levels.")
 @click.option("--shake", default=0.0, show_default=True, help="Camera shake, standard deviation in px.")
 @click.option("--light-steps", default=0, show_default=True, help="Sudden changes of the exposure.")
+@click.option("--weather", type=click.Choice(WEATHER), default="clear", show_default=True, help="Rain wets the road.")
+@click.option(
+    "--light",
+    type=click.Choice(LIGHT),
+    default="day",
+    show_default=True,
+    help="Dusk and night: vehicles have lamps on.",
+)
+@click.option("--wet", is_flag=True, help="A wet road that mirrors vehicles and lamps.")
+@click.option("--leaves", default=1.0, show_default=True, help="How far the tree's leaves swing, a factor.")
+@click.option("--clock", is_flag=True, help="Burn a running clock into the picture.")
 @click.option("--snr-db", type=float, help="Radar: mean signal to noise ratio of a target.  [default: the scenario's]")
 @click.option(
     "--pfa", type=click.FloatRange(0, 0.1), help="Radar: false alarms per resolution cell.  [default: the scenario's]"

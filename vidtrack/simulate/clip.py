@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -16,8 +16,12 @@ from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats
 from vidtrack.simulate import draw
 from vidtrack.simulate.camera import Camera, camera
+from vidtrack.simulate.clock import burn_in
+from vidtrack.simulate.conditions import Conditions, Effect
 from vidtrack.simulate.crossing import crossing, crossing_45
 from vidtrack.simulate.junction import junction
+from vidtrack.simulate.light import LOW_SUN_SHADOW
+from vidtrack.simulate.moment import Moment, Placed
 from vidtrack.simulate.nine import nine
 from vidtrack.simulate.scene import Actor, Scene
 from vidtrack.simulate.truth import Truth, in_front, truth
@@ -34,9 +38,10 @@ SCENARIOS: dict[str, Callable[[Generator], Scene]] = {
 class Clip:
     """A scene seen by a camera. Iterating gives the frames, (H, W, 3) uint8 BGR, each drawn when asked for.
 
-    fps    frames/s
-    times  (K,) time of each frame [s]
-    seed   of the textures, which are drawn at the camera's scale
+    fps         frames/s
+    times       (K,) time of each frame [s]
+    seed        of the textures, which are drawn at the camera's scale
+    conditions  weather and light
     """
 
     scene: Scene
@@ -44,6 +49,7 @@ class Clip:
     fps: float
     times: Floats
     seed: int
+    conditions: Conditions = field(default_factory=Conditions)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -63,19 +69,46 @@ class Clip:
 
     def frame(self, k: int) -> NDArray[np.uint8]:
         """Frame k, (H, W, 3) BGR."""
-        time, scale, shake = self.times[k], self.camera.scale, self.camera.shake[k]
+        time, shake = self.times[k], self.camera.shake[k]
+        moment = self._moment(k)
         picture = self._empty_street(shake)
+        for effect in self.conditions.below():
+            picture = effect(picture, moment)
         if self.scene.sun is not None:
-            for actor in self.scene.targets:
-                draw.shade(picture, draw.shadow(actor, time, self.scene.sun) * scale + shake, float(scale.mean()))
-        for actor in in_front(self.scene.targets + self.scene.props, time):
-            corners = actor.outline(np.array([time]))[0] * scale + shake
-            draw.place(picture, self._sprites[actor], self._to_picture(actor, time, shake), corners)
+            self._cast_shadows(picture, moment, self.scene.sun)
+        for placed in moment.placed:
+            draw.place(picture, placed.sprite, placed.to_picture, placed.corners)
+        for effect in self._above:
+            picture = effect(picture, moment)
         if self.camera.gain[k] != 1:
             picture = np.asarray(cv2.convertScaleAbs(picture, alpha=self.camera.gain[k]), dtype=np.uint8)
         row, col = self.camera.window[k]
         noise = self.camera.noise[row : row + self.size[1], col : col + self.size[0]]
-        return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U))
+        picture = np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), dtype=np.uint8)
+        if self.conditions.clock:
+            burn_in(picture, time, self.seed)
+        return picture
+
+    def _moment(self, k: int) -> Moment:
+        """Where everything is in frame k."""
+        time, scale, shake = self.times[k], self.camera.scale, self.camera.shake[k]
+        placed = []
+        for actor in in_front(self.scene.targets + self.scene.props, time):
+            corners = actor.outline(np.array([time]))[0] * scale + shake
+            placed.append(Placed(actor, self._sprites[actor], self._to_picture(actor, time, shake), corners))
+        return Moment(k, time, float(scale.mean()), shake, tuple(placed))
+
+    def _cast_shadows(self, picture: NDArray[np.uint8], moment: Moment, sun: tuple[float, float]) -> None:
+        """Shadows of the targets; a low sun's are harder and darker, and trees have them too."""
+        low = self.conditions.light == "low-sun"
+        softness, left = (0.5 * moment.scale, LOW_SUN_SHADOW) if low else (moment.scale, draw.SHADOW)
+        for actor in self.scene.targets + (self.scene.props if low else ()):
+            polygon = draw.shadow(actor, moment.time_s, sun) * self.camera.scale + moment.shake
+            draw.shade(picture, polygon, softness, left)
+
+    @cached_property
+    def _above(self) -> list[Effect]:
+        return self.conditions.above(self.scene, self.size, float(self.camera.scale.mean()), self.seed)
 
     def _to_picture(self, actor: Actor, time: float, shake: Floats) -> Floats:
         """The affine map (2, 3) from the actor's own frame to the picture."""
@@ -114,6 +147,11 @@ def simulate(
     noise: float = 2.0,
     shake: float = 0.0,
     light_steps: int = 0,
+    weather: str = "clear",
+    light: str = "day",
+    wet: bool = False,
+    leaves: float = 1.0,
+    clock: bool = False,
 ) -> Clip:
     """A clip of the scenario `name`: crossing, crossing-45, nine or junction.
 
@@ -123,15 +161,19 @@ def simulate(
     noise        sensor noise, standard deviation in grey levels
     shake        of the camera, standard deviation of the displacement in x and in y, px
     light_steps  sudden changes of the exposure
+    weather, light, wet, leaves, clock  as in Conditions
 
     Raises ConfigError for an unknown name or a value out of range.
     """
     _check(name, seed, fps, size, noise, shake, light_steps)
     scene_rng, camera_rng = np.random.default_rng(seed).spawn(2)
     scene = SCENARIOS[name](scene_rng)
+    conditions = Conditions(weather, light, wet, leaves, clock)
+    conditions.check(scene)
+    scene = conditions.on(scene, seed)
     times = scene.times(fps)
     view = camera(scene.size, size or scene.size, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps)
-    return Clip(scene, view, scene.fps if fps is None else fps, times, seed)
+    return Clip(scene, view, scene.fps if fps is None else fps, times, seed, conditions)
 
 
 def _check(

@@ -78,15 +78,15 @@ def place(canvas: Image, look: Sprite, to_picture: Floats, corners: Floats) -> N
     canvas[roi] = cover[..., :3] + ((below * (255 - cover[..., 3:].astype(np.uint16)) + 127) // 255).astype(np.uint8)
 
 
-def shade(canvas: Image, polygon: Floats, softness: float) -> None:
-    """Darken a polygon (V, 2) of the canvas, its edge blurred over about `softness` px."""
+def shade(canvas: Image, polygon: Floats, softness: float, left: float = SHADOW) -> None:
+    """Darken a polygon (V, 2) of the canvas to a share `left`, its edge blurred over about `softness` px."""
     roi = window(polygon, canvas, int(np.ceil(3 * softness)))
     if roi is None:
         return
     rows, cols = roi
     mask = np.zeros((rows.stop - rows.start, cols.stop - cols.start), np.float32)
     _fill(mask, polygon - (cols.start, rows.start), (1.0,))
-    light = 1 - (1 - SHADOW) * cv2.GaussianBlur(mask, (0, 0), softness)
+    light = 1 - (1 - left) * cv2.GaussianBlur(mask, (0, 0), softness)
     canvas[roi] = np.rint(canvas[roi] * light[..., None])
 
 

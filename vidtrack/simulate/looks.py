@@ -42,6 +42,7 @@ def car(length: float, width: float, colour: Colour) -> Look:
             *_lamps(x, y),
         ),
         height=0.6 * width,
+        lamps=(0.9 * x, 0.62 * y),
     )
 
 
@@ -61,6 +62,7 @@ def lorry(length: float, width: float, cab: Colour, load: Colour) -> Look:
             *_lamps(x, y)[:2],
         ),
         height=0.8 * width,
+        lamps=(0.9 * x, 0.62 * y),
     )
 
 
@@ -76,6 +78,7 @@ def motorcycle(length: float, width: float, paint: Colour, jacket: Colour) -> Lo
             Part(_ellipse(0.12 * x, 0, 0.24 * x, 0.46 * y), (225, 225, 230)),
         ),
         height=0.9 * width,
+        lamps=(0.9 * x, 0.0),
     )
 
 
@@ -105,9 +108,12 @@ def foliage(radius: float, rng: Generator) -> Look:
     return Look(parts, _hull(parts), _ellipse(0, radius, radius, 0.6 * radius), radius, upright=True)
 
 
-def _solid(parts: tuple[Part, ...], height: float) -> Look:
-    outline = _hull(parts)
-    return Look(parts, outline, outline, height)
+def _solid(parts: tuple[Part, ...], height: float, lamps: tuple[float, float]) -> Look:
+    """A vehicle; `lamps` is the place of a headlamp, mirrored to the other side and to the rear."""
+    outline, (x, y) = _hull(parts), lamps
+    sides = (-y, y) if y else (y,)
+    ahead, behind = tuple((x, side) for side in sides), tuple((-x, side) for side in sides)
+    return Look(parts, outline, outline, height, headlamps=ahead, tail_lamps=behind)
 
 
 def _lamps(x: float, y: float) -> tuple[Part, Part, Part, Part]:

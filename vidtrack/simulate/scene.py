@@ -33,6 +33,7 @@ class Look:
     base     (V, 2) convex polygon that stands on the ground
     height   px; how far the shadow reaches
     upright  seen from the side, never turned into the heading (people, trees)
+    headlamps, tail_lamps  where they are; only vehicles have some
     """
 
     parts: tuple[Part, ...]
@@ -40,6 +41,8 @@ class Look:
     base: Floats
     height: float
     upright: bool = False
+    headlamps: tuple[tuple[float, float], ...] = ()
+    tail_lamps: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,37 @@
+"""The development clips changed in known ways, vidtrack beside two scripts: hit/missed/false of each.
+
+    VIDTRACK_DATA=... python tools/benchmark_video_variants.py --clips DIR [--peers-in DIR] [--of CLIP ...]
+        [--variants NAME ...] [--set KEY=VALUE ...] [--events]
+
+Every 2nd and 3rd frame, half size, mirrored, haze, dusk, and a camera that sways by 0.5, 1 and 3 px (at 640 px of
+width). A rule that helps a clip and hurts its variants was fitted to the clip. The clips are made once, in --clips;
+--peers-in and --set are those of benchmark_video.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from benchmark_video import add_options, data_folder, event_rows, print_head
+from video_clips import DEVELOPMENT, with_events
+from video_trackers import contenders
+from video_variants import VARIANTS, derive
+
+
+def main() -> None:
+    """Print the table, row by row."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_options(parser)
+    parser.add_argument("--of", nargs="+", choices=DEVELOPMENT, default=DEVELOPMENT, metavar="CLIP")
+    parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS), metavar="NAME")
+    options = parser.parse_args()
+    data = data_folder(parser)
+    rivals = contenders(options.assignments, options.peers_in)
+    print_head(rivals)
+    clips = [with_events(name, data) for name in options.of]
+    derived = [derive(clip, name, options.clips) for name in options.variants for clip in clips]
+    event_rows(derived, rivals, [clip.name for clip in derived] if options.events else ())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""The clips of the video benchmarks: files, counting lines and truth below VIDTRACK_DATA, and simulated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import score_highway
+from score_events import Event, read_truth
+
+from vidtrack import formats
+from vidtrack.formats import Table
+from vidtrack.simulate import simulate, write
+
+DEVELOPMENT = ("street", "handheld", "tunnel")
+"""Clips whose single events may be looked at; the others are kept aside, and only their totals are printed."""
+
+FILES = {
+    "street": ("street.mp4", ("x320:320,0,320,360",)),
+    "handheld": ("handheld.mp4", ("a:230,300,620,300",)),
+    "tunnel": ("tunnel.mp4", ("left:150,140,150,245", "right:425,250,580,250")),
+    "motorway": ("motorway.avi", ("away:60,150,290,150", "towards:0,75,190,75")),
+    "uab_road": ("uab_road.avi", ("a:150,160,470,160",)),
+    "dual_carriageway": ("dual_carriageway.mp4", ("near:190,280,480,280", "far:200,110,200,235")),
+    "haze": ("haze.mp4", ("a:55,190,180,190",)),
+}
+TRAFFIC_FIRST, TRAFFIC_LAST = 900, 1235  # image numbers with truth
+
+
+def everything(result: Table, truth: Table) -> Table:
+    """All rows of a result count."""
+    return result
+
+
+def of_traffic(result: Table, truth: Table) -> Table:
+    """The rows of CDnet traffic that have truth."""
+    image = result.frame + 1
+    return result.select((image >= TRAFFIC_FIRST) & (image <= TRAFFIC_LAST))
+
+
+def of_highway(result: Table, truth: Table) -> Table:
+    """The rows of CDnet highway that count."""
+    return score_highway.judged(result, truth, 0.5)
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A video with its truth.
+
+    video   file, or a folder of pictures in%06d.jpg
+    lines   counted lines, NAME:x1,y1,x2,y2
+    events  crossings of these lines
+    truth   MOT file
+    fps     to be told where the video has no rate
+    judged  the rows of a result that are scored
+    masked  the masks are wanted too
+    """
+
+    name: str
+    video: Path
+    lines: tuple[str, ...] = ()
+    events: tuple[Event, ...] = ()
+    truth: Path | None = None
+    fps: float | None = None
+    judged: Callable[[Table, Table], Table] = field(default=everything, repr=False)
+    masked: bool = False
+
+    def scored(self, result: Table) -> tuple[Table, Table]:
+        """Result and truth as they are compared."""
+        assert self.truth is not None  # or there is nothing to compare with
+        truth = formats.read(self.truth)
+        return self.judged(result, truth), truth
+
+
+def with_events(name: str, data: Path) -> Clip:
+    """A clip whose crossings were found by eye."""
+    file, lines = FILES[name]
+    return Clip(name, data / file, lines, tuple(read_truth(data / "events" / f"{name}.csv")))
+
+
+def with_identities(data: Path) -> dict[str, Clip]:
+    """The clips whose truth is boxes with identities."""
+    traffic, highway, pets = data / "cdnet_traffic", data / "highway", data / "pets09"
+    return {
+        "traffic": Clip("traffic", traffic / "video.avi", truth=traffic / "gt_ids.txt", judged=of_traffic, masked=True),
+        "highway": Clip("highway", highway / "input", truth=highway / "gt_ids.txt", fps=25, judged=of_highway),
+        "pets": Clip("pets", pets / "video.avi", truth=pets / "gt.txt"),
+    }
+
+
+def simulated(folder: Path, label: str, seeds: Iterable[int], **knobs: Any) -> list[Clip]:
+    """The simulated junction, drawn into `folder` where it is not there yet; `label` tells the knobs apart."""
+    clips = []
+    for seed in seeds:
+        name = f"junction-{label}-{seed}"
+        place = folder / name
+        if not (place / "gt.txt").is_file():  # written last
+            place.mkdir(parents=True, exist_ok=True)
+            write(simulate("junction", seed=seed, **knobs), place)
+        clips.append(Clip(name, place / "video.avi", truth=place / "gt.txt"))
+    return clips

@@ -1,0 +1,169 @@
+"""Development clips changed in known ways, with their truth: a guard against rules that only fit the clips as they are.
+
+A variant keeps what is counted: frames, lines and directions of the truth are carried over. Written as FFV1, without
+loss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from score_events import Event
+from video_clips import Clip
+
+Picture = NDArray[np.uint8]
+SMALLEST_TOLERANCE = 4.0  # frames
+SWAY_SHARE = 0.9  # of the picture that a swaying camera sees
+OTHER_SIDE = {"left": "right", "right": "left"}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """How a clip is changed.
+
+    every   only every n-th frame
+    half    half the size
+    mirror  left and right exchanged
+    view    changes one picture; called as view(picture, rng)
+    sway    standard deviation of the camera's displacement, px at a width of 640; None: the camera stands
+    """
+
+    every: int = 1
+    half: bool = False
+    mirror: bool = False
+    view: Callable[[Picture, Generator], Picture] | None = None
+    sway: float | None = None
+
+
+def haze(picture: Picture, rng: Generator) -> Picture:
+    """Half the contrast under a bright veil, with the sensor's noise."""
+    return _noisy(0.5 * picture + 90.0, np.full((1, 1, 1), 3.0), rng)
+
+
+def dusk(picture: Picture, rng: Generator) -> Picture:
+    """A quarter of the light, with the noise of few photons."""
+    light = 0.25 * picture + 4.0
+    return _noisy(light, np.sqrt(2.0 + 0.3 * light), rng)
+
+
+def _noisy(light: NDArray, sigma: NDArray, rng: Generator) -> Picture:
+    noise = sigma * rng.standard_normal(light.shape, dtype=np.float32)
+    return np.clip(np.rint(light + noise), 0, 255).astype(np.uint8)
+
+
+VARIANTS = {
+    "every-2nd": Variant(every=2),
+    "every-3rd": Variant(every=3),
+    "half": Variant(half=True),
+    "mirror": Variant(mirror=True),
+    "haze": Variant(view=haze),
+    "dusk": Variant(view=dusk),
+    "sway-0.5": Variant(sway=0.5),
+    "sway-1": Variant(sway=1.0),
+    "sway-3": Variant(sway=3.0),
+}
+
+
+def derive(clip: Clip, name: str, folder: Path) -> Clip:
+    """The variant `name` of a clip with crossings, made in `folder` where it is not there yet."""
+    variant = VARIANTS[name]
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{clip.name}-{name}.mkv"
+    with av.open(str(clip.video)) as container:
+        stream = container.streams.video[0]
+        size, rate = (stream.width, stream.height), stream.average_rate
+    assert rate is not None  # all clips with crossings have one
+    if not path.is_file():
+        part = path.with_name(f"part-{path.name}")
+        _write(part, _pictures(clip.video, variant), rate / variant.every)
+        part.rename(path)
+    lines = tuple(_line(text, variant, size) for text in clip.lines)
+    events = tuple(_event(event, variant) for event in clip.events)
+    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=events)
+
+
+def _pictures(video: Path, variant: Variant) -> Iterator[Picture]:
+    rng = np.random.default_rng(0)
+    with av.open(str(video)) as container:
+        decoded = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
+    width = decoded[0].shape[1]
+    shifts = np.zeros((len(decoded), 2))
+    if variant.sway is not None:
+        shifts = variant.sway * width / 640 * _sway(len(decoded), rng)
+    for picture, shift in zip(decoded[:: variant.every], shifts[:: variant.every], strict=True):
+        changed: Picture = np.asarray(picture, np.uint8)
+        if variant.mirror:
+            changed = changed[:, ::-1]
+        if variant.half:
+            changed = np.asarray(cv2.resize(changed, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+        if variant.sway is not None:
+            changed = _window(changed, shift)
+        if variant.view is not None:
+            changed = variant.view(changed, rng)
+        yield changed
+
+
+def _sway(count: int, rng: Generator) -> NDArray:
+    """(count, 2) displacements of unit standard deviation: a slow random walk about the middle, and a tenth jitter."""
+    walk = np.zeros((count, 2))
+    speed = np.zeros(2)
+    for k in range(1, count):
+        speed = 0.9 * speed - 0.02 * walk[k - 1] + rng.standard_normal(2)
+        walk[k] = walk[k - 1] + speed
+    return (walk - walk.mean(axis=0)) / walk.std(axis=0) + 0.1 * rng.standard_normal((count, 2))
+
+
+def _window(picture: Picture, shift: NDArray) -> Picture:
+    """The middle of a picture, moved by `shift`, enlarged to nothing: a crop between pixels."""
+    width, height = _crop(picture.shape[1], picture.shape[0])
+    corner = _corner(picture.shape[1], picture.shape[0]) + shift
+    move = np.array([[1, 0, corner[0]], [0, 1, corner[1]]])
+    flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(picture, move, (width, height), flags=flags, borderMode=cv2.BORDER_REPLICATE))
+
+
+def _crop(width: int, height: int) -> tuple[int, int]:
+    return 2 * round(SWAY_SHARE * width / 2), 2 * round(SWAY_SHARE * height / 2)
+
+
+def _corner(width: int, height: int) -> NDArray:
+    return (np.array([width, height]) - _crop(width, height)) / 2
+
+
+def _line(text: str, variant: Variant, size: tuple[int, int]) -> str:
+    """The line where the variant has it."""
+    name, _, numbers = text.rpartition(":")
+    ends = np.array([float(number) for number in numbers.split(",")]).reshape(2, 2)
+    if variant.mirror:
+        ends[:, 0] = size[0] - ends[:, 0]
+    if variant.half:
+        ends /= 2
+    if variant.sway is not None:
+        ends -= _corner(*size)
+    return f"{name}:{','.join(f'{value:g}' for value in ends.ravel())}"
+
+
+def _event(event: Event, variant: Variant) -> Event:
+    """The crossing as the variant has it."""
+    direction = OTHER_SIDE.get(event.direction, event.direction) if variant.mirror else event.direction
+    tolerance = event.tolerance if variant.every == 1 else max(event.tolerance / variant.every, SMALLEST_TOLERANCE)
+    return replace(event, frame=event.frame / variant.every, direction=direction, tolerance=tolerance)
+
+
+def _write(path: Path, pictures: Iterator[Picture], rate: Fraction) -> None:
+    first = next(pictures)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=rate)
+        stream.height, stream.width = first.shape[:2]
+        stream.pix_fmt = "yuv420p"
+        for picture in (first, *pictures):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
+        container.mux(stream.encode())
