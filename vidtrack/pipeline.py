@@ -17,7 +17,7 @@ from vidtrack.scan import TENTATIVE, Mask, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.methods import life, rule
-from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracking.tracker import EXIT_S, Tracker
 from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
 from vidtrack.video.foreground import Background
@@ -66,6 +66,7 @@ def build_tracker(
     bounds: tuple[float, float] | None = None,
     *,
     whole: DetectionSettings | None = None,
+    pace: float = 1.0,
     explain: bool = False,
     smooth: bool = False,
 ) -> Tracker:
@@ -73,17 +74,20 @@ def build_tracker(
 
     whole    settings for stored detections, where each box is one whole object: boxes may overlap but are never
              shared, their size and score are evidence, and M hits of N confirm a track even if it does not move
+    pace     seconds of the scans' clock in a second of the settings; not 1 where the rate of the scans is assumed
     explain  keep each scan's choices, for decisions.csv and rerun
     smooth   keep what a smoother needs
     """
-    accel = settings.accel if whole is None or whole.accel is None else whole.accel
+    if whole and settings.method is None:
+        settings = settings.model_copy(update={"method": "jpda"})
+    accel = (settings.accel if whole is None or whole.accel is None else whole.accel) / pace**2
     return Tracker(
         model=ConstantVelocity(
             dim=2,
             accel=accel,
             cross=accel * settings.cross / settings.accel,
-            speed=settings.speed,
-            hold_s=settings.hold_s,
+            speed=settings.speed / pace,
+            hold_s=settings.hold_s * pace,
             per_size=True,
         ),
         associate=rule(settings),
@@ -95,8 +99,8 @@ def build_tracker(
             (whole or settings).confirm_window,
             confirm_s=0.0 if whole else settings.confirm_s,
             confirm_travel=0.0 if whole else settings.confirm_travel,
-            coast_s=settings.coast_s,
-            hidden_s=settings.hidden_s,
+            coast_s=(whole or settings).coast_s * pace,
+            hidden_s=settings.hidden_s * pace,
             coast_scans=None,
         ),
         groups=Groups(cover=settings.group_cover) if settings.merged_blobs and not whole else None,
@@ -105,7 +109,8 @@ def build_tracker(
         bounds=bounds,
         detection_probability=(whole or settings).detection_probability,
         clutter_density=settings.clutter_density,
-        box_s=(whole or settings).box_s,
+        box_s=(whole or settings).box_s * pace,
+        exit_s=EXIT_S * pace,
         explain=explain,
         smooth=smooth,
     )

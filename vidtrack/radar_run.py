@@ -15,6 +15,7 @@ from vidtrack.output.folder import begun
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.results import Results
 from vidtrack.output.sink import Step
+from vidtrack.output.linked import refuse_link
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable
@@ -50,6 +51,7 @@ class RadarRun:
     ) -> None:
         plots = read_plots(path, settings.radar)
         found = measurements(plots, settings.radar)
+        refuse_link(settings.output, "radar runs")
         tracker = build_radar_tracker(settings, found, explain=decisions or rerun is not None, seed=seed)
         self.name, self.scans = Path(path).stem, found.count
         account = {"plots": len(plots), "bad_rows": plots.bad_rows, "truncated": False}

@@ -56,12 +56,13 @@ def at_once(problem: Problem, rule: Associator, trust: Trust, confirmed: Mask, c
     else:
         shared, hides = claim(heaviest(decision))
         decision = decision.without(shared >= 0)
-    free = hides & ~_claimed(decision, count) & sure
+    free = hides & ~_claimed(decision, count)
     open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
     if np.count_nonzero(open_to_all):
-        second = _starter(rule).decide(problem.only(open_to_all))
+        second = trust.decide(_starter(rule), problem.only(open_to_all), ~confirmed, sure)
         free &= ~_claimed(second, count)
         decision = decision.joined(second)
+    free &= sure
     if not rule.gated_births:
         free[pairs.measurement] = False
     return Association(problem, decision, shared, hides, distinct(problem.scan, free))

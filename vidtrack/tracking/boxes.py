@@ -90,6 +90,30 @@ def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
     return index, share
 
 
+@kernel(error_model="numpy")
+def doubles(start: Ints, box: Floats, score: Floats, overlap: float) -> Mask:
+    """(N,) boxes (N, 4) that show an object once more: a better one of the same frame has more than `overlap` with it.
+
+    Boxes start[k]..start[k + 1] are those of frame k; overlap is intersection over union; of equal scores (N,) the
+    first is better.
+    """
+    double = np.zeros(len(box), np.bool_)
+    for k in range(len(start) - 1):
+        order = start[k] + np.argsort(-score[start[k] : start[k + 1]], kind="mergesort")
+        for n in range(len(order)):
+            a = box[order[n]]
+            for better in order[:n]:
+                b = box[better]
+                wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+                high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+                if double[better] or wide <= 0 or high <= 0:
+                    continue
+                if wide * high > overlap * (a[2] * a[3] + b[2] * b[3] - wide * high):
+                    double[order[n]] = True
+                    break
+    return double
+
+
 def longer(box: Floats) -> Floats:
     """(N,) longer sides of boxes (N, 4)."""
     return np.maximum(box[:, 2], box[:, 3])

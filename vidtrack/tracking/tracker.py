@@ -37,7 +37,7 @@ from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.sharing import Sharing
 
 EXIT_S = 0.2
-"""s; a track that is leaving over the border is deleted this long after its last evidence."""
+"""s; the time that leaving the picture takes."""
 
 
 class Tracker:
@@ -59,6 +59,7 @@ class Tracker:
                and clutter density then follow from it, and those given are ignored. None: all measurements are used
     surveyed   area [px^2 or m^2] over which the clutter is estimated; None: the picture, else the measurements' extent
     box_s      time constant [s] with which a track's box follows its blobs' boxes
+    exit_s     a track that is leaving over the border is deleted this long [s] after its last evidence
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
@@ -85,6 +86,7 @@ class Tracker:
         threshold: ThresholdController | None = None,
         surveyed: float | None = None,
         box_s: float = 0.3,
+        exit_s: float = EXIT_S,
         explain: bool = False,
         smooth: bool = False,
     ) -> None:
@@ -109,6 +111,7 @@ class Tracker:
         if not box_s > 0:
             raise ConfigError(f"box_s is {box_s}; it must be above zero")
         self.box_s = box_s
+        self.exit_s = exit_s
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
@@ -307,7 +310,7 @@ class Tracker:
             x = self.bank.x[missed]
             xy, v = x.take(self.model.position, axis=1), x.take(self.model.velocity, axis=1)
             going = self.border.leaving(absolute(register.box[missed], xy), v)
-            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > EXIT_S)
+            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > self.exit_s)
         return left
 
     def _register(self, scan: Scan, sensor: Sensor, blobs: Floats | None, free: Mask, events: list[Event]) -> Ints:
