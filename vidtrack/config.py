@@ -126,22 +126,19 @@ class DetectionSettings(_Group):
     """Stored detections (MOT det.txt); object size is the longer side of a box."""
 
     sure_score: float | None = Field(None, ge=0, le=1)
-    """share of detections, those of lowest score, that may continue tracks but start none; None: from the file (how
-    often boxes of a score are found again, and how what moves is scored)"""
+    """share of detections, those of lowest score, that may continue tracks but start none; None: from the file"""
     jitter: float | None = Field(None, gt=0)
     """object sizes; standard deviation of a box's centre; None: from the file (differences along chains of boxes)"""
     accel: float | None = Field(None, gt=0)
     """object sizes/s^2; tracker.accel for them, and in proportion tracker.cross; None: as for jitter"""
     double_overlap: float = Field(0.65, gt=0, le=1)
-    """intersection over union; of two boxes of a frame that have more, the one of lower score is left out; 1: none is"""
+    """intersection over union; of two boxes of a frame with more than that the lower score is left out; 1: none is"""
     confirm_hits: int = Field(4, ge=1, le=63)
     """M: hits within the window that confirm a track, the first one counted; confirm_s, confirm_travel do not apply"""
     confirm_window: int = Field(6, ge=1, le=63)
     """N: scans of the window"""
     detection_probability: float | None = Field(0.8, ge=0, le=1)
     """probability that a frame shows an object, tracker.detection_probability for them; None: from the tracks so far"""
-    coast_s: float = Field(2.0, ge=0)
-    """s; tracker.coast_s for them"""
     box_s: float = Field(0.05, gt=0)
     """s; time constant with which a track's box follows its detections' boxes"""
 
@@ -153,8 +150,7 @@ class TrackerSettings(_Group):
     """Object size is the longer side of a vehicle's box."""
 
     method: Method | None = None
-    """association: one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), deferred (split, mht);
-    None: gnn, of stored detections jpda"""
+    """association: one measurement (nn, gnn, sn), weights (pda, jpda, ...), late (split, mht); None: gnn, jpda of boxes"""
     n_scan: int = Field(3, ge=1, le=20)
     """scans after which split and mht decide"""
     distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"
@@ -217,7 +213,7 @@ class OutputSettings(_Group):
     smooth_lag_s: float | None = Field(None, gt=0)
     """s; how far ahead smoothing looks, rows appearing one to two times as late; None: to the end, when all appear"""
     link: bool | None = None
-    """broken tracks are joined off line and their gaps filled; not in live and radar runs; None: of stored detections"""
+    """broken tracks are joined and gaps filled, at the end; not in live and radar runs; None: of stored detections"""
     link_s: float = Field(3.0, gt=0)
     """s; longest gap between the last measurement of a track and the first of the one that goes on with it"""
     lines: tuple[str, ...] = ()

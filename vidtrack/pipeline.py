@@ -14,10 +14,11 @@ from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
 from vidtrack.scan import TENTATIVE, Mask, Tracks
+from vidtrack.tracking.border import EXIT_S
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.methods import life, rule
-from vidtrack.tracking.tracker import EXIT_S, Tracker
+from vidtrack.tracking.tracker import Tracker
 from vidtrack.video import background
 from vidtrack.video.blobs import find_blobs, join_fragments
 from vidtrack.video.foreground import Background
@@ -99,7 +100,7 @@ def build_tracker(
             (whole or settings).confirm_window,
             confirm_s=0.0 if whole else settings.confirm_s,
             confirm_travel=0.0 if whole else settings.confirm_travel,
-            coast_s=(whole or settings).coast_s * pace,
+            coast_s=settings.coast_s * pace,
             hidden_s=settings.hidden_s * pace,
             coast_scans=None,
         ),

@@ -12,10 +12,10 @@ from vidtrack.config import Settings
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import begun
+from vidtrack.output.linked import refuse_link
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.results import Results
 from vidtrack.output.sink import Step
-from vidtrack.output.linked import refuse_link
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable

@@ -55,7 +55,7 @@ def test_settings_win_over_what_the_file_tells(det):
 def test_scores_count_by_their_order_only(tmp_path):
     def scores(values):
         path = tmp_path / "det.txt"
-        path.write_text("".join(f"1,-1,0,0,9,9,{value}\n" for value in values))
+        path.write_text("".join(f"1,-1,{20 * i},0,9,9,{value}\n" for i, value in enumerate(values)))
         return next(iter(opened(path)))[2].score
 
     np.testing.assert_allclose(scores([0.1, 0.9, 0.4, 0.4]), [0.25, 1, 0.75, 0.75])
@@ -71,6 +71,17 @@ def test_methods_by_strength_need_scores_that_differ(det, method):
     det.write_text("1,-1,10,20,40,100\n2,-1,12,20,40,100\n")
     with pytest.raises(ConfigError, match=f"no scores.* {method} chooses"):
         open_detections(str(det), by_strength)
+
+
+def test_of_two_boxes_of_one_object_the_better_one_stays(det):
+    """Another box of the same object goes; that of a neighbour, who is half hidden, stays."""
+    det.write_text(
+        "1,-1,100,100,40,100,0.6\n1,-1,103,102,40,98,0.9\n1,-1,120,100,40,100,0.5\n2,-1,100,100,40,100,0.1\n"
+    )
+    boxes = [scan.z - 0.5 * scan.box[:, 2:] for _, _, scan in opened(det)]
+    np.testing.assert_allclose(boxes[0], [[103, 102], [120, 100]])
+    np.testing.assert_allclose(boxes[1], [[100, 100]])
+    assert [len(scan) for _, _, scan in opened(det, double_overlap=1.0)] == [3, 1]
 
 
 def test_seqinfo_gives_rate_size_and_length(det):

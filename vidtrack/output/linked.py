@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,8 @@ PROBABILITY = 0.999
 """Share of broken tracks whose motion and size are within the gate."""
 SIZE_SIGMA = 0.2
 """Standard deviation of the logarithm of a width or height across a gap."""
+ODDS = 5.0
+"""One object must be this many times as likely as one that begins there by chance."""
 SETTLED = 6
 """Measurements after which a new track's state is taken back to its beginning: by then its velocity is known."""
 
@@ -90,7 +93,8 @@ class Ends:
         self.time = np.array([step.time_s for step in steps])
         seen = [step.tracks.only(step.tracks.seen) for step in steps]
         at = np.repeat(np.arange(len(steps)), [len(tracks) for tracks in seen])
-        ids, x, P, box = (np.concatenate([getattr(tracks, name) for tracks in seen]) for name in ("id", "x", "P", "box"))
+        columns = ("id", "x", "P", "box")
+        ids, x, P, box = (np.concatenate([getattr(tracks, name) for tracks in seen]) for name in columns)
         self.extent = float(np.prod(np.max(box[:, :2] + box[:, 2:], axis=0) - box[:, :2].min(axis=0)))
         order = np.argsort(ids, kind="stable")
         self.id, begin, count = np.unique(ids[order], return_index=True, return_counts=True)
@@ -125,6 +129,7 @@ class Ends:
             d2[k] += nis
             cost[k] += nis + np.linalg.slogdet(S)[1] + v.shape[1] * np.log(2 * np.pi)
         limit = quantile(PROBABILITY, self.tail_x.shape[1] + ratio.shape[1])
+        cost += 2 * np.log(ODDS)
         fits = (d2 <= limit) & (cost < 0)
         start = starts(before[fits], len(self.id))
         taken = assign(start, after[fits], cost[fits], np.zeros(len(self.id)), len(self.id))
@@ -144,9 +149,7 @@ class Ends:
         variance = size.var(axis=0) + SIZE_SIGMA**2
         alike = ((size - size.mean(axis=0)) ** 2 / variance).sum(axis=1) + np.log(variance).sum()
         rate = len(self.id) / (self.extent * np.ptp(self.time))
-        return np.asarray(
-            2 * np.log(gap * rate) - len(velocity) * np.log(2 * np.pi * speed2) - alike[after]
-        )  # fmt: skip
+        return np.asarray(2 * np.log(gap * rate) - len(velocity) * np.log(2 * np.pi * speed2) - alike[after])
 
     def _moved(self, x: Floats, P: Floats, dt: float, box: Floats) -> tuple[Floats, Floats]:
         """States x (K, n), P (K, n, n) of objects with these boxes, dt seconds later or, if negative, earlier."""
@@ -165,8 +168,8 @@ class Ends:
             name[b] = name[a]
             row = steps[self.last[a]].tracks
             row = replace(row.only(row.id == self.id[a]), id=name[[a]])
-            for step in range(self.last[a] + 1, self.first[b]):
-                bridges.setdefault(step, []).append(self._bridge(row, a, b, self.time[step]))
+            for i in range(self.last[a] + 1, self.first[b]):
+                bridges.setdefault(i, []).append(self._bridge(row, a, b, self.time[i]))
         done = []
         for k, step in enumerate(steps):
             tracks = step.tracks
@@ -193,7 +196,8 @@ class Ends:
 
 
 COLUMNS = (
-    "id", "status", "x", "P", "box", "group", "group_since_s", "age_s", "travel", "existence", "measurement", "nis", "run"
+    "id", "status", "x", "P", "box", "group", "group_since_s", "age_s", "travel", "existence", "measurement", "nis",
+    "run",
 )  # fmt: skip
 
 
@@ -201,6 +205,8 @@ def _together(tracks: Tracks, more: list[Tracks]) -> Tracks:
     """The tracks with the rows of others, in the order of their ids."""
     if not more:
         return tracks
-    columns = {name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS}
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS
+    }
     joined = replace(tracks, **columns, choices=None, prior_x=None, prior_P=None, gain=None)
     return joined.only(np.argsort(joined.id, kind="stable"))

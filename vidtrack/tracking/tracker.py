@@ -26,7 +26,7 @@ from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Mask, Scan, Tracks, check_states
 from vidtrack.tracking.association import Association, at_once, deferred
 from vidtrack.tracking.births import pieces
-from vidtrack.tracking.border import Border
+from vidtrack.tracking.border import EXIT_S, Border
 from vidtrack.tracking.boxes import absolute, follow, longer
 from vidtrack.tracking.choices import choices, evidence, heaviest
 from vidtrack.tracking.forest import Deferred, Forest
@@ -35,9 +35,6 @@ from vidtrack.tracking.lifecycle import Life, LifeCycle
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.sharing import Sharing
-
-EXIT_S = 0.2
-"""s; the time that leaving the picture takes."""
 
 
 class Tracker:

@@ -11,8 +11,8 @@ import numpy as np
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config import DetectionSettings, Settings
 from vidtrack.errors import ConfigError, SourceError
-from vidtrack.formats import Table, read_mot
-from vidtrack.scan import Floats, Mask, Scan
+from vidtrack.formats import read_mot
+from vidtrack.scan import Floats, Scan
 from vidtrack.tracking.boxes import JITTER, box_scan, doubles
 from vidtrack.video.habits import Chains, Habits, habits, natural_rate
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
@@ -64,10 +64,11 @@ class Detections:
         if table.box is None or not len(table):
             raise SourceError(f"{path} holds no detections")
         order = np.argsort(table.frame, kind="stable")
-        table = table.select(order)
-        table = table.select(~_doubles(table, settings.detections.double_overlap))
-        self._frame, self._box, self._score = table.frame, table.box, _rank(table.conf)
-        self._ranked = table.conf.min() < table.conf.max()
+        frame, box, conf = table.frame[order], table.box[order], table.conf[order]
+        start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
+        single = ~doubles(start, box, conf, settings.detections.double_overlap)
+        self._frame, self._box, self._score = frame[single], box[single], _rank(conf[single])
+        self._ranked = conf.min() < conf.max()
         if settings.tracker.method in STRENGTH and not self._ranked:
             raise ConfigError(
                 f"{path} has no scores that differ, by which {settings.tracker.method} chooses; "
@@ -107,12 +108,6 @@ def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
     """The settings, what they leave open taken from the file's habits."""
     open_ones = {name: value for name, value in asdict(habits).items() if getattr(settings, name) is None}
     return settings.model_copy(update=open_ones)
-
-
-def _doubles(table: Table, overlap: float) -> Mask:
-    """(N,) doubles of a table that is sorted by frame."""
-    start = np.searchsorted(table.frame, np.arange(table.frame[0], table.frame[-1] + 2))
-    return doubles(start, table.box, table.conf, overlap)
 
 
 def _rank(score: Floats) -> Floats:
