@@ -131,8 +131,6 @@ class DetectionSettings(_Group):
     """object sizes; standard deviation of a box's centre; None: from the file (differences along chains of boxes)"""
     accel: float | None = Field(None, gt=0)
     """object sizes/s^2; tracker.accel for them, and in proportion tracker.cross; None: as for jitter"""
-    double_overlap: float = Field(0.65, gt=0, le=1)
-    """intersection over union; of two boxes of a frame with more than that the lower score is left out; 1: none is"""
     confirm_hits: int = Field(4, ge=1, le=63)
     """M: hits within the window that confirm a track, the first one counted; confirm_s, confirm_travel do not apply"""
     confirm_window: int = Field(6, ge=1, le=63)
@@ -143,14 +141,11 @@ class DetectionSettings(_Group):
     """s; time constant with which a track's box follows its detections' boxes"""
 
 
-Method = Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"]
-
-
 class TrackerSettings(_Group):
     """Object size is the longer side of a vehicle's box."""
 
-    method: Method | None = None
-    """association: one measurement (nn, gnn, sn), weights (pda, jpda, ...), late (split, mht); None: gnn, jpda of boxes"""
+    method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] | None = None
+    """association: hard (nn, gnn, sn), by weights (pda, jpda, ...), deferred (split, mht); None: gnn, of boxes jpda"""
     n_scan: int = Field(3, ge=1, le=20)
     """scans after which split and mht decide"""
     distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"

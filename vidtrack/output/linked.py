@@ -203,10 +203,9 @@ COLUMNS = (
 
 def _together(tracks: Tracks, more: list[Tracks]) -> Tracks:
     """The tracks with the rows of others, in the order of their ids."""
-    if not more:
-        return tracks
-    columns: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS
-    }
-    joined = replace(tracks, **columns, choices=None, prior_x=None, prior_P=None, gain=None)
-    return joined.only(np.argsort(joined.id, kind="stable"))
+    if more:
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS
+        }
+        tracks = replace(tracks, **columns, choices=None, prior_x=None, prior_P=None, gain=None)
+    return tracks.only(np.argsort(tracks.id, kind="stable"))

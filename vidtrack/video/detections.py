@@ -66,7 +66,7 @@ class Detections:
         order = np.argsort(table.frame, kind="stable")
         frame, box, conf = table.frame[order], table.box[order], table.conf[order]
         start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
-        single = ~doubles(start, box, conf, settings.detections.double_overlap)
+        single = ~doubles(start, box, conf)
         self._frame, self._box, self._score = frame[single], box[single], _rank(conf[single])
         self._ranked = conf.min() < conf.max()
         if settings.tracker.method in STRENGTH and not self._ranked:
