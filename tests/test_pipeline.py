@@ -117,13 +117,6 @@ def test_boxes_of_a_detector_become_tracks_with_identities():
     np.testing.assert_allclose(tracks.v, [[90, 0], [-60, 0]], atol=5)
 
 
-def test_boxes_are_associated_by_weights_unless_told_otherwise():
-    settings = load(assignments=["tracker.method=nn"])
-    for whole, associate in ((None, "GNN"), (settings.detections, "JPDA")):
-        assert type(build_tracker(TrackerSettings(), whole=whole).associate).__name__ == associate
-        assert type(build_tracker(settings.tracker, whole=whole).associate).__name__ == "NN"
-
-
 def test_stored_detections_are_seen_with_a_probability_of_their_own():
     settings = load(assignments=["tracker.detection_probability=0.7", "detections.detection_probability=0.6"])
     assert build_tracker(settings.tracker).rates.detection_probability == 0.7

@@ -5,14 +5,14 @@
 
 Detections and truth are those of VIDTRACK_DATA/mot15 (pedestrians; truth rows with conf 0 are left out),
 VIDTRACK_DATA/kitti (PointRCNN cars; truth are the labels named by --truth, everything else is background for all) and
-VIDTRACK_DATA/aicity (a junction at 10 frames/s with the boxes of three detectors; moving vehicles count, rows matched to
-a parked one at an IoU of a half are dropped, one to one).
-Ours is `vidtrack track det.txt` with its defaults for all sequences, scored by its mot.txt; --ours adds lines with other
-settings, as in --ours tracker.method=gnn,output.link=false. The peers are SORT, ByteTrack and OC-SORT of roboflow
-`trackers` and norfair, given boxes, scores and frame rate, with their own defaults; and, since their thresholds are made
-for scores from 0 to 1, once more with the threshold for new tracks (see peers/detections.py) that gives most HOTA on each
-data set, on each detector of AI City most IDF1, of the 0.1, 0.2, ... 0.9 quantiles of its scores: "best". That choice is
-made with the truth; ours is not.
+VIDTRACK_DATA/aicity (a junction at 10 frames/s with the boxes of three detectors; moving vehicles count, rows matched
+to a parked one at an IoU of a half are dropped, one to one).
+Ours is `vidtrack track det.txt` with its defaults for all sequences, scored by its mot.txt; --ours adds lines with
+other settings, as in --ours tracker.method=jpda,output.link=false. The peers are SORT, ByteTrack and OC-SORT of
+roboflow `trackers` and norfair, given boxes, scores and frame rate, with their own defaults; and, since their
+thresholds are made for scores from 0 to 1, once more with the threshold for new tracks (see peers/detections.py) that
+gives most HOTA on each data set, on each detector of AI City most IDF1, of the 0.1, 0.2, ... 0.9 quantiles of its
+scores: "best". That choice is made with the truth; ours is not.
 
 Ours was developed on one half, "developed": frames 1 to 500 of AI City with ssd512 and mask_rcnn, three sequences of
 MOT15 and those of KITTI with even numbers. The other half was looked at when all was done.

@@ -144,8 +144,8 @@ class DetectionSettings(_Group):
 class TrackerSettings(_Group):
     """Object size is the longer side of a vehicle's box."""
 
-    method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] | None = None
-    """association: hard (nn, gnn, sn), by weights (pda, jpda, ...), deferred (split, mht); None: gnn, of boxes jpda"""
+    method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] = "gnn"
+    """association: one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), deferred (split, mht)"""
     n_scan: int = Field(3, ge=1, le=20)
     """scans after which split and mht decide"""
     distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"

@@ -79,8 +79,6 @@ def build_tracker(
     explain  keep each scan's choices, for decisions.csv and rerun
     smooth   keep what a smoother needs
     """
-    if whole and settings.method is None:
-        settings = settings.model_copy(update={"method": "jpda"})
     accel = (settings.accel if whole is None or whole.accel is None else whole.accel) / pace**2
     return Tracker(
         model=ConstantVelocity(

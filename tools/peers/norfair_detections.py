@@ -1,4 +1,4 @@
-"""Run norfair over stored detections, as detections.py runs the others; started by a benchmark in norfair's environment.
+"""Run norfair over stored detections as detections.py runs the others; started by a benchmark in its environment.
 
     python norfair_detections.py FOLDER
 

@@ -85,7 +85,7 @@ def association_options(function: Function) -> Function:
         click.option(
             "--method",
             type=click.Choice(["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"]),
-            help="Association.  [default: gnn; of stored detections jpda]",
+            help="Association.  [default: gnn]",
         ),
     ):
         function = option(function)

@@ -24,7 +24,7 @@ def rule(settings: TrackerSettings) -> Associator | Deferred:
         return MHT(n_scan=settings.n_scan)
     if settings.method == "split":
         return Split(n_scan=settings.n_scan)
-    return methods.METHODS[settings.method or "gnn"]()
+    return methods.METHODS[settings.method]()
 
 
 def life(kind: str, settings: TrackerSettings, hits: int, window: int, **patience: Any) -> Life:
