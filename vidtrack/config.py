@@ -217,6 +217,10 @@ class OutputSettings(_Group):
     """tracks are smoothed: each row uses the measurements after it too; not in live runs"""
     smooth_lag_s: float | None = Field(None, gt=0)
     """s; how far ahead smoothing looks, rows appearing one to two times as late; None: to the end, when all appear"""
+    link: bool | None = None
+    """broken tracks are joined and gaps filled, at the end; not in live and radar runs; None: of stored detections"""
+    link_s: float = Field(3.0, gt=0)
+    """s; longest gap between the last measurement of a track and the first of the one that goes on with it"""
     lines: tuple[str, ...] = ()
     """counting lines, each NAME:x1,y1,x2,y2 in source pixels"""
     trail_s: float = Field(2.0, ge=0, le=60)

@@ -15,6 +15,7 @@ from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.output.sink import Step
 from vidtrack.scan import TENTATIVE, Mask, Tracks
+from vidtrack.tracking.border import EXIT_S
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.methods import life, rule
@@ -70,6 +71,7 @@ def build_tracker(
     bounds: tuple[float, float] | None = None,
     *,
     whole: DetectionSettings | None = None,
+    pace: float = 1.0,
     explain: bool = False,
     smooth: bool = False,
 ) -> Tracker:
@@ -77,17 +79,18 @@ def build_tracker(
 
     whole    settings for stored detections, where each box is one whole object: boxes may overlap but are never
              shared, their size and score are evidence, and M hits of N confirm a track even if it does not move
+    pace     seconds of the scans' clock in a second of the settings; not 1 where the rate of the scans is assumed
     explain  keep each scan's choices, for decisions.csv and rerun
     smooth   keep what a smoother needs
     """
-    accel = settings.accel if whole is None or whole.accel is None else whole.accel
+    accel = (settings.accel if whole is None or whole.accel is None else whole.accel) / pace**2
     return Tracker(
         model=ConstantVelocity(
             dim=2,
             accel=accel,
             cross=accel * settings.cross / settings.accel,
-            speed=settings.speed,
-            hold_s=settings.hold_s,
+            speed=settings.speed / pace,
+            hold_s=settings.hold_s * pace,
             per_size=True,
         ),
         associate=rule(settings),
@@ -99,8 +102,8 @@ def build_tracker(
             (whole or settings).confirm_window,
             confirm_s=0.0 if whole else settings.confirm_s,
             confirm_travel=0.0 if whole else settings.confirm_travel,
-            coast_s=settings.coast_s,
-            hidden_s=settings.hidden_s,
+            coast_s=settings.coast_s * pace,
+            hidden_s=settings.hidden_s * pace,
             coast_scans=None,
             idle_s=None if whole else 3.0,
         ),
@@ -111,7 +114,8 @@ def build_tracker(
         bounds=bounds,
         detection_probability=(whole or settings).detection_probability,
         clutter_density=settings.clutter_density,
-        box_s=(whole or settings).box_s,
+        box_s=(whole or settings).box_s * pace,
+        exit_s=EXIT_S * pace,
         explain=explain,
         smooth=smooth,
     )

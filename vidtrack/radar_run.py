@@ -12,6 +12,7 @@ from vidtrack.config import Settings
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import begun
+from vidtrack.output.linked import refuse_link
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.results import Results
 from vidtrack.output.sink import Step
@@ -50,6 +51,7 @@ class RadarRun:
     ) -> None:
         plots = read_plots(path, settings.radar)
         found = measurements(plots, settings.radar)
+        refuse_link(settings.output, "radar runs")
         tracker = build_radar_tracker(settings, found, explain=decisions or rerun is not None, seed=seed)
         self.name, self.scans = Path(path).stem, found.count
         account = {"plots": len(plots), "bad_rows": plots.bad_rows, "truncated": False}

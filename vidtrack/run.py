@@ -14,11 +14,12 @@ from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S, Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import begun, spare, withdraw
+from vidtrack.output.linked import Linked
 from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.results import Results
-from vidtrack.output.sink import Step
+from vidtrack.output.sink import Sink, Step
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
@@ -68,10 +69,12 @@ class Run:
             self._source = opened = _open(source, settings)
             stack.callback(opened.close)
             spare(opened.place, output, masks, video)
+            self._pace = opened.pace if isinstance(opened, Detections) else 1.0
             self._tracker = build_tracker(
                 settings.tracker,
                 (opened.width, opened.height),
                 whole=opened.settings if isinstance(opened, Detections) else None,
+                pace=self._pace,
                 explain=decisions or rerun is not None,
                 smooth=settings.output.smooth,
             )
@@ -119,7 +122,10 @@ class Run:
             self._results.add(CountsFile(folder / "counts.csv", counter))
         totals = counter.totals if counter else None
         plot = TrajectoryPlot(folder / "tracks.png", (source.height, source.width), scene, lines, totals)
-        sinks = smoothed_first(output, TrackTable(folder), MotFile(folder / "mot.txt"), plot)
+        sinks: tuple[Sink, ...] = (TrackTable(folder), MotFile(folder / "mot.txt"), plot)
+        if isinstance(source, Detections) if output.link is None else output.link:
+            sinks = (Linked(*sinks, motion=self._tracker.model, longest_s=output.link_s * self._pace),)
+        sinks = smoothed_first(output, *sinks)
         self._results.add(Confirmed(*sinks, hold_s=LIVE_HOLD_S if isinstance(source, Recording) else HOLD_S))
         if decisions:
             self._results.add(DecisionLog(folder / "decisions.csv"))

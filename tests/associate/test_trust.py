@@ -34,6 +34,15 @@ def test_a_low_score_starts_no_track_but_continues_one(associate):
     assert tracks.measurement.tolist() == [0]
 
 
+def test_a_low_score_takes_a_tentative_track_along_without_confirming_it():
+    """Its position counts: the next sure detection is where the unsure one led, not where the track began."""
+    scans = ([[0, 0]], [0.9]), ([[4, 0]], [0.2]), ([[8, 0]], [0.9]), ([[12, 0]], [0.9])
+    rules = {"confirm_hits": 3, "confirm_window": 5, "coast_scans": 3}
+    assert fed(tracker(**rules), *scans[:2]).measurement.tolist() == [0]
+    assert fed(tracker(**rules), *scans[:3]).status.tolist() == [Status.TENTATIVE]
+    assert fed(tracker(**rules), *scans).status.tolist() == [Status.CONFIRMED]
+
+
 def test_low_scores_confirm_no_track():
     tracks = fed(tracker(), ([[0, 0]], [0.9]), ([[0, 0]], [0.2]), ([[0, 0]], [0.2]))
     assert len(tracks) == 0

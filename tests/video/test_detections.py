@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vidtrack.config import Settings, SourceSettings, TrackerSettings
+from vidtrack.config import Settings, SourceSettings, TrackerSettings, load
 from vidtrack.errors import ConfigError, FormatError, SourceError
+from vidtrack.formats import read
+from vidtrack.run import Run
 from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.source import open_source
 
@@ -55,7 +57,7 @@ def test_settings_win_over_what_the_file_tells(det):
 def test_scores_count_by_their_order_only(tmp_path):
     def scores(values):
         path = tmp_path / "det.txt"
-        path.write_text("".join(f"1,-1,0,0,9,9,{value}\n" for value in values))
+        path.write_text("".join(f"1,-1,{20 * i},0,9,9,{value}\n" for i, value in enumerate(values)))
         return next(iter(opened(path)))[2].score
 
     np.testing.assert_allclose(scores([0.1, 0.9, 0.4, 0.4]), [0.25, 1, 0.75, 0.75])
@@ -71,6 +73,16 @@ def test_methods_by_strength_need_scores_that_differ(det, method):
     det.write_text("1,-1,10,20,40,100\n2,-1,12,20,40,100\n")
     with pytest.raises(ConfigError, match=f"no scores.* {method} chooses"):
         open_detections(str(det), by_strength)
+
+
+def test_of_two_boxes_of_one_object_the_better_one_stays(det):
+    """Another box of the same object goes; that of a neighbour, who is half hidden, stays."""
+    det.write_text(
+        "1,-1,100,100,40,100,0.6\n1,-1,103,102,40,98,0.9\n1,-1,120,100,40,100,0.5\n2,-1,100,100,40,100,0.1\n"
+    )
+    boxes = [scan.z - 0.5 * scan.box[:, 2:] for _, _, scan in opened(det)]
+    np.testing.assert_allclose(boxes[0], [[103, 102], [120, 100]])
+    np.testing.assert_allclose(boxes[1], [[100, 100]])
 
 
 def test_seqinfo_gives_rate_size_and_length(det):
@@ -129,6 +141,56 @@ def test_told_from_other_text_by_content(tmp_path, det):
     assert not is_detections(str(tmp_path / "missing.txt"))
     with pytest.raises(SourceError):
         open_source(str(tmp_path / "traffic.avi"), SourceSettings())
+
+
+def traffic(path, score=lambda s: s):
+    """A det.txt of three vehicles, one unseen for a while, each box with errors, and of strays with low scores."""
+    rng = np.random.default_rng(4)
+    lines = []
+    for k in range(80):
+        for n, (x, y, v) in enumerate([(40, 60, 4.0), (500, 160, -5.0), (60, 260, 3.0)]):
+            if (n == 2 and 30 <= k < 38) or rng.random() < 0.1:
+                continue
+            left, top = np.array([x + v * k, y]) + rng.normal(size=2)
+            lines.append((k, left, top, 40, 20, rng.uniform(0.5, 0.9)))
+        lines += [(k, *rng.uniform(0, 400, 2), 40, 20, rng.uniform(0.1, 0.5)) for _ in range(2)]
+    path.write_text("".join(f"{k + 1},-1,{x},{y},{w},{h},{score(s)}\n" for k, x, y, w, h, s in lines))
+    return path
+
+
+def result(path, output, *assignments):
+    """(N, 6) frame, id and box of the tracks of a det.txt, by the table that a run writes."""
+    with Run(str(path), load(assignments=assignments), output) as run:
+        for _ in run:
+            pass
+    table = read(output)
+    return np.column_stack([table.frame, table.id, table.box])
+
+
+def test_any_rate_that_is_assumed_gives_the_same_tracks(tmp_path, monkeypatch):
+    """Only times and speeds follow it; of what is stated instead a tracker believes that it is true."""
+    found = {}
+    for fps in (5.0, 25.0, 100.0):
+        monkeypatch.setattr("vidtrack.video.sequence.FALLBACK_FPS", fps)
+        found[fps] = result(traffic(tmp_path / "det.txt"), tmp_path / f"{fps:g}")
+    assert len(np.unique(found[25.0][:, 1])) == 3
+    for fps in (5.0, 100.0):
+        np.testing.assert_allclose(found[fps], found[25.0], atol=0.02)
+
+
+def test_any_scale_of_scores_gives_the_same_tracks(tmp_path):
+    first = result(traffic(tmp_path / "det.txt"), tmp_path / "a", "source.fps=10")
+    for n, scale in enumerate((lambda s: 1e-3 * s**3, lambda s: 100 * s - 140)):
+        other = result(traffic(tmp_path / "det.txt", scale), tmp_path / f"b{n}", "source.fps=10")
+        np.testing.assert_array_equal(first, other)
+
+
+def test_broken_tracks_of_detections_are_linked_unless_told_otherwise(tmp_path):
+    path = traffic(tmp_path / "det.txt")
+    short = ("source.fps=10", "tracker.coast_s=0.3")
+    assert len(np.unique(result(path, tmp_path / "a", *short)[:, 1])) == 3
+    assert len(np.unique(result(path, tmp_path / "b", *short, "output.link=false")[:, 1])) > 3
+    assert len(np.unique(result(path, tmp_path / "c", *short, "output.link_s=0.4")[:, 1])) > 3
 
 
 @pytest.mark.skipif("VIDTRACK_DATA" not in os.environ, reason="needs the real data: set VIDTRACK_DATA")

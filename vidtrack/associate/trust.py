@@ -15,8 +15,8 @@ from vidtrack.scan import Decision, Mask, Scan
 class Trust:
     """Detections that score at least `least` are sure; without scores all are.
 
-    Confirmed tracks choose among sure detections first and, where they get none, among the others. Only sure ones
-    start tracks, confirm them and keep them alive.
+    Tracks choose among sure detections first and, where they get none, among the others. Only sure ones start tracks,
+    confirm them and keep them alive.
     """
 
     least: float

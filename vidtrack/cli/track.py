@@ -24,6 +24,11 @@ Examples:
 @settings_options
 @tracking_options
 @smooth_option
+@click.option(
+    "--link/--no-link",
+    default=None,
+    help="Join broken tracks and fill their gaps; rows appear at the end.  [default: of stored detections]",
+)
 @click.option("--fps", type=float, metavar="N", help="True frames/s, where the input carries no times or wrong ones.")
 def command(
     source: str,

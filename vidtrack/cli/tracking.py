@@ -67,6 +67,7 @@ _SETTING = {
     "mask": "source.mask",
     "fps": "source.fps",
     "smooth": "output.smooth",
+    "link": "output.link",
 }
 
 

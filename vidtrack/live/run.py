@@ -17,6 +17,7 @@ from vidtrack.live.memory import Memory, NoStateFile, StateFile
 from vidtrack.live.outputs import Extras, Outputs, Subject
 from vidtrack.live.places import lock_extras, lock_folder
 from vidtrack.live.recorder import NoRecorder, Recorder
+from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
 from vidtrack.pipeline import build_detector, build_tracker, video_steps
@@ -56,6 +57,7 @@ class LiveRun:
         connect: Callable[[], Connection] | None = None,
     ) -> None:
         extras, live = extras or Extras(), settings.live
+        refuse_link(settings.output, "live runs")
         self._settings = settings
         self._address = parse_address(address, live.timeout_s)
         self.name = self._address.name

@@ -60,16 +60,17 @@ def at_once(
     else:
         shared, hides = claim(heaviest(decision))
         decision = decision.without(shared >= 0)
-    free = hides & ~_claimed(decision, count) & sure
+    free = hides & ~_claimed(decision, count)
     open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
     if np.count_nonzero(open_to_all):
-        second = _starter(rule).decide(problem.only(open_to_all))
+        second = trust.decide(_starter(rule), problem.only(open_to_all), ~confirmed, sure)
         free &= ~_claimed(second, count)
         decision = decision.joined(second)
     if catch is not None:
         caught = catch((heaviest(decision) < 0) & (shared < 0), free)
         shared = np.where(caught >= 0, caught, shared)
         free[caught[caught >= 0]] = False
+    free &= sure
     if not rule.gated_births:
         free[pairs.measurement] = False
     return Association(problem, decision, shared, hides, distinct(problem.scan, free))

@@ -11,6 +11,8 @@ from vidtrack.scan import Floats, Mask, Scan
 
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
+EXIT_S = 0.2
+"""s; a track that is leaving over the border is deleted this long after its last evidence."""
 SPECK = 1 / 30
 """Share of the picture's longer side; a smaller object must travel as far as one of this size to be confirmed. The
 leaves of a swaying tree are small, and a track that jumps from leaf to leaf seems to travel."""

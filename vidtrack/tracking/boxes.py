@@ -12,6 +12,11 @@ from vidtrack.scan import Floats, Ints, Mask, Scan
 JITTER = 0.05
 """Standard deviation of a box's centre, in its longer sides, where nobody measured it."""
 
+SAME = 0.65
+"""Intersection over union; two boxes of a frame that have more are of one object. Among the 40,000 boxes of MOT15 and
+KITTI 57 pairs of two objects have more than .6 and 16 more than .7; a detector that finds objects under two names gives
+a thousand in a minute."""
+
 LEAST_SIGMA_PX = 0.5
 """No detector says better where a box's centre is."""
 
@@ -115,6 +120,29 @@ def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: flo
         if index[t] >= 0 and partner[index[t]] != t:
             index[t] = -1
     return index
+
+
+@kernel(error_model="numpy")
+def doubles(start: Ints, box: Floats, score: Floats) -> Mask:
+    """(N,) boxes (N, 4) that show an object once more: a better one of the same frame, itself no double, is the SAME.
+
+    Boxes start[k]..start[k + 1] are those of frame k; of equal scores (N,) the first is better.
+    """
+    double = np.zeros(len(box), np.bool_)
+    for k in range(len(start) - 1):
+        order = start[k] + np.argsort(-score[start[k] : start[k + 1]], kind="mergesort")
+        for n in range(len(order)):
+            a = box[order[n]]
+            for better in order[:n]:
+                b = box[better]
+                wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+                high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+                if double[better] or wide <= 0 or high <= 0:
+                    continue
+                if wide * high > SAME * (a[2] * a[3] + b[2] * b[3] - wide * high):
+                    double[order[n]] = True
+                    break
+    return double
 
 
 def longer(box: Floats) -> Floats:

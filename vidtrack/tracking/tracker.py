@@ -26,7 +26,7 @@ from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Mask, Scan, Tracks, check_states
 from vidtrack.tracking.association import Association, at_once, deferred
 from vidtrack.tracking.births import pieces
-from vidtrack.tracking.border import Border
+from vidtrack.tracking.border import EXIT_S, Border
 from vidtrack.tracking.boxes import absolute, follow, longer
 from vidtrack.tracking.choices import choices, evidence, heaviest
 from vidtrack.tracking.forest import Deferred, Forest
@@ -36,9 +36,6 @@ from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.road import Road
 from vidtrack.tracking.sharing import Sharing
-
-EXIT_S = 0.2
-"""s; a track that is leaving over the border is deleted this long after its last evidence."""
 
 
 class Tracker:
@@ -61,6 +58,7 @@ class Tracker:
                and clutter density then follow from it, and those given are ignored. None: all measurements are used
     surveyed   area [px^2 or m^2] over which the clutter is estimated; None: the picture, else the measurements' extent
     box_s      time constant [s] with which a track's box follows its blobs' boxes
+    exit_s     a track that is leaving over the border is deleted this long [s] after its last evidence
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
@@ -88,6 +86,7 @@ class Tracker:
         threshold: ThresholdController | None = None,
         surveyed: float | None = None,
         box_s: float = 0.3,
+        exit_s: float = EXIT_S,
         explain: bool = False,
         smooth: bool = False,
     ) -> None:
@@ -113,6 +112,7 @@ class Tracker:
         if not box_s > 0:
             raise ConfigError(f"box_s is {box_s}; it must be above zero")
         self.box_s = box_s
+        self.exit_s = exit_s
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
@@ -321,7 +321,7 @@ class Tracker:
             x = self.bank.x[missed]
             xy, v = x.take(self.model.position, axis=1), x.take(self.model.velocity, axis=1)
             going = self.border.leaving(absolute(register.box[missed], xy), v)
-            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > EXIT_S)
+            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > self.exit_s)
         return left
 
     def _register(self, scan: Scan, sensor: Sensor, blobs: Floats | None, free: Mask, events: list[Event]) -> Ints:

@@ -13,8 +13,8 @@ from vidtrack.config import DetectionSettings, Settings
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.formats import read_mot
 from vidtrack.scan import Floats, Scan
-from vidtrack.tracking.boxes import JITTER, box_scan
-from vidtrack.video.habits import Habits, habits
+from vidtrack.tracking.boxes import JITTER, box_scan, doubles
+from vidtrack.video.habits import Chains, Habits, habits, natural_rate
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.span import Span
 from vidtrack.video.stats import SourceStats
@@ -46,6 +46,10 @@ class Detections:
     name, place, width, height, fps, frames, stats   as for Source; without seqinfo.ini the size is that of all boxes
     settings   of detections, with what the file tells in place of None
 
+    pace       seconds of the scans' clock in a second of the settings: where nobody states the rate, the boxes tell how
+               many frames a second of theirs has, and whatever rate is assumed, their tracks are the same
+
+    Doubles, boxes of an object that another box of the frame shows as well, are left out.
     z is the centre of a box, R the square of its jitter (at least LEAST_SIGMA_PX). The score is the share
     of the file's detections that do not score higher: scales differ between detectors, only the order
     counts. Where all score the same, or nothing, scans have no scores. Frames without a line are empty scans, up to
@@ -60,9 +64,11 @@ class Detections:
         if table.box is None or not len(table):
             raise SourceError(f"{path} holds no detections")
         order = np.argsort(table.frame, kind="stable")
-        self._frame, self._box = table.frame[order], table.box[order]
-        self._score = _rank(table.conf)[order]
-        self._ranked = table.conf.min() < table.conf.max()
+        frame, box, conf = table.frame[order], table.box[order], table.conf[order]
+        start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
+        single = ~doubles(start, box, conf)
+        self._frame, self._box, self._score = frame[single], box[single], _rank(conf[single])
+        self._ranked = conf.min() < conf.max()
         if settings.tracker.method in STRENGTH and not self._ranked:
             raise ConfigError(
                 f"{path} has no scores that differ, by which {settings.tracker.method} chooses; "
@@ -73,8 +79,10 @@ class Detections:
         self.place = path
         self.name = info.name or path.stem
         self.fps = untimed_rate(info, settings.source, self.stats)
-        told = habits(self._frame, self._box, self._score, self.fps, settings.tracker.hold_s)
-        self.settings = _told(settings.detections, told)
+        chains = Chains.of(self._frame, self._box, self._score)
+        rate = (natural_rate(chains) if self.stats.fps_assumed else None) or self.fps
+        self.pace = rate / self.fps
+        self.settings = _told(settings.detections, habits(chains, rate, settings.tracker.hold_s))
         right, bottom = np.ceil((self._box[:, :2] + self._box[:, 2:]).max(axis=0)).astype(int)
         self.width, self.height = info.width or int(right), info.height or int(bottom)
         length = max(info.length or 0, int(self._frame[-1]) + 1)

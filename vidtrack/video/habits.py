@@ -3,6 +3,9 @@
 A real object is found again where it was, a false one seldom: the share of boxes of a score that have a like in
 the frames next to theirs says how often that score is right. On MOT15 and KITTI detections it rises with the score
 as the share of true boxes does.
+
+Of a camera that stands still that is not enough: what a detector takes a lamp post for it takes it for in every frame.
+But nothing false drives. So what moved is real for certain, and the scores that movers have are those of real objects.
 """
 
 from __future__ import annotations
@@ -12,12 +15,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
+from vidtrack.scan import Floats, Ints, Mask
 
 REACH, ALIKE = 0.5, 1.35
 """A like: a box in the next frame within REACH of its longer side, its sides at most ALIKE times as long or short."""
 TRUSTED, BEST = 0.8, 0.9
 """A score is trusted if its boxes are found again at least TRUSTED times as often as those of rank BEST and better."""
+MOVED, STEPS = 0.5, 4
+"""A chain of at least STEPS boxes, each the next one's like, is a mover if it goes farther than MOVED of its size."""
+SELDOM = 0.1
+"""Share of the boxes of movers that may score less than is trusted."""
+PACE = 1.2
+"""Object sizes/s; speed of a typical mover (persons and cars alike), by which a rate that nobody states is told."""
+SLOWEST, FASTEST = 5.0, 60.0
+"""Frames/s; such rates lie between these."""
 LONGEST_S = 1.0
 """s; longest lag over which motion is compared."""
 ENOUGH = 30
@@ -44,21 +55,67 @@ class Habits:
     accel: float | None
 
 
-def habits(frame: Ints, box: Floats, rank: Floats, fps: float, hold_s: float) -> Habits:
-    """Habits of the detector that gave boxes (N, 4) in frames (N,), sorted by frame, with ranks (N,) in 0..1.
+@dataclass(frozen=True, slots=True)
+class Chains:
+    """Boxes in the order of frame and place, and which is which object's next.
+
+    order  (N,) of the boxes that were given
+    centre, size, rank, found   (N, 2), (N, 2), (N,), (N,) of each; found: share of the neighbouring frames with a like
+    follower  (N,) the same object's box in the next frame, -1 for none
+    mover     (N,) boxes of chains that move
+    """
+
+    centre: Floats
+    size: Floats
+    rank: Floats
+    found: Floats
+    follower: Ints
+    mover: Mask
+
+    @classmethod
+    def of(cls, frame: Ints, box: Floats, rank: Floats) -> Chains:
+        """Of boxes (N, 4) in frames (N,), sorted by frame, with ranks (N,)."""
+        centre = box[:, :2] + box[:, 2:] / 2
+        order = np.lexsort((centre[:, 0], frame))
+        frame, centre, size, rank = frame[order], centre[order], box[order, 2:], rank[order]
+        start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
+        after, before = _likes(start, centre, size, 1), _likes(start, centre, size, -1)
+        neighbours = (frame > frame[0]).astype(float) + (frame < frame[-1])
+        found = ((after >= 0).astype(float) + (before >= 0)) / np.maximum(neighbours, 1)
+        follower = np.where((after >= 0) & (before[after] == np.arange(len(after))), after, -1)
+        return cls(centre, size, rank, found, follower, _movers(follower, centre, size))
+
+    @property
+    def step(self) -> float | None:
+        """Object sizes from one frame to the next at which movers go half of their way; None where too few are seen.
+
+        Half of the way, not of the time: who waits at the lights for a minute says nothing of how fast one drives.
+        """
+        goes = np.flatnonzero(self.mover & (self.follower >= 0))
+        if len(goes) < ENOUGH:
+            return None
+        gone = self.centre[self.follower[goes]] - self.centre[goes]
+        steps = np.sort(np.hypot(*gone.T) / self.size[goes].max(axis=1))
+        way = np.cumsum(steps)
+        return float(steps[np.searchsorted(way, way[-1] / 2)])
+
+
+def natural_rate(chains: Chains) -> float | None:
+    """Frames/s at which a typical mover goes PACE; None where the boxes do not tell."""
+    step = chains.step
+    return None if step is None else float(np.clip(PACE / max(step, TINY), SLOWEST, FASTEST))
+
+
+def habits(chains: Chains, fps: float, hold_s: float) -> Habits:
+    """Habits of the detector that gave these boxes, fps frames a second.
 
     hold_s  s; correlation time of the acceleration
     """
-    centre = box[:, :2] + box[:, 2:] / 2
-    order = np.lexsort((centre[:, 0], frame))
-    frame, centre, size, rank = frame[order], centre[order], box[order, 2:], rank[order]
-    start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
-    after, before = _likes(start, centre, size, 1), _likes(start, centre, size, -1)
-    neighbours = (frame > frame[0]).astype(float) + (frame < frame[-1])
-    found = ((after >= 0).astype(float) + (before >= 0)) / np.maximum(neighbours, 1)
-    follows = (after >= 0) & (before[after] == np.arange(len(after)))
-    jitter, accel = _motion(np.where(follows, after, -1), centre, size.max(axis=1), fps, hold_s)
-    return Habits(_sure_score(rank, found), jitter, accel)
+    jitter, accel = _motion(chains.follower, chains.centre, chains.size.max(axis=1), fps, hold_s)
+    sure = _sure_score(chains.rank, chains.found)
+    if np.count_nonzero(chains.mover) >= ENOUGH:
+        sure = max(sure, float(np.quantile(chains.rank[chains.mover], SELDOM, method="higher")))
+    return Habits(sure, jitter, accel)
 
 
 def _sure_score(rank: Floats, found: Floats) -> float:
@@ -126,3 +183,27 @@ def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
                 if alike and dx * dx + dy * dy < nearest:
                     nearest, like[i] = dx * dx + dy * dy, j
     return like
+
+
+@kernel
+def _movers(follower: Ints, centre: Floats, size: Floats) -> Mask:
+    """(N,) boxes of chains of at least STEPS boxes that go farther than MOVED of their longest side."""
+    mover, begun = np.zeros(len(follower), np.bool_), np.zeros(len(follower), np.bool_)
+    for i in range(len(follower)):
+        if begun[i]:
+            continue
+        boxes, longest, j = 0, 0.0, i
+        low, high = centre[i].copy(), centre[i].copy()
+        while j >= 0:
+            begun[j] = True
+            boxes += 1
+            for axis in range(2):
+                low[axis], high[axis] = min(low[axis], centre[j, axis]), max(high[axis], centre[j, axis])
+                longest = max(longest, size[j, axis])
+            j = follower[j]
+        if boxes >= STEPS and (high[0] - low[0]) ** 2 + (high[1] - low[1]) ** 2 > (MOVED * longest) ** 2:
+            j = i
+            while j >= 0:
+                mover[j] = True
+                j = follower[j]
+    return mover

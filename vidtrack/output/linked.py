@@ -1,0 +1,211 @@
+"""Broken tracks made whole: a track that ends and one that begins a little later are one if motion and size fit."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vidtrack.associate.assignment import assign
+from vidtrack.associate.gate import quantile
+from vidtrack.config import OutputSettings
+from vidtrack.errors import ConfigError
+from vidtrack.estimate.model import Motion
+from vidtrack.output.sink import Sink, Step, close_together
+from vidtrack.scan import COASTING, Floats, Ints, Tracks, starts
+from vidtrack.tracking.boxes import absolute, longer
+
+PROBABILITY = 0.999
+"""Share of broken tracks whose motion and size are within the gate."""
+SIZE_SIGMA = 0.2
+"""Standard deviation of the logarithm of a width or height across a gap."""
+ODDS = 5.0
+"""One object must be this many times as likely as one that begins there by chance."""
+SETTLED = 6
+"""Measurements after which a new track's state is taken back to its beginning: by then its velocity is known."""
+
+
+class Linked:
+    """Passes steps on to `sinks` with broken tracks joined under the first one's id, and the gaps filled.
+
+    motion     the tracker's model, by which a track is taken on across a gap, and the next one back
+    longest_s  s; longest gap between the last measurement of the one and the first of the other
+
+    Steps with confirmed tracks wait until no track is there, or could be found again, or the end.
+    """
+
+    def __init__(self, *sinks: Sink, motion: Motion, longest_s: float) -> None:
+        self._sinks = sinks
+        self._motion = motion
+        self._longest_s = longest_s
+        self._waiting: deque[Step] = deque()
+        self._there_s = -np.inf
+
+    def step(self, step: Step) -> None:
+        """Take a step with confirmed tracks."""
+        if len(step.tracks):
+            self._there_s = step.time_s
+        elif step.time_s - self._there_s > self._longest_s:
+            self._release()
+        self._waiting.append(step)
+
+    def close(self) -> None:
+        """Pass on what waits."""
+        try:
+            self._release()
+        finally:
+            close_together(*self._sinks)
+
+    def _release(self) -> None:
+        steps = list(self._waiting)
+        self._waiting.clear()
+        for step in linked(steps, self._motion, self._longest_s):
+            for sink in self._sinks:
+                sink.step(step)
+
+
+def refuse_link(settings: OutputSettings, where: str) -> None:
+    """Raise ConfigError where tracks cannot be linked although the settings ask for it."""
+    if settings.link:
+        raise ConfigError(f"output.link has no effect in {where}: tracks are linked off line, by their boxes")
+
+
+def linked(steps: list[Step], motion: Motion, longest_s: float) -> list[Step]:
+    """The steps with broken tracks joined, gaps of at most longest_s [s] filled."""
+    if not any(step.tracks.seen.any() for step in steps):
+        return steps
+    ends = Ends(steps, motion)
+    before, after = ends.links(longest_s)
+    return ends.joined(steps, before, after) if len(before) else steps
+
+
+class Ends:
+    """Where the tracks of some steps begin and end; rows are tracks in the order of their ids.
+
+    id (T,), first and last (T,) steps with a measurement; head and tail: states x (T, n), P (T, n, n) there, and boxes
+    (T, 4) relative to the position
+    """
+
+    def __init__(self, steps: list[Step], motion: Motion) -> None:
+        self.motion = motion
+        self.time = np.array([step.time_s for step in steps])
+        seen = [step.tracks.only(step.tracks.seen) for step in steps]
+        at = np.repeat(np.arange(len(steps)), [len(tracks) for tracks in seen])
+        columns = ("id", "x", "P", "box")
+        ids, x, P, box = (np.concatenate([getattr(tracks, name) for tracks in seen]) for name in columns)
+        self.extent = float(np.prod(np.max(box[:, :2] + box[:, 2:], axis=0) - box[:, :2].min(axis=0)))
+        order = np.argsort(ids, kind="stable")
+        self.id, begin, count = np.unique(ids[order], return_index=True, return_counts=True)
+        first, last = order[begin], order[begin + count - 1]
+        settled = order[begin + np.minimum(count, SETTLED) - 1]
+        relative = absolute(box, -x[:, list(motion.position)])
+        self.first, self.last = at[first], at[last]
+        self.tail_x, self.tail_P, self.tail_box = x[last], P[last], relative[last]
+        self.head_x, self.head_P, self.head_box = x[settled], P[settled], relative[first]
+        back = self.time[self.first] - self.time[at[settled]]
+        for dt in np.unique(back):
+            rows = np.flatnonzero(back == dt)
+            moved = self._moved(self.head_x[rows], self.head_P[rows], dt, self.head_box[rows])
+            self.head_x[rows], self.head_P[rows] = moved
+
+    def links(self, longest_s: float) -> tuple[Ints, Ints]:
+        """Rows (L,) that end, and rows (L,) that go on with them at most longest_s [s] later.
+
+        One to one, of the largest summed log-likelihood ratio: one object, against another that begins by chance.
+        """
+        gap = self.time[self.first] - self.time[self.last][:, None]
+        before, after = np.nonzero((gap > 0) & (gap <= longest_s))
+        gap = gap[before, after]
+        ratio = np.log(self.head_box[after, 2:] / self.tail_box[before, 2:]) / SIZE_SIGMA
+        d2 = np.einsum("ki,ki->k", ratio, ratio)
+        cost = d2 + 2 * ratio.shape[1] * np.log(SIZE_SIGMA) + self._chance(after, gap)
+        for dt in np.unique(gap):
+            k = np.flatnonzero(gap == dt)
+            x, P = self._moved(self.tail_x[before[k]], self.tail_P[before[k]], dt, self.tail_box[before[k]])
+            v, S = self.head_x[after[k]] - x, self.head_P[after[k]] + P
+            nis = np.einsum("ki,ki->k", v, np.linalg.solve(S, v[:, :, None])[:, :, 0])
+            d2[k] += nis
+            cost[k] += nis + np.linalg.slogdet(S)[1] + v.shape[1] * np.log(2 * np.pi)
+        limit = quantile(PROBABILITY, self.tail_x.shape[1] + ratio.shape[1])
+        cost += 2 * np.log(ODDS)
+        fits = (d2 <= limit) & (cost < 0)
+        start = starts(before[fits], len(self.id))
+        taken = assign(start, after[fits], cost[fits], np.zeros(len(self.id)), len(self.id))
+        rows = np.flatnonzero(taken >= 0)
+        return rows, taken[rows]
+
+    def _chance(self, after: Ints, gap: Floats) -> Floats:
+        """(K,) twice the log density with which some track begins like rows `after` (K,) within `gap` seconds (K,).
+
+        As many begin as did, anywhere in the extent of all boxes, with any of the velocities that they have, and with
+        their sizes.
+        """
+        velocity = list(self.motion.velocity)
+        v, spread = self.head_x[:, velocity], self.head_P[:, velocity, velocity]
+        speed2 = np.median((v**2).sum(axis=1) + spread.sum(axis=1)) / len(velocity)
+        size = np.log(self.head_box[:, 2:])
+        variance = size.var(axis=0) + SIZE_SIGMA**2
+        alike = ((size - size.mean(axis=0)) ** 2 / variance).sum(axis=1) + np.log(variance).sum()
+        rate = len(self.id) / (self.extent * np.ptp(self.time))
+        return np.asarray(2 * np.log(gap * rate) - len(velocity) * np.log(2 * np.pi * speed2) - alike[after])
+
+    def _moved(self, x: Floats, P: Floats, dt: float, box: Floats) -> tuple[Floats, Floats]:
+        """States x (K, n), P (K, n, n) of objects with these boxes, dt seconds later or, if negative, earlier."""
+        F = self.motion.transition(dt, x)
+        Q = self.motion.process_noise(abs(dt), x, P, np.zeros(len(x), np.int64), longer(box))
+        noisy = F @ (P + Q) @ np.swapaxes(F, 1, 2) if dt < 0 else F @ P @ np.swapaxes(F, 1, 2) + Q
+        return (F @ x[:, :, None])[:, :, 0], noisy
+
+    def joined(self, steps: list[Step], before: Ints, after: Ints) -> list[Step]:
+        """The steps with rows `after` (L,) under the ids of rows `before` (L,), and with rows in the gaps."""
+        name, begins, ends = self.id.copy(), np.zeros(len(self.id), np.int64), np.full(len(self.id), len(steps))
+        begins[after], ends[before] = self.first[after], self.last[before]
+        bridges: dict[int, list[Tracks]] = {}
+        for k in np.argsort(self.first[after], kind="stable"):
+            a, b = int(before[k]), int(after[k])
+            name[b] = name[a]
+            row = steps[self.last[a]].tracks
+            row = replace(row.only(row.id == self.id[a]), id=name[[a]])
+            for i in range(self.last[a] + 1, self.first[b]):
+                bridges.setdefault(i, []).append(self._bridge(row, a, b, self.time[i]))
+        done = []
+        for k, step in enumerate(steps):
+            tracks = step.tracks
+            rows = np.searchsorted(self.id, tracks.id).clip(max=len(self.id) - 1)
+            known = self.id[rows] == tracks.id
+            stays = ~known | ((begins[rows] <= k) & (k <= ends[rows]))
+            tracks = replace(tracks, id=np.where(known, name[rows], tracks.id)).only(stays)
+            done.append(replace(step, tracks=_together(tracks, bridges.get(k, []))))
+        return done
+
+    def _bridge(self, row: Tracks, a: int, b: int, t: float) -> Tracks:
+        """The last row of track a, made one at t [s] in its gap before track b: by what both ends say of it."""
+        ahead, back = t - self.time[self.last[a]], t - self.time[self.first[b]]
+        x0, P0 = self._moved(self.tail_x[[a]], self.tail_P[[a]], ahead, self.tail_box[[a]])
+        x1, P1 = self._moved(self.head_x[[b]], self.head_P[[b]], back, self.head_box[[b]])
+        share = P0 @ np.linalg.inv(P0 + P1)
+        x, P = x0 + (share @ (x1 - x0)[:, :, None])[:, :, 0], P0 - share @ P0
+        box = self.tail_box[[a]] + ahead / (ahead - back) * (self.head_box[[b]] - self.tail_box[[a]])
+        return replace(
+            row, t=t, status=np.array([COASTING], np.int8), x=x, P=(P + np.swapaxes(P, 1, 2)) / 2,
+            box=absolute(box, x[:, list(self.motion.position)]), age_s=row.age_s + ahead,
+            measurement=np.array([-1]), nis=np.array([np.nan]),
+        )  # fmt: skip
+
+
+COLUMNS = (
+    "id", "status", "x", "P", "box", "group", "group_since_s", "age_s", "travel", "existence", "measurement", "nis",
+    "run",
+)  # fmt: skip
+
+
+def _together(tracks: Tracks, more: list[Tracks]) -> Tracks:
+    """The tracks with the rows of others, in the order of their ids."""
+    if more:
+        columns: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS
+        }
+        tracks = replace(tracks, **columns, choices=None, prior_x=None, prior_P=None, gain=None)
+    return tracks.only(np.argsort(tracks.id, kind="stable"))
