@@ -27,7 +27,9 @@ def rule(settings: TrackerSettings) -> Associator | Deferred:
     return methods.METHODS[settings.method]()
 
 
-def life(kind: str, settings: TrackerSettings, hits: int, window: int, *, idle_s: float | None = None, **patience: Any) -> Life:
+def life(
+    kind: str, settings: TrackerSettings, hits: int, window: int, *, idle_s: float | None = None, **patience: Any
+) -> Life:
     """The rules of confirmation and deletion by their name: m-of-n as given, or llr, the score.
 
     patience  what both have in common: confirm_s, confirm_travel, coast_s, hidden_s, coast_scans

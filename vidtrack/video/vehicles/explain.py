@@ -7,6 +7,8 @@ import numpy as np
 from vidtrack import plane
 from vidtrack.config import BlobSettings
 from vidtrack.scan import TENTATIVE, Floats, Ints, Tracks
+from vidtrack.tracking.road import Road
+from vidtrack.tracking.sizes import SizeField
 from vidtrack.video.blobs import Blobs, measured
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Image
@@ -14,8 +16,6 @@ from vidtrack.video.regions import Regions, find_regions, of_labels, patch
 from vidtrack.video.vehicles.fragments import together
 from vidtrack.video.vehicles.nearest import nearest_box
 from vidtrack.video.vehicles.necks import parts
-from vidtrack.tracking.road import Road
-from vidtrack.tracking.sizes import SizeField
 
 _LARGE = 1.3  # typical widths or heights from which on a region may be several vehicles
 _NECK = 0.5  # half width of a neck as a share of the smaller part's
