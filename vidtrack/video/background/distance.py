@@ -12,7 +12,7 @@ from vidtrack.video.frame import Image
 _ONE = np.float32(1)
 _CLEAR = 40.0  # grey levels over two pixels; one pixel in a hundred of a scene in clear light has a steeper edge
 _STEEP = 99.0  # percent
-_LEAST = 0.5  # of the threshold in clear light
+LEAST_CONTRAST = 0.5  # of the threshold in clear light
 _DARKEST = 0.5  # percent of the pixels
 _DARK_PAINT = 10.0  # grey levels; tyres are not quite black
 _ROWS = 4  # every so many are looked at
@@ -22,7 +22,7 @@ def contrast(luma: Levels) -> np.float32:
     """How much of its contrast haze or darkness leaves to the scene (h, w), 0.5..1: vehicles lose as much."""
     rows = luma[::_ROWS]
     edges = np.abs(rows[:, 2:] - rows[:, :-2])
-    return np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, _LEAST), 1.0)) if edges.size else _ONE
+    return np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
 
 
 def veil(luma: Image) -> float:

@@ -15,7 +15,7 @@ from vidtrack.scan import Floats, Ints
 from vidtrack.video.background.camera import Camera
 from vidtrack.video.background.canvas import lay, mark_unseen, settled
 from vidtrack.video.background.change import Change
-from vidtrack.video.background.distance import contrast, disturbance, veil
+from vidtrack.video.background.distance import LEAST_CONTRAST, contrast, disturbance, veil
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
@@ -126,6 +126,12 @@ class Disturbance:
         return scene
 
     @property
+    def _black(self) -> np.float32:
+        """Luminance of black as it is seen: haze lifts it where it takes contrast away."""
+        lift = max(0.0, self._veil - self._view.black) * (1 - self._contrast) / (1 - LEAST_CONTRAST)
+        return np.float32(self._view.black + lift)
+
+    @property
     def _unsure(self) -> bool:
         return self._time_s - self._start_s < _UNSURE_S
 
@@ -138,7 +144,7 @@ class Disturbance:
         floor, factor, chroma = self._thresholds
         disturbance(seen, scene, floor * self._contrast, factor, chroma, strength, hit)
         if s.shadow:
-            mark_shadow(seen, scene, np.float32(max(self._view.black, self._veil)), hit)
+            mark_shadow(seen, scene, self._black, hit)
             reclaim(hit)
         return strength, hit
 
