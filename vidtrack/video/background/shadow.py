@@ -66,8 +66,8 @@ def _texture_error(luma: Image, scene: Levels, y: int, x: int, r: np.float32) ->
 def reclaim(hit: Image) -> None:
     """Set hit (h, w) uint8 from SHADOW back to 1 where the vehicle is seen on at least three of four sides.
 
-    Dark paint passes for shadow, but shadow lies beside a vehicle and not amid it. A side shows the vehicle if a line of
-    hits leads to a pixel that is not shadow.
+    Dark paint passes for shadow, but shadow lies beside a vehicle and not amid it. A side shows the vehicle if a line
+    of hits leads to a pixel that is not shadow.
     """
     row, start, stop = find_runs(hit, False)
     h = len(hit)
