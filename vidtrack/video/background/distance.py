@@ -26,14 +26,14 @@ def contrast(luma: Levels) -> np.float32:
     return np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, _LEAST), 1.0)) if edges.size else _ONE
 
 
-def veil(luma: Image) -> float:
+def veil(luma: Image) -> float | None:
     """Luminance that haze adds to black: what is darkest in a picture (h, w) with traffic is black without it.
 
-    0 where the darkest does not stand out from the rest: the picture shows nothing black, and tells nothing of haze.
+    None where the darkest does not stand out from the rest: the picture shows nothing black, and tells nothing of haze.
     """
     dark, low, median, high = np.percentile(luma[::_ROWS], (_DARKEST, 25, 50, 75))
     if median - dark < _STANDS_OUT * (high - low):
-        return 0.0
+        return None
     return max(float(dark) - _DARK_PAINT, 0.0)
 
 
