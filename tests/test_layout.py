@@ -36,6 +36,7 @@ FLOORS = (
     "scan",
     "explain",
     "config",
+    "settings",
     "toml_file",
     "state",
     "errors",

@@ -12,17 +12,16 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
 from vidtrack.errors import ConfigError
+from vidtrack.settings.group import Group
+from vidtrack.settings.live import LiveSettings as LiveSettings
+from vidtrack.settings.radar import RadarSettings as RadarSettings
 from vidtrack.toml_file import read_toml
 
 
-class _Group(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
-
-
-class SourceSettings(_Group):
+class SourceSettings(Group):
     start_s: float = Field(0.0, ge=0)
     """s; frames before this media time are skipped"""
     end_s: float | None = Field(None, ge=0)
@@ -43,7 +42,7 @@ class SourceSettings(_Group):
         return end_s
 
 
-class DisturbanceSettings(_Group):
+class DisturbanceSettings(Group):
     """The robust map; lengths are pixels of the processed picture (see source.scale), levels are 0..255."""
 
     luma_threshold: float = Field(15.0, gt=0, le=255)
@@ -95,7 +94,7 @@ class DisturbanceSettings(_Group):
         return value
 
 
-class PaperSettings(_Group):
+class PaperSettings(Group):
     """The map exactly as paper 004 has it."""
 
     weight: float = Field(0.1, gt=0, le=1)
@@ -106,14 +105,14 @@ class PaperSettings(_Group):
     """both darker and brighter than the average; false: brighter only"""
 
 
-class DetectorSettings(_Group):
+class DetectorSettings(Group):
     kind: Literal["disturbance", "paper", "mog2", "knn"] = "disturbance"
     """how the foreground is found"""
     disturbance: DisturbanceSettings = DisturbanceSettings()
     paper: PaperSettings = PaperSettings()
 
 
-class BlobSettings(_Group):
+class BlobSettings(Group):
     """Connected regions of the foreground, as measurements."""
 
     min_area_share: float = Field(1e-4, ge=0, le=1)
@@ -132,7 +131,7 @@ class BlobSettings(_Group):
     """standard deviation of the centroid per standard deviation of the blob's extent, in its direction; it lasts"""
 
 
-class DetectionSettings(_Group):
+class DetectionSettings(Group):
     """Stored detections (MOT det.txt); object size is the longer side of a box."""
 
     sure_score: float | None = Field(None, ge=0, le=1)
@@ -151,7 +150,7 @@ class DetectionSettings(_Group):
     """s; time constant with which a track's box follows its detections' boxes"""
 
 
-class TrackerSettings(_Group):
+class TrackerSettings(Group):
     """Object size is the longer side of a vehicle's box."""
 
     method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] = "gnn"
@@ -212,7 +211,7 @@ class TrackerSettings(_Group):
         return window
 
 
-class OutputSettings(_Group):
+class OutputSettings(Group):
     smooth: bool = False
     """tracks are smoothed: each row uses the measurements after it too; not in live runs"""
     smooth_lag_s: float | None = Field(None, gt=0)
@@ -233,89 +232,7 @@ class OutputSettings(_Group):
     """s; least time between the pictures of a rerun recording, for long runs; 0: every frame"""
 
 
-class RadarSettings(_Group):
-    """Radar plots: metres, seconds, degrees; x east, y north, z up, azimuth clockwise from north."""
-
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """m; x, y, z of the radar, added to what it measures in range and azimuth"""
-    sigma_range_m: float = Field(50.0, gt=0)
-    """m; standard deviation of a range where the file has no column sigma_range_m"""
-    sigma_azimuth_deg: float = Field(0.3, gt=0, le=45)
-    """degrees; the same of an azimuth"""
-    sigma_elevation_deg: float = Field(0.3, gt=0, le=45)
-    """degrees; the same of an elevation"""
-    sigma_position_m: float = Field(50.0, gt=0)
-    """m; the same of x, y and z"""
-    sigma_doppler_m_s: float = Field(2.0, gt=0)
-    """m/s; the same of a range rate"""
-    skip_bad_rows: bool = False
-    """rows that cannot be right are left out and counted; false: they end the run"""
-    estimator: Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"] = "kalman"
-    """kalman, converted: plots become unbiased positions; ekf, ukf, particle: range and angles stay; imm: two models"""
-    model: Literal["cv", "ca", "singer", "ct"] = "cv"
-    """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
-    detection_probability: float | None = Field(0.9, gt=0, lt=1)
-    """probability that a scan shows a target; None: from the tracks so far"""
-    clutter_density: float | None = Field(None, gt=0)
-    """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from what the tracks leave"""
-    max_speed: float = Field(400.0, gt=0)
-    """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
-    accel: float = Field(8.0, gt=0)
-    """m/s^2; standard deviation of a target's acceleration"""
-    hold_s: float = Field(4.0, gt=0)
-    """s; correlation time of the acceleration"""
-    quiet_accel: float = Field(1.0, gt=0)
-    """m/s^2; standard deviation of the acceleration in imm's quiet mode; its other mode is radar.model"""
-    quiet_s: float = Field(60.0, gt=0)
-    """s; mean time that imm's quiet mode lasts"""
-    manoeuvre_s: float = Field(15.0, gt=0)
-    """s; mean time that imm's other mode lasts"""
-    particles: int = Field(2000, ge=2)
-    """samples of each track in the particle filter"""
-    resampling: Literal["none", "multinomial", "residual", "stratified", "systematic", "error-signal"] = "systematic"
-    """how particles are resampled; none: never; error-signal: near the plot (paper 003)"""
-    glint: float = Field(0.0, ge=0, lt=1)
-    """share of a plot's errors that are five times as large, for the particle filter"""
-    euclidean_radius_m: float = Field(2000.0, gt=0)
-    """m; gate of the euclidean distance"""
-    life: Literal["m-of-n", "llr"] = "llr"
-    """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
-    coast_scans: int = Field(5, ge=1, le=62)
-    """a track is given up after this many scans without a plot"""
-    trail_s: float = Field(60.0, ge=0)
-    """s; how far back the trail behind a target reaches in rerun"""
-
-
-class LiveSettings(_Group):
-    """Cameras and streams."""
-
-    timeout_s: float = Field(5.0, gt=0, le=300)
-    """s; opening or reading that takes longer is given up and begun anew"""
-    backoff_s: float = Field(1.0, gt=0)
-    """s; pause before the second attempt to connect, doubled with every further one"""
-    backoff_longest_s: float = Field(30.0, gt=0)
-    """s; longest pause between two attempts"""
-    roll_s: float | None = Field(None, gt=0)
-    """s; by the clock, after which results go on in a new sub-folder; None: never, or hourly if live.keep_* is set"""
-    keep_s: float | None = Field(None, gt=0)
-    """s; sub-folders that are older are deleted; None: none are"""
-    keep_bytes: float | None = Field(None, ge=1e6)
-    """bytes that results and recordings may take together; the oldest are deleted; None: no limit"""
-    every_frame: bool = False
-    """every frame is tracked, and a tracker that is too slow falls behind; false: the newest one, others are dropped"""
-    ffmpeg: tuple[str, ...] = ()
-    """NAME=VALUE options for opening, such as rtsp_transport=udp, video_size=1280x720 or input_format=mjpeg"""
-
-    @field_validator("ffmpeg")
-    @classmethod
-    def _name_and_value(cls, options: tuple[str, ...]) -> tuple[str, ...]:
-        for option in options:
-            if not option.partition("=")[1]:
-                raise ValueError(f"{option!r} is not NAME=VALUE")
-        return options
-
-
-class Settings(_Group):
+class Settings(Group):
     """Everything that a run can be told."""
 
     source: SourceSettings = SourceSettings()

@@ -148,7 +148,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
 
 
 def has_driven(tracks: Tracks) -> Mask:
-    """(T,) confirmed tracks that have travelled farther than three times their size.
+    """(T,) confirmed tracks that have travelled farther than one and a half times their size.
 
     A ghost, the mark that a departed vehicle leaves in the scene, never does, and must not be kept from being absorbed.
     """

@@ -82,16 +82,16 @@ def test_three_vehicles_in_one_blob_come_out_as_three():
 
 
 def test_a_blob_that_swallows_a_car_for_good_does_not_keep_it_alive():
-    """A car drives behind a standing lorry and stays there: nothing in the picture is evidence for it."""
+    """A car drives behind a lorry that stopped and stays there: nothing in the picture is evidence for it."""
 
     def scene(t):
-        lorry = centred(220, 120, 80, 60)
+        lorry = centred(min(100 + 60 * t, 220), 120, 80, 60)
         car = centred(min(20 + 50 * t, 220), 120, 24, 14)
         return [lorry, car]
 
     tracker = default_tracker(confirm_travel=0.0, coast_s=1.0)
     seen = play(tracker, scene, 9.0)
-    lorry = nearest_id(seen[40], 220, 120)
+    lorry = nearest_id(seen[40], 196, 120)
     assert len(seen[40].id[seen[40].status != Status.TENTATIVE]) == 2
     assert seen[-1].id.tolist() == [lorry]
     hidden_at = (220 - 40 + 12 - 20) / 50

@@ -110,7 +110,7 @@ def test_settings_name_the_rule(life):
         assert found.false_track == 1e-5
     else:
         assert found.confirm_hits == 2
-    assert found.coast_s == 1.0
+    assert found.coast_s == settings.tracker.coast_s
 
 
 @pytest.mark.parametrize(

@@ -81,11 +81,22 @@ def test_a_far_vehicle_of_few_pixels_is_seen():
     assert len(find_blobs(foreground, BlobSettings())) == 1
 
 
-def test_a_stopped_car_stays_until_it_is_absorbed():
+def test_a_stopped_car_that_does_not_change_is_absorbed_after_steady_s():
     street, detector = Street(), disturbance()
     play(detector, street, 2)
-    assert covered(play(detector, street, 58, start=2, fps=5, cars=[(60, 50, 230)]), 60, 50) > 0.95
-    assert not play(detector, street, 5, start=60, fps=5, cars=[(60, 50, 230)]).mask.any()
+    assert covered(play(detector, street, 3.5, start=2, fps=5, cars=[(60, 50, 230)]), 60, 50) > 0.95
+    assert not play(detector, street, 2.5, start=5.5, fps=5, cars=[(60, 50, 230)]).mask.any()
+
+
+def test_what_changes_while_it_stands_stays_until_absorb_s():
+    street, detector = Street(), disturbance(absorb_s=10.0)
+    play(detector, street, 2)
+    for k in range(100):
+        t = 2 + k / 10
+        foreground = detector.apply(street.frame(t, cars=[(60, 50, 200 + 50 * (k % 2))]), NONE_KNOWN)
+        if 0.5 < t - 2 < 9.5:
+            assert covered(foreground, 60, 50) > 0.95, t
+    assert covered(play(detector, street, 2, start=12, cars=[(60, 50, 250)]), 60, 50) < 0.05
 
 
 def test_a_known_car_is_never_absorbed():

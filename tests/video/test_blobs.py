@@ -9,8 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.config import BlobSettings
-from vidtrack.video.blobs import find_blobs, join_fragments
+from vidtrack.video.blobs import find_blobs, measured
 from vidtrack.video.foreground import Foreground
+from vidtrack.video.regions import find_regions
+from vidtrack.video.vehicles.fragments import together
 
 EVERY = BlobSettings(min_area_share=0)
 JOIN = BlobSettings(min_area_share=0, join_gap=0.3)
@@ -86,40 +88,43 @@ def test_a_scan_has_centroids_relative_boxes_and_noise_along_the_extent():
     np.testing.assert_allclose(scan.amplitude, [1])
 
 
+def joined(foreground, predicted, settings=JOIN):
+    """Blobs whose pieces are joined inside predicted boxes, where no size is typical."""
+    regions = find_regions(foreground.mask, 0)
+    box, unknown = regions.boxes().astype(float), np.full((regions.total, 2), np.nan)
+    group, count = together(
+        box, regions.areas().astype(float), np.asarray(predicted, float).reshape(-1, 4), unknown,
+        settings.join_overlap, settings.join_gap,
+    )  # fmt: skip
+    return measured(regions.joined(group, count), foreground, settings)
+
+
 def test_fragments_of_one_predicted_vehicle_become_one():
-    parts = painted((10, 10, 8, 12), (22, 11, 8, 10), (60, 40, 6, 6))
-    joined = join_fragments(find_blobs(parts, JOIN), np.array([[9.0, 9.0, 22.0, 14.0]]))
-    assert sorted(joined.box.tolist()) == [[10, 10, 20, 12], [60, 40, 6, 6]]
+    parts = painted((10, 10, 8, 12), (20, 11, 8, 10), (60, 40, 6, 6))
+    blobs = joined(parts, [[9, 9, 22, 14]])
+    assert sorted(blobs.box.tolist()) == [[10, 10, 18, 12], [60, 40, 6, 6]]
     rows, columns = np.nonzero(parts.mask[:, :40])
-    vehicle = joined.box[:, 0].argmin()
-    np.testing.assert_allclose(joined.centroid[vehicle], [columns.mean(), rows.mean()])
+    vehicle = blobs.box[:, 0].argmin()
+    np.testing.assert_allclose(blobs.centroid[vehicle], [columns.mean(), rows.mean()])
     pixels = np.cov(np.stack([columns, rows]), bias=True)
-    np.testing.assert_allclose(joined.cov[vehicle], pixels + np.eye(2) / 12, atol=1e-9)
-    assert joined.area[vehicle] == len(rows)
-    assert joined.amplitude[vehicle] == pytest.approx(1)
-
-
-def test_a_blob_of_two_predicted_vehicles_is_left_alone():
-    blobs = find_blobs(painted((10, 10, 40, 12), (32, 23, 6, 4)), JOIN)
-    predicted = np.array([[9.0, 8.0, 20.0, 20.0], [30.0, 8.0, 22.0, 20.0]])
-    assert join_fragments(blobs, predicted).box.tolist() == blobs.box.tolist()
+    np.testing.assert_allclose(blobs.cov[vehicle], pixels + np.eye(2) / 12, atol=1e-9)
+    assert blobs.area[vehicle] == len(rows)
+    assert blobs.amplitude[vehicle] == pytest.approx(1)
 
 
 def test_fragments_of_two_vehicles_are_not_mixed():
-    blobs = find_blobs(painted((10, 10, 8, 5), (10, 17, 8, 5), (40, 10, 8, 5), (40, 17, 8, 5)), JOIN)
-    joined = join_fragments(blobs, np.array([[9.0, 9.0, 10.0, 14.0], [39.0, 9.0, 10.0, 14.0]]))
-    assert sorted(joined.box.tolist()) == [[10, 10, 8, 12], [40, 10, 8, 12]]
+    parts = painted((10, 10, 8, 5), (10, 17, 8, 5), (40, 10, 8, 5), (40, 17, 8, 5))
+    blobs = joined(parts, [[9, 9, 10, 14], [39, 9, 10, 14]])
+    assert sorted(blobs.box.tolist()) == [[10, 10, 8, 12], [40, 10, 8, 12]]
 
 
 def test_pieces_far_apart_in_one_predicted_box_are_not_joined():
-    blobs = find_blobs(painted((10, 10, 8, 12), (22, 11, 8, 10)), EVERY)
-    assert len(join_fragments(blobs, np.array([[9.0, 9.0, 22.0, 14.0]]))) == 2
+    assert len(joined(painted((10, 10, 8, 12), (20, 11, 8, 10)), [[9, 9, 22, 14]], EVERY)) == 2
 
 
-@pytest.mark.parametrize("predicted", [np.empty((0, 4)), np.array([[50.0, 50.0, 5.0, 5.0]])])
+@pytest.mark.parametrize("predicted", [[], [[50, 50, 5, 5]]])
 def test_without_a_vehicle_near_nothing_is_joined(predicted):
-    blobs = find_blobs(painted((10, 10, 8, 5), (10, 17, 8, 5)), EVERY)
-    assert len(join_fragments(blobs, predicted)) == 2
+    assert len(joined(painted((10, 10, 8, 5), (10, 17, 8, 5)), predicted)) == 2
 
 
 def test_full_size_masks_repeat_pixels_up_to_the_source_s_edge():

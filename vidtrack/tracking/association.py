@@ -67,7 +67,8 @@ def at_once(
         free &= ~_claimed(second, count)
         decision = decision.joined(second)
     if catch is not None:
-        caught = catch((heaviest(decision) < 0) & (shared < 0), free)
+        untaken = free & (np.bincount(shared[shared >= 0], minlength=count) == 0)
+        caught = catch((heaviest(decision) < 0) & (shared < 0), untaken)
         shared = np.where(caught >= 0, caught, shared)
         free[caught[caught >= 0]] = False
     free &= sure

@@ -116,9 +116,9 @@ def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: flo
                 index[t], best[t] = j, overlap
             if overlap >= most[j]:
                 partner[j], most[j] = t, overlap
-    for t in range(len(inner)):
-        if index[t] >= 0 and partner[index[t]] != t:
-            index[t] = -1
+    for i in range(len(inner)):
+        if index[i] >= 0 and partner[index[i]] != i:
+            index[i] = -1
     return index
 
 

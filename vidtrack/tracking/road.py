@@ -24,8 +24,9 @@ class Road:
 
     def learn(self, tracks: Tracks) -> None:
         """Take in the tracks of a scan."""
-        low, high = tracks.box[:, :2], tracks.box[:, :2] + tracks.box[:, 2:]
-        whole = (low > _EDGE).all(axis=1) & (high < [self._width - _EDGE, self._height - _EDGE]).all(axis=1)
+        left, top, width, height = tracks.box.T
+        right, bottom = self._width - _EDGE, self._height - _EDGE
+        whole = (left > _EDGE) & (top > _EDGE) & (left + width < right) & (top + height < bottom)
         self.sizes.learn(tracks, whole)
         self.restless.learn(tracks)
 

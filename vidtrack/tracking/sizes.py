@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import CONFIRMED, Floats, Ints, Tracks
+from vidtrack.scan import CONFIRMED, Floats, Ints, Mask, Tracks
 from vidtrack.tracking.boxes import longer
 
 _SAMPLES = 400  # kept, the newest
@@ -51,7 +51,7 @@ class SizeField:
             return np.full((len(box), 2), np.nan)
         return np.maximum(self._places(box) @ self._fit, self._floor)
 
-    def learn(self, tracks: Tracks, whole: np.ndarray) -> None:
+    def learn(self, tracks: Tracks, whole: Mask) -> None:
         """Take samples of tracks (T,) that are alone, `whole` (T,) and have driven; refit once a second."""
         longest = longer(tracks.box)
         good = (tracks.status == CONFIRMED) & (tracks.group < 0) & (tracks.travel > longest) & whole
@@ -79,7 +79,7 @@ class SizeField:
         return np.column_stack([np.ones(len(box)), bottom / self._extent - 0.5])
 
     def _refit(self) -> None:
-        """Quantile regression of relative sizes by iteratively reweighted least squares, each vehicle counting alike."""
+        """Quantile regression of relative sizes by iteratively reweighted least squares; each vehicle counts alike."""
         _, of, number = np.unique(self._of, return_inverse=True, return_counts=True)
         vote = 1 / np.sqrt(number[of])
         for axis in range(2):

@@ -36,6 +36,7 @@ from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.road import Road
 from vidtrack.tracking.sharing import Sharing
+from vidtrack.tracking.snapshot import snapshot
 
 
 class Tracker:
@@ -380,36 +381,9 @@ class Tracker:
         self.bank.keep(rows)
         self.register.keep(rows)
 
-    def _snapshot(
-        self,
-        t: float,
-        x: Floats,
-        P: Floats,
-        taken: Ints,
-        nis: Floats,
-        **more: Any,
-    ) -> Tracks:
-        register, xy = self.register, x.take(self.model.position, axis=1)
-        tracks = Tracks(
-            t=t,
-            id=register.id.copy(),
-            status=register.status.copy(),
-            x=x.copy(),
-            P=P.copy(),
-            box=absolute(register.box, xy),
-            group=register.group.copy(),
-            group_since_s=register.group_since_s.copy(),
-            age_s=t - register.born_s,
-            travel=register.travel(xy),
-            existence=register.existence,
-            measurement=taken,
-            nis=nis,
-            position=self.model.position,
-            velocity=self.model.velocity,
-            run=register.run.copy(),
-            **more,
-        )
+    def _snapshot(self, t: float, x: Floats, P: Floats, taken: Ints, nis: Floats, **more: Any) -> Tracks:
+        tracks = snapshot(self.register, self.model, t, x, P, taken, nis, **more)
         if not self.forest:
             return tracks
         shown = self.forest.shown
-        return tracks.only(shown[np.argsort(register.id[shown])])
+        return tracks.only(shown[np.argsort(self.register.id[shown])])

@@ -16,43 +16,43 @@ class Regions(NamedTuple):
     """Horizontal runs of pixels, and the region of each.
 
     row, start, stop  (N,) stop excluded
-    label             (N,) region of each run, 0..count-1
-    count             number of regions
+    label             (N,) region of each run, 0..total-1
+    total             number of regions
     """
 
     row: Runs
     start: Runs
     stop: Runs
     label: Ints
-    count: int
+    total: int
 
     def boxes(self) -> Ints:
-        """(count, 4) left, top, width, height in pixels of the mask."""
-        return _boxes(self.row, self.start, self.stop, self.label, self.count)
+        """(total, 4) left, top, width, height in pixels of the mask."""
+        return _boxes(self.row, self.start, self.stop, self.label, self.total)
 
     def areas(self) -> Ints:
-        """(count,) pixels."""
-        return np.bincount(self.label, self.stop - self.start, self.count).astype(np.int64)
+        """(total,) pixels."""
+        return np.bincount(self.label, self.stop - self.start, self.total).astype(np.int64)
 
-    def joined(self, group: Ints, count: int) -> Regions:
-        """The same runs in `count` larger regions; group (self.count,) has the new number of each region."""
-        return self._replace(label=group[self.label], count=count)
+    def joined(self, group: Ints, total: int) -> Regions:
+        """The same runs in `total` larger regions; group (self.total,) has the new number of each region."""
+        return self._replace(label=group[self.label], total=total)
 
     def without(self, region: int) -> Regions:
         """The runs of all other regions; the numbers stay."""
         stays = self.label != region
-        return Regions(self.row[stays], self.start[stays], self.stop[stays], self.label[stays], self.count)
+        return Regions(self.row[stays], self.start[stays], self.stop[stays], self.label[stays], self.total)
 
     def parted(self, region: int, parts: Regions) -> Regions:
-        """`region` replaced by its parts: the first takes its number, the others are numbered from `count` on."""
+        """`region` replaced by its parts: the first takes its number, the others are numbered from `total` on."""
         rest = self.without(region)
-        label = np.where(parts.label == 0, region, self.count - 1 + parts.label)
+        label = np.where(parts.label == 0, region, self.total - 1 + parts.label)
         return Regions(
             np.concatenate([rest.row, parts.row]),
             np.concatenate([rest.start, parts.start]),
             np.concatenate([rest.stop, parts.stop]),
             np.concatenate([rest.label, label]),
-            self.count + parts.count - 1,
+            self.total + parts.total - 1,
         )
 
 
@@ -68,7 +68,8 @@ def patch(regions: Regions, region: int, box: Ints) -> Image:
 
 def of_labels(labels: Ints, count: int, box: Ints) -> Regions:
     """Regions from a picture of labels (height, width), -1 for none, whose upper left corner is that of box (4,)."""
-    return Regions(*_runs_of(labels, box), count)
+    row, start, stop, label = _runs_of(labels, box)
+    return Regions(row, start, stop, label, count)
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack import plane
 from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Mask
-from vidtrack.video.background.alignment import Fit, align, leap, pyramid
+from vidtrack.video.background.alignment import FEWEST, Fit, align, leap, pyramid
 from vidtrack.video.background.canvas import fitting, recut, settled
 from vidtrack.video.background.points import CELLS, Points, choose, no_points, shifted
 from vidtrack.video.background.scene import Levels, Scene
@@ -102,7 +102,7 @@ class Camera:
         """
         if not len(self._points.x) and time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
-        if not self.moves and not len(self._points.x):  # nothing to hold on to
+        if not self.moves and self._points.start[1] < FEWEST:  # nothing to hold on to
             self.fits, self._time_s = False, time_s
             return scene
         scene = (self._track if self.moves else self._watch)(luma, scene, known, time_s)

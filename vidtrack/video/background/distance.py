@@ -14,6 +14,7 @@ _CLEAR = 40.0  # grey levels over two pixels; one pixel in a hundred of a scene 
 _STEEP = 99.0  # percent
 LEAST_CONTRAST = 0.5  # of the threshold in clear light
 _DARKEST = 0.5  # percent of the pixels
+_STANDS_OUT = 1.25  # interquartile ranges below the median; evenly spread levels reach down by 1.0
 _DARK_PAINT = 10.0  # grey levels; tyres are not quite black
 _ROWS = 4  # every so many are looked at
 
@@ -25,9 +26,15 @@ def contrast(luma: Levels) -> np.float32:
     return np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
 
 
-def veil(luma: Image) -> float:
-    """Luminance that haze adds to black: what is darkest in a picture (h, w) with traffic is black without it."""
-    return max(float(np.percentile(luma[::_ROWS], _DARKEST)) - _DARK_PAINT, 0.0)
+def veil(luma: Image) -> float | None:
+    """Luminance that haze adds to black: what is darkest in a picture (h, w) with traffic is black without it.
+
+    None where the darkest does not stand out from the rest: the picture shows nothing black, and tells nothing of haze.
+    """
+    dark, low, median, high = np.percentile(luma[::_ROWS], (_DARKEST, 25, 50, 75))
+    if median - dark < _STANDS_OUT * (high - low):
+        return None
+    return max(float(dark) - _DARK_PAINT, 0.0)
 
 
 @kernel(error_model="numpy")

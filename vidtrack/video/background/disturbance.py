@@ -105,7 +105,8 @@ class Disturbance:
         self._learn(picture, scene, mask, hit, dt, span)
         if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
             self._contrast = contrast(scene.luma)
-            self._veil = min(self._veil + _LIFT, veil(picture.luma))
+            haze = veil(picture.luma)
+            self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
             self._absorb(picture, scene, hit)
         return mask, strength
 
@@ -122,7 +123,7 @@ class Disturbance:
         self._change.restart(time_s)
         self._camera.restart()
         scene = start(picture)
-        self._contrast, self._veil = contrast(scene.luma), veil(picture.luma)
+        self._contrast, self._veil = contrast(scene.luma), veil(picture.luma) or 0.0
         return scene
 
     @property

@@ -84,15 +84,15 @@ def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
     """The regions, those cut that are large enough for several vehicles and have necks between them."""
     box, area = regions.boxes(), regions.areas()
     typical = measure.typical(box)
-    large = (box[:, 2:] > _LARGE * typical).any(axis=1)
+    large = np.any(box[:, 2:] > _LARGE * typical, axis=1)
     hollow = np.isnan(typical[:, 0]) & (area < _OPEN * box[:, 2] * box[:, 3])
-    for i in np.flatnonzero((large | hollow) & (area >= _LEAST_PX)):
+    for i in np.flatnonzero((large | hollow) & (area >= _LEAST_PX)).tolist():
         border = measure.border(box[i])
         inside = patch(regions, i, box[i])
         if large[i]:
             least = typical[i] * np.sqrt(_CUT_PART if any(border) else _PART)
             cut = _cut(inside, border, _NECK, least, box[i])
-            if cut.count < 2:
+            if cut.total < 2:
                 cut = _cut(inside, border, _SHALLOW, least, box[i])
                 if not _likelier(cut, box[i], typical[i], measure.sizes):
                     continue
@@ -113,15 +113,15 @@ def _likelier(cut: Regions, box: Ints, typical: Floats, sizes: SizeField) -> boo
     """Whether vehicles of the parts' sizes explain a region better than one vehicle of the size of its box (4,)."""
     sigma = np.maximum(sizes.spread, _SURE)
 
-    def surprise(size: Floats) -> Floats:
+    def surprise(size: Ints) -> Floats:
         return np.minimum(((np.log(size / typical) / sigma) ** 2).sum(axis=-1) / 2, _ODD)
 
-    return bool(surprise(cut.boxes()[:, 2:]).sum() + _ANOTHER * (cut.count - 1) < surprise(box[2:]))
+    return bool(surprise(cut.boxes()[:, 2:]).sum() + _ANOTHER * (cut.total - 1) < surprise(box[2:]))
 
 
 def _alike(cut: Regions) -> bool:
     """Whether parts are of like size and each fills its box, as vehicles do."""
-    if cut.count < 2:
+    if cut.total < 2:
         return False
     box = cut.boxes()
     whole = box[:, 2] * box[:, 3]
@@ -134,7 +134,7 @@ def divided(regions: Regions, predicted: Floats, measure: _Measure) -> Regions:
     Vehicles nose to tail have no neck between them; each pixel goes to the box that it is nearest to.
     """
     box = regions.boxes()
-    for i in np.flatnonzero((box[:, 2:] > _LARGE * measure.typical(box)).any(axis=1)):
+    for i in np.flatnonzero((box[:, 2:] > _LARGE * measure.typical(box)).any(axis=1)).tolist():
         label, count = nearest_box(patch(regions, i, box[i]), box[i], predicted)
         if count > 1:
             regions = regions.parted(i, of_labels(label, count, box[i]))

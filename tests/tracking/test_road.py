@@ -1,0 +1,137 @@
+"""What traffic teaches about a scene: the size of vehicles, and restless places."""
+
+import numpy as np
+import pytest
+from drawn_tracks import drive, tracks_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidtrack.scan import TENTATIVE
+from vidtrack.state import gather, restore
+from vidtrack.tracking.restless import RestlessMap
+from vidtrack.tracking.road import Road
+from vidtrack.tracking.sizes import SizeField
+
+WIDTH, HEIGHT = 320, 240
+
+
+def perspective(bottom):
+    return 10 + 0.2 * bottom, 0.6 * (10 + 0.2 * bottom)
+
+
+def seen_as(rng, size, fragments=0.3):
+    """Sizes as a detector sees them: noisy, and often of a part only."""
+
+    def measured(bottom):
+        part = rng.uniform(0.3, 0.8, 2) if rng.random() < fragments else np.ones(2)
+        return np.array(size(bottom)) * part * np.exp(0.08 * rng.normal(size=2))
+
+    return measured
+
+
+def at_bottom(x, y, size):
+    return [x - size[0] / 2, y - size[1], *size]
+
+
+@settings(max_examples=10)
+@given(st.integers(0, 2**32 - 1))
+def test_a_perspective_field_is_found_though_three_of_ten_samples_are_fragments(seed):
+    road = Road(WIDTH, HEIGHT)
+    drive(road.learn, seen_as(np.random.default_rng(seed), perspective), vehicles=12)
+    for y in (80, 140, 200):
+        typical = road.sizes.typical(np.array([at_bottom(160, y, (20, 10))]))[0]
+        np.testing.assert_allclose(typical, perspective(y), rtol=0.2)
+
+
+def test_nothing_is_typical_before_five_vehicles_drove():
+    sizes = SizeField(WIDTH, HEIGHT)
+
+    def learn(tracks):
+        sizes.learn(tracks, np.ones(len(tracks), bool))
+
+    drive(learn, perspective, vehicles=4)
+    assert not sizes.known
+    assert np.isnan(sizes.typical(np.array([[10.0, 10, 20, 10]]))).all()
+    drive(learn, perspective, vehicles=1, first=4)
+    assert sizes.known
+
+
+@pytest.mark.parametrize("unlike", [{"travel": 5.0}, {"status": TENTATIVE}])
+def test_what_has_not_driven_or_is_not_confirmed_teaches_no_size(unlike):
+    sizes = SizeField(WIDTH, HEIGHT)
+    for k in range(100):
+        x = 10.0 * (k % 20)
+        sizes.learn(tracks_of(k / 5, [[x, 100, 40, 20]], ids=[k // 20], **unlike), np.ones(1, bool))
+    assert not sizes.known
+
+
+def test_what_the_border_cuts_teaches_no_size():
+    road = Road(WIDTH, HEIGHT)
+    drive(road.learn, lambda y: (40.0, 20.0), vehicles=6, x=18.0)
+    assert not road.sizes.known
+
+
+def test_a_standing_vehicle_is_one_sample():
+    sizes = SizeField(WIDTH, HEIGHT)
+    noisy = seen_as(np.random.default_rng(1), perspective, fragments=0)
+    drive(lambda tracks: sizes.learn(tracks, np.ones(len(tracks), bool)), noisy, vehicles=6)
+    before = sizes.typical(np.array([at_bottom(160, 140, (20, 10))]))
+    for k in range(500):
+        sizes.learn(tracks_of(100 + k / 5, [at_bottom(160, 140, (90, 70))], ids=[99]), np.ones(1, bool))
+    np.testing.assert_allclose(sizes.typical(np.array([at_bottom(160, 140, (20, 10))])), before, rtol=0.1)
+
+
+def test_a_road_is_saved_and_restored():
+    road, other = Road(WIDTH, HEIGHT), Road(WIDTH, HEIGHT)
+    drive(road.learn, perspective, vehicles=7)
+    restore(other, gather(road))
+    box = np.array([[100.0, 100, 30, 20]])
+    np.testing.assert_array_equal(other.sizes.typical(box), road.sizes.typical(box))
+    for each in (road, other):
+        drive(each.learn, lambda y: (50.0, 25.0), vehicles=2, first=7)
+    np.testing.assert_array_equal(other.sizes.typical(box), road.sizes.typical(box))
+    np.testing.assert_array_equal(other.restless.starts, road.restless.starts)
+
+
+PLACE = np.array([[55.0, 45.0]])
+LEAF = [50.0, 40.0, 10.0, 10.0]
+
+
+def flutter(learn, times, box=LEAF, travel=1.0, known=()):
+    """Tracks that begin and end at one place, beside known vehicles."""
+    for k in range(times):
+        boxes = [*known, box]
+        status = np.array([1] * len(known) + [TENTATIVE])
+        learn(tracks_of(0.2 * k, boxes, ids=[*range(1000, 1000 + len(known)), k], status=status, travel=travel))
+        learn(tracks_of(0.2 * k + 0.1, known, ids=range(1000, 1000 + len(known))))
+
+
+def test_false_starts_make_a_place_restless_until_they_are_forgotten():
+    road = Road(WIDTH, HEIGHT)
+    assert road.caution(PLACE).tolist() == [1.0]
+    flutter(road.learn, 4)
+    assert road.caution(PLACE).tolist() == [3.0]
+    assert road.caution(np.array([[300.0, 200.0], [-50.0, 900.0]])).tolist() == [1.0, 1.0]
+    before = road.restless.starts.sum()
+    road.learn(tracks_of(0.7 + 30.0))
+    assert road.restless.starts.sum() == pytest.approx(before / np.e, rel=1e-9)
+    assert not road.restless.restless(PLACE).any()
+
+
+def test_tracks_that_travelled_or_are_part_of_a_vehicle_are_no_false_starts():
+    restless = RestlessMap(WIDTH, HEIGHT)
+    flutter(restless.learn, 10, travel=50.0)
+    flutter(restless.learn, 10, known=[[40.0, 30.0, 60.0, 40.0]])
+    assert not restless.starts.any()
+
+
+def test_a_restless_place_asks_for_more_travel_before_a_track_is_confirmed():
+    from blob_scene import confirmed_ids, default_tracker, play
+
+    def swaying(t):
+        return [[90 + 14 * min(t / 0.6, 1), 100, 14, 14]]
+
+    tracker = default_tracker()
+    flutter(tracker.road.learn, 8, box=[95.0, 100.0, 14.0, 14.0])
+    assert not confirmed_ids(play(tracker, swaying, 0.9))
+    assert confirmed_ids(play(default_tracker(), swaying, 0.9))

@@ -1,0 +1,94 @@
+"""What stands: queues of vehicles that drove in stay, what never travelled ends; changed shapes are followed."""
+
+import numpy as np
+import pytest
+from blob_scene import confirmed_ids, default_tracker, events, nearest_id, play
+
+from vidtrack.errors import ConfigError
+from vidtrack.scan import Status
+from vidtrack.tracking.boxes import overlapping
+from vidtrack.tracking.groups import Groups
+from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.sharing import Sharing
+from vidtrack.tracking.tracker import Tracker
+
+
+def test_what_never_travelled_and_stands_still_ends():
+    seen = play(default_tracker(confirm_travel=0.0), lambda t: [[100, 100, 40, 20]], 4.0)
+    ((gone, number),) = events(seen, "delete")
+    assert 3.0 < gone < 3.2
+    assert number == seen[0].id[0]
+    (reason,) = (e.reason for tracks in seen for e in tracks.events if e.kind == "delete")
+    assert reason == "never travelled and stands still"
+
+
+def test_without_idle_s_it_stays():
+    life = LifeCycle(coast_s=1.0, coast_scans=None)
+    tracker = Tracker(life=life, bounds=(320.0, 240.0))
+    seen = play(tracker, lambda t: [[100, 100, 40, 20]], 8.0, fps=5)
+    assert not events(seen, "delete")
+
+
+def test_a_queue_that_drove_in_stays_for_two_minutes():
+    def queue(t):
+        return [[min(30 * t - 60 * k, 240 - 60 * k), 100, 40, 20] for k in range(3)]
+
+    seen = play(default_tracker(), queue, 132.0, fps=10, jitter=0.3)
+    standing = [tracks for tracks in seen if tracks.t > 12.0]
+    ids = {int(number) for number in standing[0].id}
+    assert len(ids) == 3
+    for tracks in standing:
+        assert set(tracks.id.tolist()) == ids
+        assert (tracks.status == Status.CONFIRMED).all()
+
+
+def test_a_slow_vehicle_is_not_idle():
+    seen = play(default_tracker(confirm_travel=0.0), lambda t: [[100 + 8 * t, 100, 40, 20]], 10.0, fps=10)
+    assert confirmed_ids(seen) == {int(seen[0].id[0])}
+    assert not events(seen, "delete")
+
+
+def test_a_track_continues_on_what_is_left_of_its_blob():
+    """At once only the rear third is seen, as where a shadow falls on a vehicle: its centroid is far off."""
+
+    def shrinking(t):
+        x = 20 + 60 * t
+        return [[x, 100, 60, 24]] if t < 1.5 else [[x, 100, 22, 24]]
+
+    seen = play(default_tracker(), shrinking, 3.5)
+    number = nearest_id(seen[35], 20 + 60 * seen[35].t + 30, 112)
+    assert confirmed_ids(seen) == {number}
+    assert seen[-1].id.tolist() == [number]
+    assert not events(seen, "delete")
+
+
+def test_catch_gives_each_idle_track_the_free_blob_that_it_overlaps_most():
+    tracks = np.array([[0.0, 0, 40, 20], [100.0, 0, 40, 20], [200.0, 0, 40, 20]])
+    blobs = np.array([[10.0, 0, 40, 20], [2.0, 0, 40, 20], [130.0, 0, 40, 20], [200.0, 0, 14, 20]])
+    everyone, all_free = np.ones(3, bool), np.ones(4, bool)
+    sharing = Sharing(Groups(), 0.3)
+    assert sharing.catch(tracks, blobs, everyone, all_free).tolist() == [1, -1, 3]
+    assert sharing.catch(tracks, blobs, everyone, np.array([True, False, True, True])).tolist() == [0, -1, 3]
+    assert sharing.catch(tracks, blobs, np.array([False, True, True]), all_free).tolist() == [-1, -1, 3]
+    assert sharing.catch(tracks, np.empty((0, 4)), everyone, np.empty(0, bool)).tolist() == [-1] * 3
+
+
+def test_of_two_tracks_on_one_blob_the_one_that_overlaps_it_more_has_it():
+    tracks = np.array([[0.0, 0, 40, 20], [6.0, 0, 40, 20], [np.nan, 0, 40, 20]])
+    blob = np.array([[8.0, 0, 40, 20]])
+    assert overlapping(tracks, blob, np.ones(3, bool), np.ones(1, bool), 0.3).tolist() == [-1, 0, -1]
+
+
+def test_a_tentative_track_is_confirmed_before_it_joins_a_group():
+    """Two vehicles on one blob that hides more: a newcomer on it is told of before it is shown as merged."""
+    before = None
+    for tracks in play(default_tracker(), lambda t: [[20 + 40 * t, 100, 40, 20], [180 - 40 * t, 112, 40, 20]], 4.0):
+        told = {e.track_id for e in tracks.events if e.kind == "confirmed"}
+        known = set() if before is None else set(before.id[before.status != Status.TENTATIVE].tolist())
+        assert set(tracks.id[tracks.status != Status.TENTATIVE].tolist()) <= known | told
+        before = tracks
+
+
+def test_a_life_without_end_is_refused():
+    with pytest.raises(ConfigError):
+        LifeCycle(coast_s=None, coast_scans=None, idle_s=3.0)

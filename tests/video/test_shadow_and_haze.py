@@ -1,0 +1,97 @@
+"""Shadow amid a vehicle, and what haze leaves of contrast and black: known answers."""
+
+import numpy as np
+import pytest
+
+from vidtrack.video.background.distance import contrast, veil
+from vidtrack.video.background.shadow import SHADOW, reclaim
+
+VEHICLE = 1
+
+
+def reclaimed(hit):
+    hit = np.array(hit, np.uint8)
+    reclaim(hit)
+    return hit
+
+
+def car(shape=(40, 60)):
+    """A vehicle of 30 x 20 px at (15, 10)."""
+    hit = np.zeros(shape, np.uint8)
+    hit[10:30, 15:45] = VEHICLE
+    return hit
+
+
+def test_shadow_amid_a_vehicle_is_vehicle():
+    hit = car()
+    hit[15:25, 22:38] = SHADOW
+    np.testing.assert_array_equal(reclaimed(hit), car())
+
+
+def test_dark_paint_at_one_end_is_seen_from_three_sides():
+    hit = car()
+    hit[15:25, 38:45] = SHADOW
+    np.testing.assert_array_equal(reclaimed(hit), car())
+
+
+@pytest.mark.parametrize("place", [np.s_[30:36, 15:45], np.s_[10:30, 45:58], np.s_[2:10, 20:50]])
+def test_shadow_beside_a_vehicle_stays_shadow(place):
+    hit = car()
+    hit[place] = SHADOW
+    np.testing.assert_array_equal(reclaimed(hit), hit)
+
+
+def test_what_lies_between_shadow_and_vehicle_breaks_the_line():
+    hit = car()
+    hit[13:27, 18:42] = 0
+    hit[16:24, 22:38] = SHADOW
+    np.testing.assert_array_equal(reclaimed(hit), hit)
+
+
+def test_the_narrow_edges_of_a_shadow_are_no_vehicle():
+    hit = np.zeros((40, 60), np.uint8)
+    hit[10:30, 15:45] = VEHICLE
+    hit[12:28, 17:43] = SHADOW
+    hit[20, 20:40] = VEHICLE
+    np.testing.assert_array_equal(reclaimed(hit), hit)
+
+
+def test_an_empty_map_stays_empty():
+    assert not reclaimed(np.zeros((4, 5))).any()
+
+
+def steps(height, share=0.5, base=100.0, shape=(80, 200)):
+    """A scene with steps of this height; they take this share of the columns' differences."""
+    luma = np.full(shape, base, np.float32)
+    luma[:, np.arange(shape[1]) % 4 < 4 * share] += height
+    return luma
+
+
+@pytest.mark.parametrize(("height", "expected"), [(100, 1.0), (40, 1.0), (30, 0.75), (20, 0.5), (4, 0.5), (0, 0.5)])
+def test_contrast_is_the_height_of_steep_edges_within_limits(height, expected):
+    assert contrast(steps(height)) == pytest.approx(expected)
+
+
+def test_contrast_of_a_picture_too_narrow_for_edges_is_that_of_clear_light():
+    assert contrast(np.zeros((10, 2), np.float32)) == 1
+
+
+def road(seed=0):
+    """Grey levels of a road, with some black."""
+    luma = np.random.default_rng(seed).normal(120, 10, (120, 160))
+    luma[60:64, 40:80] = 12
+    return np.clip(luma, 0, 255)
+
+
+def test_the_veil_is_what_haze_adds_to_black():
+    assert veil(road().astype(np.uint8)) == pytest.approx(2, abs=1)
+    assert veil((0.5 * road() + 90).astype(np.uint8)) == pytest.approx(0.5 * 12 + 90 - 10, abs=1)
+    black = road()
+    black[60:64, 40:80] = 0
+    assert veil(black.astype(np.uint8)) == 0
+
+
+@pytest.mark.parametrize("haze", [0, 60])
+def test_a_picture_that_shows_nothing_black_tells_nothing_of_haze(haze):
+    flat = np.random.default_rng(1).uniform(90 + haze, 150 + haze, (120, 160))
+    assert veil(flat.astype(np.uint8)) is None
