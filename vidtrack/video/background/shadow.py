@@ -23,7 +23,7 @@ _REACH = 1  # px to either side over which luminance differences are taken; fart
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
-_LIT = 0.25  # share of a region that is no shadow if there is a vehicle in it
+_LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
 _NEUTRAL = np.float32(128)  # chroma of grey
 
 
