@@ -131,7 +131,7 @@ def test_objects_that_are_too_small(tmp_path):
 
 
 def test_a_reduced_picture_that_makes_them_too_small(clean, tmp_path):
-    assert problems_of(write(tmp_path / "clip.mkv", clean), "source.scale=0.5") == {"tiny": ("--scale 1",)}
+    assert problems_of(write(tmp_path / "clip.mkv", clean), "source.scale=0.334") == {"tiny": ("--scale 1",)}
 
 
 def test_a_place_that_never_rests(clean, tmp_path):

@@ -87,4 +87,4 @@ def test_half_the_size_tells_the_same(road):
     expected = tracks_of(0.0, [[100.0, 100, 40, 20], [140.0, 100, 40, 20]])
     fine = explain(foreground((100, 100, 80, 20)), expected, road, SETTINGS)
     coarse = explain(foreground((50, 50, 40, 10), step=2), expected, road, SETTINGS)
-    np.testing.assert_allclose(found(coarse), found(fine), atol=1)
+    assert found(coarse) == found(fine)

@@ -51,7 +51,7 @@ def test_what_lies_between_shadow_and_vehicle_breaks_the_line():
 def test_the_narrow_edges_of_a_shadow_are_no_vehicle():
     hit = np.zeros((40, 60), np.uint8)
     hit[10:30, 15:45] = VEHICLE
-    hit[12:28, 17:43] = SHADOW
+    hit[11:29, 16:44] = SHADOW
     hit[20, 20:40] = VEHICLE
     np.testing.assert_array_equal(reclaimed(hit), hit)
 

@@ -18,6 +18,7 @@ from vidtrack.video.blobs import find_blobs
 from vidtrack.video.foreground import Foreground
 
 _SETTLE_S = 2.0  # in which what stood in the first picture comes out of the scene
+_GOES = 0.2  # sizes; what has moved on by that is not restless
 _OFTEN = 0.2  # share of the frames
 _ENOUGH_S = 3.0  # of frames to say so: in less, a vehicle that is not confirmed yet moves as often as a tree
 _SMALL = 10  # percentile
@@ -130,9 +131,10 @@ class ObjectMeter:
 
 
 def _covered(step: Step, shape: tuple[int, int]) -> Mask:
-    """(h, w) the boxes of confirmed tracks, with a margin."""
+    """(h, w) the boxes of tracks that are confirmed or go somewhere, with a margin."""
     assert step.foreground is not None
-    boxes = widened(step.shown.box[step.tracks.status != TENTATIVE], _MARGIN) / step.foreground.step
+    going = (step.tracks.status != TENTATIVE) | (step.tracks.travel > _GOES * longer(step.tracks.box))
+    boxes = widened(step.shown.box[going], _MARGIN) / step.foreground.step
     covered = np.zeros(shape, bool)
     corners = np.column_stack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
     for left, top, right, bottom in np.maximum(corners, 0).astype(int):

@@ -45,14 +45,15 @@ class Foreground:
     def full_size(self, shape: tuple[int, int]) -> Image:
         """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""
         if self.place is not None and self.motion is not None:
-            to_picture = plane.after(plane.after(self.motion, self.place), _enlargement(self.step))
+            to_picture = plane.after(plane.after(self.motion, self.place), enlargement(self.step))
             return _warped(self.mask, to_picture, shape)
         mask = self.mask.repeat(self.step, axis=0).repeat(self.step, axis=1)
         rows, columns = (max(0, size - found) for size, found in zip(shape, mask.shape, strict=True))
         return np.pad(mask, ((0, rows), (0, columns)), mode="edge")[: shape[0], : shape[1]]
 
 
-def _enlargement(step: int) -> Floats:
+def enlargement(step: int) -> Floats:
+    """From the processed pixels to the source's, `step` times as many in each direction."""
     return np.array([[step, 0, (step - 1) / 2], [0, step, (step - 1) / 2]])
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from vidtrack.compiled import kernel
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import find_runs
+from vidtrack.video.runs import connect, find_runs
 
 if TYPE_CHECKING:  # the scene needs SHADOW
     from vidtrack.video.background.picture import Picture
@@ -24,7 +23,7 @@ _REACH = 1  # px to either side over which luminance differences are taken; fart
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
-_SOLID = np.ones((3, 3), np.uint8)
+_LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
 _NEUTRAL = np.float32(128)  # chroma of grey
 
 
@@ -64,33 +63,35 @@ def _texture_error(luma: Image, scene: Levels, y: int, x: int, r: np.float32) ->
     return abs(across) + abs(along)
 
 
+@kernel
 def reclaim(hit: Image) -> None:
     """Set hit (h, w) uint8 from SHADOW back to 1 where the vehicle is seen on at least three of four sides.
 
     Dark paint passes for shadow, but shadow lies beside a vehicle and not amid it. A side shows the vehicle if a line
-    of hits leads to pixels that are not shadow, three by three of them: the soft edges of a shadow are narrower.
+    of hits leads to a pixel that is not shadow. A region that is nearly all shadow is one: its rest are soft edges.
     """
-    _reclaim(hit, np.asarray(cv2.erode((hit == 1).astype(np.uint8), _SOLID), np.uint8))
-
-
-@kernel
-def _reclaim(hit: Image, vehicle: Image) -> None:
     row, start, stop = find_runs(hit, False)
+    label, count = connect(row, start, stop, 1)
+    whole, lit = np.zeros(count), np.zeros(count)
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)
     for k in range(len(row)):
         y, seen = row[k], False
+        whole[label[k]] += stop[k] - start[k]
         for x in range(start[k], stop[k]):
-            above = y > 0 and hit[y - 1, x] != 0 and (vehicle[y - 1, x] != 0 or side[y - 1, x] & _ABOVE != 0)
+            above = y > 0 and hit[y - 1, x] != 0 and (hit[y - 1, x] == 1 or side[y - 1, x] & _ABOVE != 0)
             side[y, x] = np.uint8(seen) * _LEFT | np.uint8(above) * _ABOVE
-            seen |= vehicle[y, x] != 0
+            lit[label[k]] += hit[y, x] == 1
+            seen |= hit[y, x] == 1
     for k in range(len(row) - 1, -1, -1):
         y, seen = row[k], False
         for x in range(stop[k] - 1, start[k] - 1, -1):
-            below = y < h - 1 and hit[y + 1, x] != 0 and (vehicle[y + 1, x] != 0 or side[y + 1, x] & _BELOW != 0)
+            below = y < h - 1 and hit[y + 1, x] != 0 and (hit[y + 1, x] == 1 or side[y + 1, x] & _BELOW != 0)
             side[y, x] |= np.uint8(seen) * _RIGHT | np.uint8(below) * _BELOW
-            seen |= vehicle[y, x] != 0
+            seen |= hit[y, x] == 1
     for k in range(len(row)):
+        if lit[label[k]] < _LIT * whole[label[k]]:
+            continue
         for x in range(start[k], stop[k]):
             if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= _AMID:
                 hit[row[k], x] = 1

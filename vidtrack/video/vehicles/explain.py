@@ -10,7 +10,7 @@ from vidtrack.scan import TENTATIVE, Floats, Ints, Tracks
 from vidtrack.tracking.road import Road
 from vidtrack.tracking.sizes import SizeField
 from vidtrack.video.blobs import Blobs, measured
-from vidtrack.video.foreground import Foreground
+from vidtrack.video.foreground import Foreground, enlargement
 from vidtrack.video.frame import Image
 from vidtrack.video.regions import Regions, find_regions, of_labels, patch
 from vidtrack.video.vehicles.fragments import together
@@ -36,13 +36,15 @@ class _Measure:
 
     def __init__(self, foreground: Foreground, sizes: SizeField) -> None:
         place = plane.IDENTITY if foreground.place is None else foreground.place
-        self._to_scene = plane.after(place, np.diag([foreground.step, foreground.step, 1.0])[:2])
+        self._to_scene = plane.after(place, enlargement(foreground.step))
         self._to_mask = plane.inverse(self._to_scene)
         self.sizes = sizes
         h, w = foreground.mask.shape
         self.edges = np.array([0.0, 0.0, w, h])
         if foreground.surveyed is not None and foreground.place is not None:
-            self.edges = plane.points(self._to_mask, foreground.surveyed.reshape(2, 2)).ravel()
+            low, high = foreground.surveyed.reshape(2, 2)
+            left, top, width, height = self.predicted(np.concatenate([low, high - low])[None])[0]
+            self.edges = np.array([left, top, left + width, top + height])
 
     def typical(self, box: Ints | Floats) -> Floats:
         """(N, 2) width and height [px of the mask] typical of vehicles at boxes (N, 4) there; NaN if unknown."""
