@@ -22,11 +22,22 @@ from vidtrack import score
 
 WITHOUT: dict[str, tuple[str, ...]] = {
     "everything": (),
+    "no cuts at necks": ("blobs.cut=false",),
+    "no division among predicted boxes": ("blobs.divide=false",),
+    "no pieces joined by size": ("blobs.pieces=false",),
     "no groups": ("tracker.merged_blobs=false",),
-    "confirmed by hits alone": ("tracker.confirm_s=0",),
+    "nothing kept by overlap": ("tracker.blob_overlap=1",),
+    "no restless map": ("tracker.restless=false",),
+    "idle tracks stay": ("tracker.idle_s=none",),
     "no travel to be confirmed": ("tracker.confirm_travel=0",),
+    "confirmed by hits and travel alone": ("tracker.confirm_s=0",),
+    "coasting for 1 s": ("tracker.coast_s=1",),
+    "hidden no longer than coasting": ("tracker.hidden_s=0.6",),
     "boxes not smoothed": ("tracker.box_s=0.001",),
-    "hidden no longer than coasting": ("tracker.hidden_s=1",),
+    "shadow amid a vehicle stays shadow": ("detector.disturbance.amid=false",),
+    "one threshold for all contrasts": ("detector.disturbance.contrast=false",),
+    "standing things stay for 20 s": ("detector.disturbance.steady_s=20",),
+    "no registration": ("detector.disturbance.registration=false",),
 }
 SHAKES = (0.0, 1.0)
 

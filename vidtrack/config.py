@@ -57,6 +57,10 @@ class DisturbanceSettings(Group):
     """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
     shadow: bool = True
     """what is the scene darkened by one factor, in luminance, colour and texture, is shadow, not foreground"""
+    amid: bool = True
+    """what passes for shadow amid a vehicle is vehicle: dark paint does"""
+    contrast: bool = True
+    """luma_threshold falls with the contrast that haze or dusk leave to the scene, to half of it at least"""
     exposure: bool = True
     """changes of the camera's gain are compensated at once"""
     learn_s: float = Field(2.0, gt=0)
@@ -121,6 +125,8 @@ class BlobSettings(Group):
     """regions too large for one vehicle, or hardly filling their box, are cut at their necks"""
     divide: bool = True
     """regions too large for one vehicle are divided among the vehicles predicted there"""
+    pieces: bool = True
+    """small regions that nobody predicted are joined with their neighbours up to the typical size of a vehicle"""
     join_overlap: float = Field(0.7, gt=0, le=1)
     """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
     join_gap: float = Field(0.05, ge=0, le=1)
@@ -195,6 +201,14 @@ class TrackerSettings(Group):
     """s; a track is given up this long after its last evidence"""
     hidden_s: float = Field(2.0, ge=0)
     """s; the same for a vehicle inside a blob that it shares, where nothing could be seen of it"""
+    idle_s: float | None = Field(3.0, gt=0)
+    """s; a track of a video that stands still for so long and has never travelled ends; None: it stays"""
+    idle_travel: float = Field(1.2, ge=0)
+    """object sizes; what has been this far from its start has travelled, and may stand as long as it likes"""
+    restless: bool = True
+    """where tracks began in vain lately, as under a tree, others must travel three times as far to be confirmed"""
+    blob_overlap: float = Field(0.3, gt=0, le=1)
+    """intersection over union with a blob outside the gate that keeps a track on it; 1: never"""
     merged_blobs: bool = True
     """vehicles that share one blob stay several tracks"""
     group_cover: float = Field(0.5, gt=0, le=1)

@@ -27,6 +27,7 @@ from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
 from vidtrack.video.source import open_source
 from vidtrack.video.vehicles.explain import explain
+from vidtrack.video.vehicles.outlook import Outlook
 
 log = logging.getLogger(__name__)
 
@@ -105,12 +106,15 @@ def build_tracker(
             coast_s=settings.coast_s * pace,
             hidden_s=settings.hidden_s * pace,
             coast_scans=None,
-            idle_s=None if whole else 3.0,
+            idle_s=None if whole else settings.idle_s,
+            idle_travel=settings.idle_travel,
         ),
-        groups=Groups(cover=settings.group_cover) if settings.merged_blobs and not whole else None,
+        groups=Groups(cover=settings.group_cover, overlap=settings.blob_overlap)
+        if settings.merged_blobs and not whole
+        else None,
         shape=Shape() if whole else None,
         trust=Trust(whole.sure_score) if whole and whole.sure_score is not None else None,
-        road=Road(*bounds) if bounds and not whole else None,
+        road=Road(*bounds, wary=settings.restless) if bounds and not whole else None,
         bounds=bounds,
         detection_probability=(whole or settings).detection_probability,
         clutter_density=settings.clutter_density,
@@ -127,6 +131,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
     The tracker's prediction reaches the detector before the frame is processed: fragments are joined inside a
     predicted box, and vehicles that were seen driving are not absorbed into the scene.
     """
+    outlook = Outlook()
     ended = perf_counter()
     for frame in frames:
         clock = [ended, perf_counter()]
@@ -140,7 +145,8 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         clock.append(perf_counter())
         spans = (end - begin for begin, end in pairwise(clock))
         seconds = dict(zip(("read", "detect", "blobs", "track"), spans, strict=True))
-        motion, warnings = foreground.motion, foreground.warnings
+        motion = foreground.motion
+        warnings = foreground.warnings + outlook.look(frame, foreground, tracker.road)
         for warning in warnings:
             log.warning("at %.1f s: %s", frame.time_s, warning)
         yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds, motion, warnings)

@@ -17,7 +17,7 @@ def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05):
     box = np.asarray(box, float)
     usual = np.tile(np.full(2, np.nan) if typical is None else typical, (len(box), 1))
     area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
-    group, count = together(box, area, np.asarray(predicted, float), usual, 0.7, gap)
+    group, count = together(box, area, np.asarray(predicted, float), usual, True, 0.7, gap)
     assert sorted(set(group.tolist())) == list(range(count))
     return group.tolist()
 

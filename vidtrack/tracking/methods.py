@@ -28,12 +28,20 @@ def rule(settings: TrackerSettings) -> Associator | Deferred:
 
 
 def life(
-    kind: str, settings: TrackerSettings, hits: int, window: int, *, idle_s: float | None = None, **patience: Any
+    kind: str,
+    settings: TrackerSettings,
+    hits: int,
+    window: int,
+    *,
+    idle_s: float | None = None,
+    idle_travel: float = 0.0,
+    **patience: Any,
 ) -> Life:
     """The rules of confirmation and deletion by their name: m-of-n as given, or llr, the score.
 
+    idle_s, idle_travel  those of m-of-n, see LifeCycle
     patience  what both have in common: confirm_s, confirm_travel, coast_s, hidden_s, coast_scans
     """
     if kind == "llr":
         return LogRatio(settings.false_track, settings.missed_track, **patience)
-    return LifeCycle(hits, window, idle_s=idle_s, **patience)
+    return LifeCycle(hits, window, idle_s=idle_s, idle_travel=idle_travel, **patience)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vidtrack.scan import TENTATIVE, Floats, Ints, Tracks
+from vidtrack.scan import TENTATIVE, Floats, Ints, Mask, Tracks
 from vidtrack.tracking.boxes import best_cover, longer
 
 _CELLS = 20  # across the longer side of the picture
@@ -29,6 +29,10 @@ class RestlessMap:
         self._time_s = 0.0
         self._id: Ints = np.empty(0, np.int64)  # tracks of the last scan that have not travelled yet
         self._xy: Floats = np.empty((0, 2))
+
+    def now(self) -> Mask:
+        """(rows, columns) cells that are restless."""
+        return np.asarray(self.starts > _RESTLESS)
 
     def restless(self, xy: Floats) -> np.ndarray:
         """(N,) whether places (N, 2) saw false starts lately."""

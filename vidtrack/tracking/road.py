@@ -8,6 +8,7 @@ from vidtrack.scan import Floats, Tracks
 from vidtrack.tracking.restless import RestlessMap
 from vidtrack.tracking.sizes import SizeField
 
+_CAUTION = 3.0  # times as far must a track travel to be confirmed where the picture is restless
 _EDGE = 2.0  # px; a box this close to the border is cut by it
 
 
@@ -16,8 +17,9 @@ class Road:
 
     STATE = ("sizes", "restless")
 
-    def __init__(self, width: float, height: float) -> None:
-        """width, height of the picture [px]."""
+    def __init__(self, width: float, height: float, *, wary: bool = True) -> None:
+        """width, height of the picture [px]; wary: tracks must travel farther where others began in vain."""
+        self._wary = wary
         self._width, self._height = width, height
         self.sizes = SizeField(width, height)
         self.restless = RestlessMap(width, height)
@@ -32,4 +34,4 @@ class Road:
 
     def caution(self, xy: Floats) -> Floats:
         """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""
-        return np.where(self.restless.restless(xy), 3.0, 1.0)
+        return np.where(self._wary & self.restless.restless(xy), _CAUTION, 1.0)

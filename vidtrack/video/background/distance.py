@@ -23,7 +23,9 @@ def contrast(luma: Levels) -> np.float32:
     """How much of its contrast haze or darkness leaves to the scene (h, w), 0.5..1: vehicles lose as much."""
     rows = luma[::_ROWS]
     edges = np.abs(rows[:, 2:] - rows[:, :-2])
-    return np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
+    return (
+        np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
+    )
 
 
 def veil(luma: Image) -> float | None:

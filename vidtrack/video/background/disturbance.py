@@ -143,10 +143,13 @@ class Disturbance:
         hit = np.empty(picture.luma.shape, np.uint8)
         seen = picture if s.chroma else picture.grey()
         floor, factor, chroma = self._thresholds
-        disturbance(seen, scene, floor * self._contrast, factor, chroma, strength, hit)
+        disturbance(
+            seen, scene, floor * (self._contrast if s.contrast else np.float32(1)), factor, chroma, strength, hit
+        )
         if s.shadow:
             mark_shadow(seen, scene, self._black, hit)
-            reclaim(hit)
+            if s.amid:
+                reclaim(hit)
         return strength, hit
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

@@ -77,6 +77,7 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
     box = regions.boxes().astype(float)
     group, count = together(
         box, regions.areas().astype(float), measure.predicted(expected.box[known]), measure.typical(box),
+        settings.pieces,
         settings.join_overlap, settings.join_gap,
     )  # fmt: skip
     return measured(regions.joined(group, count), foreground, settings)

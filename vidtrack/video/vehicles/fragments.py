@@ -18,22 +18,22 @@ _NEAR = 0.35  # typical sizes between such pieces at most
 
 
 def together(
-    box: Floats, area: Floats, predicted: Floats, typical: Floats, overlap: float, gap: float
+    box: Floats, area: Floats, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
 ) -> tuple[Ints, int]:
     """Group of each region (R,) and their number: the pieces of one vehicle have one.
 
     box (R, 4) and area (R,) of the regions, predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of
-    vehicles at each region, NaN where unknown; overlap, gap: `blobs.join_overlap`, `blobs.join_gap`.
+    vehicles at each region, NaN where unknown; pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
 
     Pieces lie inside one predicted box, close together; or nobody predicted them, and one is small, near the other,
     and with it no larger than a vehicle. Two regions that are each like a vehicle are never pieces.
     """
-    return _together(box, area, predicted, typical, overlap, gap)
+    return _together(box, area, predicted, typical, pieces, overlap, gap)
 
 
 @kernel
 def _together(
-    box: Floats, area: Floats, predicted: Floats, typical: Floats, overlap: float, gap: float
+    box: Floats, area: Floats, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
 ) -> tuple[Ints, int]:
     parent = np.arange(len(box))
     vehicle = np.empty(len(box), np.int64)
@@ -47,7 +47,7 @@ def _together(
                 longer = max(predicted[vehicle[i], 2], predicted[vehicle[i], 3])
                 if _gap(box[i], box[j]) <= gap * longer:
                     join(parent, i, j)
-            if _whole(box[i], box[j], typical[i]):
+            if pieces and _whole(box[i], box[j], typical[i]):
                 join(parent, i, j)
     return components(parent)
 
