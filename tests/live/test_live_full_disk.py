@@ -98,8 +98,8 @@ def check_no_half_files(folder):
 
 
 def test_a_quota_ends_files_and_not_the_run(camera, tmp_path):
-    """10 kB a file are too few for the picture and most states, and after a while for the tables."""
-    limit = 10_000
+    """20 kB a file are too few for the picture and most states, and after a while for the tables."""
+    limit = 20_000
     said = tmp_path / "said"
     arguments = (camera.url(), "-o", "out", "--state", "cam.state", "--save-masks", "masks")
     with said.open("w") as stderr:
