@@ -135,3 +135,16 @@ def test_a_restless_place_asks_for_more_travel_before_a_track_is_confirmed():
     flutter(tracker.road.learn, 8, box=[95.0, 100.0, 14.0, 14.0])
     assert not confirmed_ids(play(tracker, swaying, 0.9))
     assert confirmed_ids(play(default_tracker(), swaying, 0.9))
+
+
+def test_boxes_grow_and_shrink_with_the_sizes_that_are_typical_where_they_go():
+    road = Road(640, 480)
+    near, far = np.array([[300.0, 380.0, 80.0, 60.0]]), np.array([[310.0, 160.0, 80.0, 60.0]])
+    assert road.growth(near, far).tolist() == [[1, 1, 1, 1]]  # nothing is known yet
+    road.sizes.spread = np.full(2, 0.1)
+    road.sizes._fit = np.array([[60.0, 40.0], [0.0, 0.0], [90.0, 60.0]])
+    slow = near + np.array([0.0, -4.0, 0.0, 0.0])
+    expected = road.sizes.typical(slow) / road.sizes.typical(near)
+    np.testing.assert_allclose(road.growth(near, slow), np.tile(expected, 2))
+    assert road.growth(near, slow).max() < 1
+    np.testing.assert_allclose(road.growth(far, near), 1.2)  # nothing becomes so much larger in one scan

@@ -9,6 +9,7 @@ from vidtrack.tracking.restless import RestlessMap
 from vidtrack.tracking.sizes import SizeField
 
 _CAUTION = 3.0  # times as far must a track travel to be confirmed where the picture is restless
+_FASTEST = 1.2  # times as large can a vehicle become from one scan to the next
 _EDGE = 2.0  # px; a box this close to the border is cut by it
 
 
@@ -31,6 +32,13 @@ class Road:
         whole = (left > _EDGE) & (top > _EDGE) & (left + width < right) & (top + height < bottom)
         self.sizes.learn(tracks, whole)
         self.restless.learn(tracks)
+
+    def growth(self, before: Floats, after: Floats) -> Floats:
+        """(N, 4) factors by which boxes (N, 4) grow on their way, about a point in them: far vehicles look small."""
+        if not self.sizes.known or not len(before):
+            return np.ones((len(before), 4))
+        grown = self.sizes.typical(after) / self.sizes.typical(before)
+        return np.tile(np.clip(np.nan_to_num(grown, nan=1.0), 1 / _FASTEST, _FASTEST), 2)
 
     def caution(self, xy: Floats) -> Floats:
         """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""

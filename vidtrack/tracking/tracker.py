@@ -198,8 +198,11 @@ class Tracker:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
         dt = self._since_last(t)
         x, P = self.bank.x, self.bank.P
+        before = self._boxes()
         self.bank.predict(dt)
         self.t = t
+        if self.road:
+            self.register.box *= self.road.growth(before, self._boxes())
         if self.smooth:
             self._remember(dt, x, P)
         lost = self.life.lost(self.register, t)
