@@ -7,7 +7,7 @@ import vidtrack as vt
 from vidtrack.config import load
 from vidtrack.errors import ConfigError
 from vidtrack.live.run import LiveRun
-from vidtrack.output.linked import Linked
+from vidtrack.output.linked import Linked, _within
 from vidtrack.output.sink import Step
 from vidtrack.radar_run import RadarRun
 
@@ -150,3 +150,13 @@ def test_where_it_has_no_effect_it_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"output\.link .* radar"):
         RadarRun(str(tmp_path / "plots.csv"), settings, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_pairs_in_reach_are_found_without_comparing_all_tracks():
+    rng = np.random.default_rng(0)
+    begins, ends = rng.integers(0, 100, (2, 60)) / 25
+    gap = begins - ends[:, None]
+    before, after, between = _within(ends, begins, 0.4)
+    expected = np.nonzero((gap > 0) & (gap <= 0.4))
+    assert np.array_equal([before, after], expected)
+    assert np.array_equal(between, gap[expected])

@@ -14,6 +14,7 @@ from vidtrack.output.sink import Step
 from vidtrack.pipeline import build_detector, build_tracker, video_steps
 from vidtrack.traffic.lines import Line, LineCounter
 from vidtrack.video.background import create
+from vidtrack.video.background.camera import Camera
 from vidtrack.video.background.canvas import fitting, lay, recut
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import UNKNOWN, start
@@ -256,3 +257,23 @@ def test_a_camera_that_never_holds_still_is_told_once_and_nothing_is_reported():
     assert len(said) == 1
     assert "does not hold still" in said[0]
     assert reported < 5
+
+
+def test_a_knock_is_no_traffic_where_nobody_measures_the_motion():
+    world, blind = World(), detector(registration=False, relearn_share=1.0)
+    seen = [blind.apply(world.frame(k), NONE_KNOWN) for k in range(3 * FPS)]
+    seen += [blind.apply(world.frame(k, plane.shift(6, 4)), NONE_KNOWN) for k in range(3 * FPS, 5 * FPS)]
+    assert not any(foreground.mask.any() for foreground in seen)
+
+
+def test_points_are_chosen_again_where_there_were_too_few():
+    luma = np.full(SHAPE, 100, np.uint8)
+    luma[80:90, 100:120] = 160
+    none = np.empty((0, 0), np.uint8)
+    camera = Camera(still_s=10.0)
+    camera.follow(luma, start(Picture(luma, none, none)), NONE_KNOWN, 0.0)
+    assert not camera.fits
+    luma = World().frame(0).y
+    for time_s in (0.5, 1.5, 2.0):
+        camera.follow(luma, start(Picture(luma, none, none)), NONE_KNOWN, time_s)
+    assert camera.fits

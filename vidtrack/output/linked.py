@@ -115,9 +115,7 @@ class Ends:
 
         One to one, of the largest summed log-likelihood ratio: one object, against another that begins by chance.
         """
-        gap = self.time[self.first] - self.time[self.last][:, None]
-        before, after = np.nonzero((gap > 0) & (gap <= longest_s))
-        gap = gap[before, after]
+        before, after, gap = _within(self.time[self.last], self.time[self.first], longest_s)
         ratio = np.log(self.head_box[after, 2:] / self.tail_box[before, 2:]) / SIZE_SIGMA
         d2 = np.einsum("ki,ki->k", ratio, ratio)
         cost = d2 + 2 * ratio.shape[1] * np.log(SIZE_SIGMA) + self._chance(after, gap)
@@ -193,6 +191,19 @@ class Ends:
             box=absolute(box, x[:, list(self.motion.position)]), age_s=row.age_s + ahead,
             measurement=np.array([-1]), nis=np.array([np.nan]),
         )  # fmt: skip
+
+
+def _within(ends: Floats, begins: Floats, longest_s: float) -> tuple[Ints, Ints, Floats]:
+    """Rows (L,) that end, in order, others that begin at most longest_s [s] later, and the times between (L,) [s]."""
+    order = np.argsort(begins, kind="stable")
+    latest = np.nextafter(ends + longest_s, np.inf)
+    low, high = (np.searchsorted(begins[order], t, side="right") for t in (ends, latest))
+    before = np.repeat(np.arange(len(ends)), high - low)
+    after = order[np.arange(len(before)) + np.repeat(high - np.cumsum(high - low), high - low)]
+    gap = begins[after] - ends[before]
+    rows = np.lexsort((after, before))
+    rows = rows[gap[rows] <= longest_s]
+    return before[rows], after[rows], gap[rows]
 
 
 COLUMNS = (

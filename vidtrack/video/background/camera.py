@@ -100,10 +100,10 @@ class Camera:
 
         known  (K, 4) boxes of vehicles expected here, on the canvas
         """
-        if not len(self._points.x) and time_s - self._chosen_s > _CHOSEN_S:
+        if self._points.start[1] < FEWEST and time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
         if not self.moves and self._points.start[1] < FEWEST:  # nothing to hold on to
-            self.fits, self._time_s = False, time_s
+            self.fits, self.lost_s, self._time_s = False, 0.0, time_s
             return scene
         scene = (self._track if self.moves else self._watch)(luma, scene, known, time_s)
         self._notice_loss(luma, time_s)

@@ -94,7 +94,8 @@ class Disturbance:
         strength, hit = self._disturbed(picture, scene)
         mask = np.empty_like(hit)
         majority(hit, s.majority_px, mask)
-        self._changed_s = self._change.lasted_s(mask, self._time_s, self._camera.fits)
+        fits = s.registration and self._camera.fits  # nobody looked, if not
+        self._changed_s = self._change.lasted_s(mask, self._time_s, fits)
         if self._changed_s > 0:
             return np.zeros_like(mask), strength
         if s.holes:

@@ -97,14 +97,14 @@ def _absorb_small(
 ) -> None:
     """Join parts whose box is smaller than `least` to the neighbour with the widest neck, the smallest first."""
     h, w = label.shape
+    low, high = np.full((len(parent), 2), 2**31), np.full((len(parent), 2), -1)
+    for y in range(h):
+        for x in range(w):
+            if label[y, x] >= 0:
+                r = _root(parent, label[y, x])
+                low[r, 0], low[r, 1] = min(low[r, 0], x), min(low[r, 1], y)
+                high[r, 0], high[r, 1] = max(high[r, 0], x), max(high[r, 1], y)
     while True:
-        low, high = np.full((len(parent), 2), 2**31), np.full((len(parent), 2), -1)
-        for y in range(h):
-            for x in range(w):
-                if label[y, x] >= 0:
-                    r = _root(parent, label[y, x])
-                    low[r, 0], low[r, 1] = min(low[r, 0], x), min(low[r, 1], y)
-                    high[r, 0], high[r, 1] = max(high[r, 0], x), max(high[r, 1], y)
         smallest, size, into = -1, least, -1
         for r in range(len(parent)):
             area = (high[r, 0] - low[r, 0] + 1) * (high[r, 1] - low[r, 1] + 1)
@@ -120,6 +120,9 @@ def _absorb_small(
         if smallest < 0:
             return
         parent[smallest] = into
+        for axis in range(2):
+            low[into, axis] = min(low[into, axis], low[smallest, axis])
+            high[into, axis] = max(high[into, axis], high[smallest, axis])
 
 
 @kernel
