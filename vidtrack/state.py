@@ -112,7 +112,9 @@ def _check(name: str, now: Any, found: Any) -> None:
         return
     same_kind = isinstance(found, np.ndarray) and found.dtype == now.dtype and found.ndim == now.ndim
     if not same_kind or any(size not in (0, new) for size, new in zip(now.shape[1:], found.shape[1:], strict=True)):
-        raise FormatError(f"the saved state's {name} does not fit: other settings made it; give it those, or remove it")
+        raise FormatError(
+            f"the saved state's {name} does not fit: other settings or another version made it; give it those, or remove it"
+        )
 
 
 def _names(thing: Any) -> tuple[str, ...]:
@@ -127,5 +129,5 @@ def _get(state: State, name: str) -> Any:
         return state[name]
     except KeyError:
         raise FormatError(
-            f"the saved state has no {name}: other settings made it; give it those, or remove it"
+            f"the saved state has no {name}: other settings or another version made it; give it those, or remove it"
         ) from None
