@@ -113,7 +113,7 @@ def _check(name: str, now: Any, found: Any) -> None:
     same_kind = isinstance(found, np.ndarray) and found.dtype == now.dtype and found.ndim == now.ndim
     if not same_kind or any(size not in (0, new) for size, new in zip(now.shape[1:], found.shape[1:], strict=True)):
         raise FormatError(
-            f"the saved state's {name} does not fit: other settings or another version made it; give it those, or remove it"
+            f"the saved state's {name} does not fit: other settings or another version made it; remove it"
         )
 
 

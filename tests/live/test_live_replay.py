@@ -62,7 +62,8 @@ def test_parts_cut_from_one_connection_do_too(camera, tmp_path):
     lived = [(part / "tracks.csv").read_text().splitlines() for part in parts_of(tmp_path / "out")]
     whole = [row for part in lived for row in part[1:]]
     assert replay(tape, tmp_path / "again", chosen).splitlines()[1:] == whole
-    alone = [replay(part, tmp_path / part.name, chosen).splitlines()[1:] for part in parts_of(tape)]
+    begun = [part for part in parts_of(tape) if is_recording(part)]  # the last may have ended before its first frame
+    alone = [replay(part, tmp_path / part.name, chosen).splitlines()[1:] for part in begun]
     assert any(alone)
     assert set().union(*alone) <= set(whole)  # a part alone begins where it began
 
