@@ -57,8 +57,8 @@ class DisturbanceSettings(Group):
     """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
     shadow: bool = True
     """what is the scene darkened by one factor, in luminance, colour and texture, is shadow, not foreground"""
-    amid: bool = True
-    """what passes for shadow amid a vehicle is vehicle: dark paint does"""
+    amid: bool = False
+    """what passes for shadow amid a vehicle is vehicle: dark paint does; soft shadow then widens boxes"""
     contrast: bool = True
     """luma_threshold falls with the contrast that haze or dusk leave to the scene, to half of it at least"""
     exposure: bool = True
