@@ -95,6 +95,14 @@ def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
     return index, share
 
 
+@kernel(inline="always")
+def common(a: Floats, b: Floats) -> float:
+    """Area that two boxes (4,) have in common; 0 where one of them is not known."""
+    wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
+    high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
+    return wide * high if wide > 0 and high > 0 else 0.0
+
+
 @kernel(error_model="numpy")
 def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: float) -> Ints:
     """(T,) for each inner box the outer one that overlaps it most, if it does so most in turn; -1 for none.
@@ -107,11 +115,10 @@ def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: flo
     for t in np.flatnonzero(one):
         for j in np.flatnonzero(other):
             a, b = inner[t], outer[j]
-            wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-            high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-            if not (wide > 0 and high > 0):
+            both = common(a, b)
+            if not both > 0:
                 continue
-            overlap = wide * high / (a[2] * a[3] + b[2] * b[3] - wide * high)
+            overlap = both / (a[2] * a[3] + b[2] * b[3] - both)
             if overlap >= best[t]:
                 index[t], best[t] = j, overlap
             if overlap >= most[j]:
@@ -135,11 +142,10 @@ def doubles(start: Ints, box: Floats, score: Floats) -> Mask:
             a = box[order[n]]
             for better in order[:n]:
                 b = box[better]
-                wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
-                high = min(a[1] + a[3], b[1] + b[3]) - max(a[1], b[1])
-                if double[better] or wide <= 0 or high <= 0:
+                both = common(a, b)
+                if double[better] or both <= 0:
                     continue
-                if wide * high > SAME * (a[2] * a[3] + b[2] * b[3] - wide * high):
+                if both > SAME * (a[2] * a[3] + b[2] * b[3] - both):
                     double[order[n]] = True
                     break
     return double

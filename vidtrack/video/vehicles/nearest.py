@@ -6,6 +6,7 @@ import numpy as np
 
 from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints
+from vidtrack.tracking.boxes import common
 from vidtrack.video.frame import Image
 
 _COVERED = 0.4  # share of a predicted box that the region fills if the vehicle is in it
@@ -25,7 +26,7 @@ def nearest_box(inside: Image, box: Ints, predicted: Floats) -> tuple[Ints, int]
     for k in range(len(predicted)):
         used[k] = _filled(inside, box, predicted[k]) >= _COVERED
         for j in range(k):
-            used[k] &= not (used[j] and _common(predicted[j], predicted[k]) > _SAME)
+            used[k] &= not (used[j] and _share(predicted[j], predicted[k]) > _SAME)
     boxes = np.flatnonzero(used)
     number = np.full(len(boxes), -1)
     count = 0
@@ -63,9 +64,6 @@ def _filled(inside: Image, box: Ints, p: Floats) -> float:
 
 
 @kernel(error_model="numpy")
-def _common(a: Floats, b: Floats) -> float:
-    """Overlap of two boxes as a share of the smaller one."""
-    common = 1.0
-    for axis in range(2):
-        common *= max(min(a[axis] + a[axis + 2], b[axis] + b[axis + 2]) - max(a[axis], b[axis]), 0.0)
-    return common / min(a[2] * a[3], b[2] * b[3])
+def _share(a: Floats, b: Floats) -> float:
+    """What two boxes have in common as a share of the smaller one."""
+    return common(a, b) / min(a[2] * a[3], b[2] * b[3])
