@@ -17,6 +17,7 @@ _WHOLE = 1.2  # typical areas of what pieces make together at most
 _NEAR = 0.35  # typical sizes between such pieces at most
 
 
+@kernel
 def together(
     box: Floats, area: Floats, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
 ) -> tuple[Ints, int]:
@@ -28,13 +29,6 @@ def together(
     Pieces lie inside one predicted box, close together; or nobody predicted them, and one is small, near the other,
     and with it no larger than a vehicle. Two regions that are each like a vehicle are never pieces.
     """
-    return _together(box, area, predicted, typical, pieces, overlap, gap)
-
-
-@kernel
-def _together(
-    box: Floats, area: Floats, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
-) -> tuple[Ints, int]:
     parent = np.arange(len(box))
     vehicle = np.empty(len(box), np.int64)
     for i in range(len(box)):
