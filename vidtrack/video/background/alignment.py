@@ -32,14 +32,12 @@ _FITS_LEVELS, _FITS_PX = 4.0, 0.3  # a point fits if its residual is less than t
 class Fit(NamedTuple):
     """A picture on the canvas.
 
-    motion    (2, 3) from the canvas to the picture, in pixels of both
-    share     of the points used, those that fit
-    residual  px; root mean square of what the points that fit are off along their gradients
+    motion  (2, 3) from the canvas to the picture, in pixels of both
+    share   of the points used, those that fit
     """
 
     motion: Floats
     share: float
-    residual: float
 
 
 def pyramid(luma: Image, levels: int) -> list[Image]:
@@ -58,7 +56,7 @@ def align(pictures: Sequence[Image], points: Points, free: Mask, motion: Floats,
     free      (N,) points where no traffic is expected
     every     only each so many'th point is used
     """
-    fit = Fit(motion, 0.0, np.inf)
+    fit = Fit(motion, 0.0)
     for level in reversed(range(len(pictures))):
         part = (points.start[level], points.start[level + 1], every)
         stiff = level == len(CELLS) - 1
@@ -83,8 +81,8 @@ def leap(scene: Levels, luma: Image, motion: Floats) -> Floats:
 def _fit(
     luma: Image, size: float, points: Points, free: Mask, part: tuple[int, int, int], motion: Floats, steps: int,
     stiff: bool,
-) -> tuple[Floats, float, float]:  # fmt: skip
-    """Motion, share of the points that fit, and their residual.
+) -> tuple[Floats, float]:  # fmt: skip
+    """Motion, and share of the points that fit.
 
     I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d (a mere shift if it is stiff), gain and
     bias by least squares with Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the
@@ -94,7 +92,7 @@ def _fit(
     used = used[free[part[0] : part[1] : part[2]]]
     count = len(used)
     if count < FEWEST:
-        return motion, 0.0, np.inf
+        return motion, 0.0
     x, y, value, gx, gy = points.x[used], points.y[used], points.value[used], points.gx[used], points.gy[used]
     middle_x, middle_y = np.float64(np.mean(x)), np.float64(np.mean(y))
     radius = np.sqrt(np.mean((x - middle_x) ** 2 + (y - middle_y) ** 2)) + 1.0
@@ -110,7 +108,7 @@ def _fit(
     inside = _sample(luma, size, x, y, A, seen)
     for _ in range(steps):
         if inside < _INSIDE * count:
-            return A, 0.0, np.inf
+            return A, 0.0
         centre, sigma = _spread(seen, gain, bias, value)
         for k in range(count):
             r = (seen[k] - gain * value[k] - bias - centre) / (_TUKEY * sigma)
@@ -126,19 +124,18 @@ def _fit(
         found = np.linalg.solve(normal, weighted.T @ shown)
         gain, bias = found[4] / _GREY, found[5]
         if not 1 / _GAIN < gain < _GAIN:
-            return A, 0.0, np.inf
+            return A, 0.0
         tx, ty, grow, turn = found[0] / gain, found[1] / gain, found[2] / gain / radius, found[3] / gain / radius
         A = _undone(A, tx, ty, 1 + grow, turn, middle_x, middle_y)
         inside = _sample(luma, size, x, y, A, seen)
         if abs(tx) + abs(ty) + radius * (abs(grow) + abs(turn)) < _SETTLED_PX * size:
             break
-    fits, total = 0, 0.0
+    fits = 0
     for k in range(count):
         off, slope = abs(seen[k] - gain * value[k] - bias), np.sqrt(gx[k] ** 2 + gy[k] ** 2) * gain
         if off < _FITS_LEVELS + _FITS_PX * slope:
             fits += 1
-            total += (off / slope) ** 2
-    return A, fits / max(inside, 1), np.sqrt(total / max(fits, 1))
+    return A, fits / max(inside, 1)
 
 
 @kernel(error_model="numpy")
