@@ -198,10 +198,10 @@ class Tracker:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
         dt = self._since_last(t)
         x, P = self.bank.x, self.bank.P
-        before = self._boxes()
+        before = self._boxes() if self.road else None
         self.bank.predict(dt)
         self.t = t
-        if self.road:
+        if self.road and before is not None:
             self.register.box *= self.road.growth(before, self._boxes())
         if self.smooth:
             self._remember(dt, x, P)
