@@ -12,6 +12,19 @@ from vidtrack.video.frame import Frame
 WORDS = {"t": Status.TENTATIVE, "c": Status.CONFIRMED, "o": Status.COASTING, "m": Status.MERGED}
 
 
+class Kept:
+    """A sink that keeps what it is given."""
+
+    def __init__(self):
+        self.steps, self.closed = [], False
+
+    def step(self, step):
+        self.steps.append(step)
+
+    def close(self):
+        self.closed = True
+
+
 def make_tracks(t, rows, **extra):
     """Tracks at time t from rows (id, letter of the status, x, y); coasting ones have no measurement."""
     ids = np.array([row[0] for row in rows], np.int64)

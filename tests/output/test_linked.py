@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from synthetic_steps import Kept
 
 import vidtrack as vt
 from vidtrack.config import load
@@ -13,17 +14,6 @@ from vidtrack.radar_run import RadarRun
 
 MODEL = vt.ConstantVelocity(accel=1.0, speed=4.0, hold_s=0.5, per_size=True)
 FPS = 10.0
-
-
-class Kept:
-    def __init__(self):
-        self.steps, self.closed = [], False
-
-    def step(self, step):
-        self.steps.append(step)
-
-    def close(self):
-        self.closed = True
 
 
 def drive(k, x, v, y=100.0, size=(40.0, 20.0)):

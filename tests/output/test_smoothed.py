@@ -3,6 +3,7 @@
 import numpy as np
 import pyarrow.parquet
 import pytest
+from synthetic_steps import Kept
 
 import vidtrack as vt
 from vidtrack.config import Settings
@@ -10,17 +11,6 @@ from vidtrack.output.mot import MotFile
 from vidtrack.output.sink import Step
 from vidtrack.output.smoothed import Smoothed, smoothed_by
 from vidtrack.radar_run import RadarRun
-
-
-class Kept:
-    def __init__(self):
-        self.steps, self.closed = [], False
-
-    def step(self, step):
-        self.steps.append(step)
-
-    def close(self):
-        self.closed = True
 
 
 def steps(count, there=lambda k: True, box=True):
