@@ -93,7 +93,9 @@ def learn(
                 scene.steady_s[y, x] = scene.steady_s[y, x] + dt if steady else _NONE
         if len(picture.cb) > 0 and y % 2 == 0:
             for x in range((w + 1) // 2):
-                share = weight if covered[y, 2 * x] | hit[y, 2 * x] & SHADOW == 0 else _NONE
+                right = min(2 * x + 1, w - 1)  # the pixels that share one of chroma
+                taken = covered[y, 2 * x] | covered[y, right] | (hit[y, 2 * x] | hit[y, right]) & SHADOW
+                share = weight if taken == 0 else _NONE
                 scene.cb[y // 2, x] += share * (np.float32(picture.cb[y // 2, x]) - scene.cb[y // 2, x])
                 scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])
 
