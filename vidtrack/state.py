@@ -69,7 +69,10 @@ def write_state(path: Path, state: State) -> None:
     arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
     plain = {name: value for name, value in state.items() if name not in arrays}
     block = BytesIO()
-    np.savez(block, allow_pickle=False, **{_PLAIN: np.frombuffer(json.dumps(plain).encode(), np.uint8)}, **arrays)
+    with zipfile.ZipFile(block, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:  # savez takes 6
+        for name, array in {_PLAIN: np.frombuffer(json.dumps(plain).encode(), np.uint8), **arrays}.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
     new = path.with_name(path.name + ".new")
     try:
         with open(new, "wb") as file:

@@ -26,7 +26,7 @@ _ANOTHER = 3.0  # ln; that another vehicle stands so close is less likely by thi
 _PART, _CUT_PART = 0.26, 0.11  # share of the typical box area that is a vehicle; where the border cuts it
 _OPEN = 0.72  # before a typical size is known: a region that fills less of its box may be several vehicles
 _EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
-_LEAST_PX = 60  # pixels of the mask; smaller regions have no shape
+_LEAST_PX = 300  # pixels of the mask; in smaller regions the window of the majority leaves no shape
 _AT_EDGE = 1.0  # px of the mask; a region this close to the picture's edge is cut by it
 _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
 
