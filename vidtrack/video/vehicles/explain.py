@@ -26,7 +26,7 @@ _ANOTHER = 3.0  # ln; that another vehicle stands so close is less likely by thi
 _PART, _CUT_PART = 0.26, 0.11  # share of the typical box area that is a vehicle; where the border cuts it
 _OPEN = 0.72  # before a typical size is known: a region that fills less of its box may be several vehicles
 _EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
-_LEAST_PX = 300  # pixels of the mask; in smaller regions the window of the majority leaves no shape
+_LEAST_PX, _LEAST_HOLLOW_PX = 60, 300  # pixels of the mask; the shape of smaller regions is the grid's
 _AT_EDGE = 1.0  # px of the mask; a region this close to the picture's edge is cut by it
 _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
 
@@ -89,7 +89,7 @@ def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
     typical = measure.typical(box)
     large = np.any(box[:, 2:] > _LARGE * typical, axis=1)
     hollow = np.isnan(typical[:, 0]) & (area < _OPEN * box[:, 2] * box[:, 3])
-    for i in np.flatnonzero((large | hollow) & (area >= _LEAST_PX)).tolist():
+    for i in np.flatnonzero(large & (area >= _LEAST_PX) | hollow & (area >= _LEAST_HOLLOW_PX)).tolist():
         border = measure.border(box[i])
         inside = patch(regions, i, box[i])
         if large[i]:
