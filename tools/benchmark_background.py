@@ -37,7 +37,7 @@ WITHOUT = {
     "no majority": {"majority_px": 1},
     "majority 5": {"majority_px": 5},
     "no shadow test": {"shadow": False},
-    "shadow amid vehicles": {"amid": False},
+    "shadow amid vehicles": {"amid": True},
     "one threshold for all": {"contrast": False},
     "no hole filling": {"holes": False},
     "no ghost healing": {"ghosts": False},

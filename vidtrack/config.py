@@ -53,6 +53,8 @@ class DisturbanceSettings(Group):
     """use colour where the source has it"""
     chroma_threshold: float = Field(10.0, gt=0, le=255)
     """grey levels; a difference of Cb or Cr alone that is a disturbance"""
+    weak: float = Field(0.5, gt=0, le=1)
+    """share of the thresholds that is enough to link pieces of one vehicle; 1: such links say nothing new"""
     majority_px: int = Field(7, ge=1, le=15)
     """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
     shadow: bool = True

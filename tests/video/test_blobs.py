@@ -93,7 +93,8 @@ def joined(foreground, predicted, settings=JOIN):
     regions = find_regions(foreground.mask, 0)
     box, unknown = regions.boxes().astype(float), np.full((regions.total, 2), np.nan)
     group, count = together(
-        box, regions.areas().astype(float), np.asarray(predicted, float).reshape(-1, 4), unknown, True,
+        box, regions.areas().astype(float), np.arange(regions.total),
+        np.asarray(predicted, float).reshape(-1, 4), unknown, True,
         settings.join_overlap, settings.join_gap,
     )  # fmt: skip
     return measured(regions.joined(group, count), foreground, settings)

@@ -1,5 +1,7 @@
 """One explanation of every blob: a vehicle, a piece of one, or several."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_tracks import drive, tracks_of
@@ -46,6 +48,15 @@ def test_two_vehicles_with_a_neck_between_them_are_two(road):
     assert blobs.area.sum() == np.count_nonzero(picture.mask)
     np.testing.assert_allclose(found(blobs), [[100, 100, 38, 20], [142, 100, 38, 20]], atol=4)
     assert len(explain(picture, NONE, road, BlobSettings(cut=False))) == 1
+
+
+def test_pieces_that_weak_foreground_links_are_one_vehicle_before_sizes_are_known():
+    picture = foreground((100, 100, 40, 8), (110, 84, 12, 6))
+    young = Road(320, 240)
+    assert len(explain(picture, NONE, young, SETTINGS)) == 2
+    linked = replace(picture, weak=foreground((100, 100, 40, 8), (110, 84, 12, 20)).mask)
+    assert found(explain(linked, NONE, young, SETTINGS)) == [[100, 84, 40, 24]]
+    assert len(explain(linked, NONE, young, BlobSettings(pieces=False))) == 2
 
 
 def test_two_vehicles_nose_to_tail_are_divided_among_those_predicted(road):

@@ -12,12 +12,13 @@ CAR = (40.0, 20.0)
 NOBODY = np.empty((0, 4))
 
 
-def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05):
+def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None):
     """Group of each box (R, 4), where it is known that vehicles are as large as `typical`; None: it is not."""
     box = np.asarray(box, float)
     usual = np.tile(np.full(2, np.nan) if typical is None else typical, (len(box), 1))
     area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
-    group, count = together(box, area, np.asarray(predicted, float), usual, True, 0.7, gap)
+    link = np.arange(len(box)) if link is None else np.asarray(link)
+    group, count = together(box, area, link, np.asarray(predicted, float), usual, True, 0.7, gap)
     assert sorted(set(group.tolist())) == list(range(count))
     return group.tolist()
 
@@ -39,6 +40,15 @@ def test_a_small_piece_beside_a_vehicle_belongs_to_it_though_nobody_predicted_it
     assert grouped([[10, 10, 30, 20], [60, 12, 6, 10]]) == [0, 1]  # too far
     assert grouped([[10, 10, 40, 20], [52, 12, 15, 18]]) == [0, 1]  # more than a vehicle
     assert grouped([[10, 10, 30, 20], [44, 12, 6, 10]], typical=None) == [0, 1]
+
+
+@pytest.mark.parametrize("typical", [CAR, None])
+def test_pieces_that_weak_foreground_links_are_one_unless_each_is_a_vehicle(typical):
+    pieces = [[10, 10, 30, 6], [20, 18, 12, 4]]
+    assert grouped(pieces, typical=None) == [0, 1]
+    assert grouped(pieces, typical=typical, link=[0, 0]) == [0, 0]
+    assert grouped(pieces, [pieces[0], pieces[1]], typical=None, link=[0, 0]) == [0, 1]
+    assert grouped([[10, 10, 35, 18], [50, 10, 35, 18]], typical=typical, link=[0, 0]) == [0, 1]
 
 
 def test_a_region_of_two_predicted_vehicles_is_a_piece_of_neither():

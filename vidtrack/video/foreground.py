@@ -21,6 +21,7 @@ class Foreground:
     mask      (h, w) 0 background, 255 foreground
     strength  (h, w) disturbance in units of its threshold (1 is just detected)
     step      source pixels per mask pixel
+    weak      (h, w) the mask with lower thresholds: pieces that it links may be of one vehicle; None: not known
     place     (2, 3) from the mask, enlarged by `step`, to the scene [source px]; None: it lies on it
     motion    (2, 3) from the scene to the picture [source px]; None: the camera is where it was in the first one
     warnings  what the user should know, each said once
@@ -30,6 +31,7 @@ class Foreground:
     mask: Image
     strength: NDArray
     step: int
+    weak: Image | None = None
     place: Floats | None = None
     motion: Floats | None = None
     surveyed: Floats | None = None

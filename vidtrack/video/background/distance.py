@@ -46,10 +46,11 @@ def disturbance(
     floor: np.float32,
     noise_factor: np.float32,
     chroma_threshold: np.float32,
+    least: np.float32,
     strength: Levels,
     hit: Image,
 ) -> None:
-    """strength = sqrt((dY / TY)^2 + (dCb / TC)^2 + (dCr / TC)^2) and hit = strength > 1, both (h, w).
+    """strength = sqrt((dY / TY)^2 + (dCb / TC)^2 + (dCr / TC)^2) and hit = strength > least, both (h, w).
 
     TY = max(floor, noise_factor * noise), per pixel; TC = chroma_threshold. Four luminance pixels share one of
     chroma. strength is float32, hit uint8 0 or 1.
@@ -70,4 +71,4 @@ def disturbance(
             threshold = max(floor, noise_factor * scene.noise[y, x])
             d = (np.float32(picture.luma[y, x]) - scene.luma[y, x]) / threshold
             strength[y, x] = np.sqrt(d * d + chroma[x])
-            hit[y, x] = np.uint8(strength[y, x] > _ONE)
+            hit[y, x] = np.uint8(strength[y, x] > least)

@@ -68,36 +68,39 @@ class Disturbance:
         if self._camera.lost_s > 0:
             self._changed_s = self._camera.lost_s
             self._change.skip(frame.time_s)
-            mask, strength = np.zeros_like(picture.luma), np.zeros(picture.luma.shape, np.float32)
+            nothing = np.zeros_like(picture.luma)
+            mask, weak, strength = nothing, nothing, np.zeros(picture.luma.shape, np.float32)
         elif self._camera.moves:
             laid, span = lay(picture, self._camera.motion, self._scene)
-            mask, strength = self._map(laid, known, dt, span)
+            mask, weak, strength = self._map(laid, known, dt, span)
         else:
-            mask, strength = self._map(picture, known, dt)
+            mask, weak, strength = self._map(picture, known, dt)
         if not self._camera.trusted:
             mask = np.zeros_like(mask)
         place, motion = self._camera.place, self._camera.motion
         if self._changed_s > self._settings.relearn_s:
             self._scene = self._start(picture, frame.time_s)
-        return replace(self._view.foreground(mask, strength, place, motion), warnings=self._camera.warnings())
+        foreground = self._view.foreground(mask, strength, place, motion)
+        return replace(foreground, weak=weak, warnings=self._camera.warnings())
 
     def _map(
         self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
-    ) -> tuple[Image, NDArray[np.float32]]:
-        """Mask and strength; what is free is learnt. The mask is empty while the whole picture changes.
+    ) -> tuple[Image, Image, NDArray[np.float32]]:
+        """Mask, weak mask and strength; what is free is learnt. The mask is empty while the whole picture changes.
 
         span  (h, 2) columns from which to which the picture shows each row of the canvas; None: all of it
         """
         s, scene = self._settings, self._scene
         if s.exposure:
             follow_gain(picture, scene, np.float32(self._view.black))
-        strength, hit = self._disturbed(picture, scene)
-        mask = np.empty_like(hit)
+        strength, hit, weak_hit = self._disturbed(picture, scene)
+        mask, weak = np.empty_like(hit), np.empty_like(hit)
         majority(hit, s.majority_px, mask)
+        majority(weak_hit, s.majority_px, weak)
         fits = s.registration and self._camera.fits  # nobody looked, if not
         self._changed_s = self._change.lasted_s(mask, self._time_s, fits)
         if self._changed_s > 0:
-            return np.zeros_like(mask), strength
+            return np.zeros_like(mask), weak, strength
         if s.holes:
             fill_holes(mask)
         spare(scene.covered_s, known, _KNOWN_S)
@@ -109,7 +112,7 @@ class Disturbance:
             haze = veil(picture.luma)
             self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
             self._absorb(picture, scene, hit)
-        return mask, strength
+        return mask, weak, strength
 
     def scene(self) -> Image:
         """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
@@ -137,21 +140,21 @@ class Disturbance:
     def _unsure(self) -> bool:
         return self._time_s - self._start_s < _UNSURE_S
 
-    def _disturbed(self, picture: Picture, scene: Scene) -> tuple[NDArray[np.float32], Image]:
-        """Strength, and hits: 1 disturbed, SHADOW, or 0."""
+    def _disturbed(self, picture: Picture, scene: Scene) -> tuple[NDArray[np.float32], Image, Image]:
+        """Strength, hits (1 disturbed, SHADOW, or 0), and the same from a weaker strength on."""
         s = self._settings
         strength = np.empty(picture.luma.shape, np.float32)
-        hit = np.empty(picture.luma.shape, np.uint8)
+        weak = np.empty(picture.luma.shape, np.uint8)
         seen = picture if s.chroma else picture.grey()
         floor, factor, chroma = self._thresholds
-        disturbance(
-            seen, scene, floor * (self._contrast if s.contrast else np.float32(1)), factor, chroma, strength, hit
-        )
+        floor *= self._contrast if s.contrast else np.float32(1)
+        disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak)
         if s.shadow:
-            mark_shadow(seen, scene, self._black, hit)
-            if s.amid:
-                reclaim(hit)
-        return strength, hit
+            mark_shadow(seen, scene, self._black, weak)
+        hit = np.where(strength > 1, weak, np.uint8(0))
+        if s.shadow and s.amid:
+            reclaim(hit)
+        return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:
         """Remove ghosts, blobs that are in the scene and not in the picture, from mask and scene."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from vidtrack import plane
@@ -76,11 +77,21 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
         regions = divided(regions, measure.predicted(dividing), measure)
     box = regions.boxes().astype(float)
     group, count = together(
-        box, regions.areas().astype(float), measure.predicted(expected.box[known]), measure.typical(box),
-        settings.pieces,
-        settings.join_overlap, settings.join_gap,
+        box, regions.areas().astype(float), _links(regions, foreground.weak),
+        measure.predicted(expected.box[known]), measure.typical(box),
+        settings.pieces, settings.join_overlap, settings.join_gap,
     )  # fmt: skip
     return measured(regions.joined(group, count), foreground, settings)
+
+
+def _links(regions: Regions, weak: Image | None) -> Ints:
+    """(R,) the region of the weak mask (h, w) that each region lies in; its own negative number without one."""
+    link = -1 - np.arange(regions.total)
+    if weak is not None:
+        _, inside = cv2.connectedComponents(weak)
+        found = inside[regions.row, regions.start]
+        link[regions.label[found > 0]] = found[found > 0]
+    return link
 
 
 def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:

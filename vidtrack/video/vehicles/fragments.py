@@ -14,20 +14,23 @@ _LIKE_BOX, _LIKE_FILL, _APART = 0.2, 0.6, 0.75  # before a typical size is known
 # own box that is filled, and the share of the union's box that two vehicles' boxes leave unfilled together
 _SMALL = 0.35  # share of the typical area of a piece that nobody predicted
 _WHOLE = 1.2  # typical areas of what pieces make together at most
+_LESSER = 0.6  # of two linked pieces the smaller is less than this share of the larger, before sizes are known
 _NEAR = 0.35  # typical sizes between such pieces at most
 
 
 @kernel
 def together(
-    box: Floats, area: Floats, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
+    box: Floats, area: Floats, link: Ints, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
 ) -> tuple[Ints, int]:
     """Group of each region (R,) and their number: the pieces of one vehicle have one.
 
-    box (R, 4) and area (R,) of the regions, predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of
-    vehicles at each region, NaN where unknown; pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
+    box (R, 4) and area (R,) of the regions, link (R,) the same number for regions that weak foreground links,
+    predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, NaN where unknown;
+    pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
 
     Pieces lie inside one predicted box, close together; or nobody predicted them, and one is small, near the other,
-    and with it no larger than a vehicle. Two regions that are each like a vehicle are never pieces.
+    and with it no larger than a vehicle; or they are linked, no larger than a vehicle, and before that is known one is
+    smaller than the other. Two regions that are each like a vehicle are never pieces.
     """
     parent = np.arange(len(box))
     vehicle = np.empty(len(box), np.int64)
@@ -43,6 +46,9 @@ def together(
                     join(parent, i, j)
             if pieces and _whole(box[i], box[j], typical[i]):
                 join(parent, i, j)
+            two = vehicle[i] >= 0 and vehicle[j] >= 0 and vehicle[i] != vehicle[j]
+            if pieces and link[i] == link[j] and not two and _fit(box[i], box[j], typical[i]):
+                join(parent, i, j)
     return components(parent)
 
 
@@ -54,6 +60,15 @@ def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
     usual = typical[0] * typical[1]
     small = min(a[2] * a[3], b[2] * b[3]) < _SMALL * usual
     return small and _union(a, b) <= _WHOLE * usual and _gap(a, b) <= _NEAR * max(typical[0], typical[1])
+
+
+@kernel
+def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
+    """Whether two linked boxes make no more than a vehicle of typical (2,) width and height."""
+    if np.isnan(typical[0]):
+        one, other = a[2] * a[3], b[2] * b[3]
+        return min(one, other) < _LESSER * max(one, other)
+    return _union(a, b) <= _WHOLE * typical[0] * typical[1]
 
 
 @kernel
