@@ -338,7 +338,13 @@ def test_a_folder_named_like_a_video_is_a_folder(vidtrack, tmp_path):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_has_the_common_options(vidtrack, name):
     _, shown, _ = vidtrack(name, "--help")
-    assert [option for option in ("-o,", "--seed", "--force", "--quiet", "-v,") if option not in shown] == []
+    assert [option for option in ("-o,", "--force", "--quiet", "-v,") if option not in shown] == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_only_commands_that_draw_random_numbers_have_a_seed(vidtrack, name):
+    _, shown, _ = vidtrack(name, "--help")
+    assert ("--seed" in shown) == (name in ("simulate", "radar", "predict", "reproduce"))
 
 
 def test_reports_and_copies_go_into_a_folder_on_request(vidtrack, tmp_path):

@@ -16,8 +16,14 @@ from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_va
 
 from vidtrack.errors import ConfigError
 from vidtrack.settings.group import Group
+from vidtrack.settings.inputs import Input as Input
+from vidtrack.settings.inputs import is_own, needs, reads
 from vidtrack.settings.live import LiveSettings as LiveSettings
 from vidtrack.settings.radar import RadarSettings as RadarSettings
+from vidtrack.settings.video import BlobSettings as BlobSettings
+from vidtrack.settings.video import DetectorSettings as DetectorSettings
+from vidtrack.settings.video import DisturbanceSettings as DisturbanceSettings
+from vidtrack.settings.video import PaperSettings as PaperSettings
 from vidtrack.toml_file import read_toml
 
 
@@ -40,103 +46,6 @@ class SourceSettings(Group):
         if end_s is not None and end_s < start_s:
             raise ValueError(f"must not be before source.start_s = {start_s:g}")
         return end_s
-
-
-class DisturbanceSettings(Group):
-    """The robust map; lengths are pixels of the processed picture (see source.scale), levels are 0..255."""
-
-    luma_threshold: float = Field(15.0, gt=0, le=255)
-    """grey levels; a smaller difference of luminance alone is never a disturbance"""
-    noise_factor: float = Field(4.0, ge=0, le=20)
-    """the threshold is at least this many times the pixel's measured mean deviation; 0: noise is not used"""
-    chroma: bool = True
-    """use colour where the source has it"""
-    chroma_threshold: float = Field(10.0, gt=0, le=255)
-    """grey levels; a difference of Cb or Cr alone that is a disturbance"""
-    weak: float = Field(0.5, gt=0, le=1)
-    """share of the thresholds that is enough to link pieces of one vehicle; 1: such links say nothing new"""
-    majority_px: int = Field(7, ge=1, le=15)
-    """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
-    shadow: bool = True
-    """what is the scene darkened by one factor, in luminance, colour and texture, is shadow, not foreground"""
-    amid: bool = False
-    """what passes for shadow amid a vehicle is vehicle: dark paint does; soft shadow then widens boxes"""
-    contrast: bool = True
-    """luma_threshold falls with the contrast that haze or dusk leave to the scene, to half of it at least"""
-    exposure: bool = True
-    """changes of the camera's gain are compensated at once"""
-    learn_s: float = Field(2.0, gt=0)
-    """s; time constant of the scene's average"""
-    noise_s: float = Field(4.0, gt=0)
-    """s; time constant of the noise's average"""
-    registration: bool = True
-    """pictures are laid on the scene where the camera sways, drifts or is knocked; false: it is taken to stand still"""
-    still_s: float = Field(10.0, gt=0)
-    """s; a camera that has stood still for so long is only watched again, which costs next to nothing"""
-    selective: bool = True
-    """foreground is not learnt; false: it is, and leaves a tail"""
-    guard_px: int = Field(3, ge=0, le=30)
-    """pixels of the processed picture; what is this close to foreground is not learnt either"""
-    holes: bool = True
-    """foreground that encloses background is filled"""
-    ghosts: bool = True
-    """marks left in the scene by what was there in the first frames, or stood long, are found by their edges"""
-    ghost_s: float = Field(1.0, ge=0)
-    """s; time that a region must be covered before it can be such a mark (ghost)"""
-    absorb_s: float = Field(20.0, gt=0)
-    """s; what stands longer and is no tracked vehicle becomes scene; its departure is recognised all the same"""
-    steady_s: float = Field(4.0, gt=0)
-    """s; the same for what does not change while it stands"""
-    relearn_share: float = Field(0.6, gt=0, le=1)
-    """share of the picture; more foreground than that is no traffic but a change of light or view"""
-    relearn_s: float = Field(1.0, ge=0)
-    """s; a change of the whole picture that lasts longer starts the scene anew; until then nothing is reported"""
-
-    @field_validator("majority_px")
-    @classmethod
-    def _odd(cls, value: int) -> int:
-        if value % 2 == 0:
-            raise ValueError("a window has a middle: take an odd number")
-        return value
-
-
-class PaperSettings(Group):
-    """The map exactly as paper 004 has it."""
-
-    weight: float = Field(0.1, gt=0, le=1)
-    """share of the new frame in the average, per frame"""
-    threshold: float = Field(20.0, gt=0, le=255)
-    """grey levels; a larger difference from the average is a disturbance"""
-    two_sided: bool = True
-    """both darker and brighter than the average; false: brighter only"""
-
-
-class DetectorSettings(Group):
-    kind: Literal["disturbance", "paper", "mog2", "knn"] = "disturbance"
-    """how the foreground is found"""
-    disturbance: DisturbanceSettings = DisturbanceSettings()
-    paper: PaperSettings = PaperSettings()
-
-
-class BlobSettings(Group):
-    """Connected regions of the foreground, as measurements."""
-
-    min_area_share: float = Field(1e-4, ge=0, le=1)
-    """share of the picture's area (8 pixels of 320x240); smaller blobs are left out"""
-    cut: bool = True
-    """regions too large for one vehicle, or hardly filling their box, are cut at their necks"""
-    divide: bool = True
-    """regions too large for one vehicle are divided among the vehicles predicted there"""
-    pieces: bool = True
-    """small regions that nobody predicted are joined with their neighbours up to the typical size of a vehicle"""
-    join_overlap: float = Field(0.7, gt=0, le=1)
-    """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
-    join_gap: float = Field(0.05, ge=0, le=1)
-    """share of that box's longer side; pieces farther apart are not joined"""
-    jitter_px: float = Field(0.5, gt=0)
-    """pixels of the processed picture; standard deviation of a small blob's centroid"""
-    jitter_share: float = Field(0.05, ge=0, le=1)
-    """standard deviation of the centroid per standard deviation of the blob's extent, in its direction; it lasts"""
 
 
 class DetectionSettings(Group):
@@ -265,18 +174,29 @@ def load(
     path: str | Path | None = None,
     assignments: Iterable[str | tuple[str, Any]] = (),
     base: Mapping[str, Any] | None = None,
+    kind: Input | None = None,
 ) -> Settings:
     """Settings from defaults, a TOML file and assignments ("a.b=value" or a name with its value), later ones winning.
 
     base  nested settings between the defaults and the file
+    kind  of the input: settings that have no effect on it are refused; None: not known, and nothing is refused
 
-    Raises ConfigError for an unreadable file, an unknown key (naming the nearest) or a bad value.
+    A file may hold groups for other kinds of input, and settings at their defaults.
+    Raises ConfigError for an unreadable file, an unknown key (naming the nearest), a bad value, or one without effect.
     """
-    tree = merged(base or {}, {} if path is None else read_toml(Path(path), "settings"))
-    for assignment in assignments:
-        name, value = _split(assignment) if isinstance(assignment, str) else assignment
+    filed = {} if path is None else read_toml(Path(path), "settings")
+    assigned = [_split(one) if isinstance(one, str) else one for one in assignments]
+    tree = merged(base or {}, filed)
+    if kind is not None and filed:
+        alone, usual = parse(tree), Settings()
+        own = (name for name in _leaves(filed) if is_own(kind, name))
+        _refuse_idle(kind, alone, [name for name in own if value_of(alone, name) != value_of(usual, name)])
+    for name, value in assigned:
         _assign(tree, name.split("."), value)
-    return parse(tree)
+    settings = parse(tree)
+    if kind is not None:
+        _refuse_idle(kind, settings, [name for name, _ in assigned])
+    return settings
 
 
 def parse(tree: Mapping[str, Any]) -> Settings:
@@ -292,6 +212,53 @@ def merged(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
     both = dict(base) | dict(tree)
     groups = (name for name in tree if isinstance(base.get(name), dict) and isinstance(tree[name], dict))
     return both | {name: merged(base[name], tree[name]) for name in groups}
+
+
+def value_of(settings: BaseModel, name: str) -> Any:
+    """The setting with that dotted name."""
+    value: Any = settings
+    for part in name.split("."):
+        value = getattr(value, part)
+    return value
+
+
+def _refuse_idle(kind: Input, settings: Settings, asked: Iterable[str]) -> None:
+    """Raise ConfigError for settings that were asked for and have no effect on that kind of input."""
+    complaints = []
+    for name in asked:
+        missing = [(other, values) for other, values in needs(kind, name) if value_of(settings, other) not in values]
+        if not reads(kind, name):
+            near = _nearest(name, (other for other in _leaves(Settings().model_dump()) if reads(kind, other)))
+            complaints.append(f"setting {name} has no effect on {kind}{near}")
+        elif missing:
+            other, values = missing[0]
+            wanted = " or ".join(_as_written(value) for value in values)
+            now = _as_written(value_of(settings, other))
+            complaints.append(f"setting {name} has no effect with {other}={now}; it needs {other}={wanted}")
+    if complaints:
+        raise ConfigError("\n".join(complaints))
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """What to suggest instead: the setting of the same name in another group, or of a similar one."""
+    of_last: dict[str, str] = {}
+    for other in known:
+        of_last.setdefault(other.rpartition(".")[2], other)
+    near = difflib.get_close_matches(name.rpartition(".")[2], of_last, n=1, cutoff=0.7)
+    return f"; the nearest that has is {of_last[near[0]]}" if near else "; see vidtrack config --explain"
+
+
+def _as_written(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterable[str]:
+    """Dotted names of the values in nested settings."""
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name
 
 
 def _split(assignment: str) -> tuple[str, Any]:

@@ -151,7 +151,7 @@ def test_a_signal_while_the_kernels_are_compiled_ends_it_too(camera, tmp_path, m
 
 
 def test_a_signal_while_the_program_loads_is_no_error_either(monkeypatch):
-    def terminated(*_):
+    def terminated(*_, **_kind):
         raise Terminated
 
     monkeypatch.setattr("vidtrack.config.load", terminated)

@@ -57,6 +57,8 @@ def test_pieces_that_weak_foreground_links_are_one_vehicle_before_sizes_are_know
     linked = replace(picture, weak=foreground((100, 100, 40, 8), (110, 84, 12, 20)).mask)
     assert found(explain(linked, NONE, young, SETTINGS)) == [[100, 84, 40, 24]]
     assert len(explain(linked, NONE, young, BlobSettings(pieces=False))) == 2
+    flood = replace(picture, weak=np.full_like(picture.mask, 255))
+    assert len(explain(flood, NONE, young, SETTINGS)) == 2
 
 
 def test_two_vehicles_nose_to_tail_are_divided_among_those_predicted(road):

@@ -23,17 +23,13 @@ Examples:
 def command(
     explain: bool,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
     config_file: Path | None,
     assignments: tuple[str, ...],
 ) -> None:
-    """Print the effective settings as TOML, ready for --config. Settings that are None are commented out.
-
-    --seed is accepted for uniformity.
-    """
+    """Print the effective settings as TOML, ready for --config. Settings that are None are commented out."""
     from vidtrack.config import load
     from vidtrack.explain import as_toml
     from vidtrack.output.folder import open_folder, writing

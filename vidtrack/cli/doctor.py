@@ -44,7 +44,6 @@ def command(
     assignments: tuple[str, ...],
     json_to: str | None,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -59,13 +58,14 @@ def command(
     from vidtrack.config import load
     from vidtrack.doctor.examine import examine
     from vidtrack.doctor.judge import judge
+    from vidtrack.doctor.opening import kind_of
     from vidtrack.output.folder import open_folder
     from vidtrack.video.live.address import secrets
 
     hide_arguments(secrets(source))
     start_log(verbose, quiet=not verbose)  # what is worth a warning is among the advice
     given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
-    settings = load(config_file, [*assignments, *given])
+    settings = load(config_file, [*assignments, *given], kind=kind_of(source))
     announce_compiling(quiet)
     folder = None if output is None else open_folder(output, "doctor", force)
     findings = examine(source, settings, seconds)

@@ -87,7 +87,6 @@ def command(
     result: Path,
     truth: Path,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -102,7 +101,7 @@ def command(
 
     Scores are fractions, not percent. Truth rows with conf 0 are ignored. Boxes are matched by
     intersection over union, positions (radar) by distance. Of a run folder mot.txt is scored, and
-    the tracks table gives the consistency of the covariances (NIS, NEES). --seed is accepted for uniformity.
+    the tracks table gives the consistency of the covariances (NIS, NEES).
     """
     from vidtrack import formats, score
     from vidtrack.output.folder import open_folder

@@ -54,7 +54,6 @@ Examples:
 def command(
     sources: tuple[str, ...],
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -85,7 +84,7 @@ def command(
     try:
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_many import are_many, track_many
-        from vidtrack.config import load
+        from vidtrack.config import Input, load
         from vidtrack.live.outputs import Extras
         from vidtrack.video.live.address import secrets
 
@@ -93,7 +92,7 @@ def command(
         hide_arguments([*hidden, *([http_token] if http_token else [])])
         start_log(verbose, quiet)
         given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
-        settings = load(config_file, given)
+        settings = load(config_file, given, kind=Input.CAMERA)
         announce_compiling(quiet)
         extras = Extras(rerun, video, save_masks, decisions, state, record)
         with _page(http, http_token) as page:

@@ -14,26 +14,30 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def common(output_help: str) -> Callable[[Function], Function]:
-    """-o, --seed, --force, --quiet, -v: the same words in every command that writes results."""
+    """-o, --force, --quiet, -v: the same words in every command that writes results."""
 
     def decorate(function: Function) -> Function:
         for option in (
             click.option("-v", "--verbose", count=True, help="Say more; twice: everything."),
             click.option("-q", "--quiet", is_flag=True, help="Only errors: no progress, no warnings."),
             click.option("--force", is_flag=True, help="Replace the results in a folder that is not empty."),
-            click.option(
-                "--seed",
-                type=click.IntRange(min=0),
-                default=0,
-                show_default=True,
-                help="The same seed gives the same random numbers.",
-            ),
             click.option("-o", "--output", type=click.Path(path_type=Path), metavar="DIR", help=output_help),
         ):
             function = option(function)
         return function
 
     return decorate
+
+
+def seed_option(function: Function) -> Function:
+    """--seed, where something is random."""
+    return click.option(
+        "--seed",
+        type=click.IntRange(min=0),
+        default=0,
+        show_default=True,
+        help="The same seed gives the same random numbers.",
+    )(function)
 
 
 def start_log(verbose: int, quiet: bool, who: str = "") -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
-from vidtrack.cli.options import common, start_log
+from vidtrack.cli.options import common, seed_option, start_log
 from vidtrack.cli.radar_problem import problem_options
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ Examples:
     "--runs", type=click.IntRange(min=1), metavar="N", help="Simulate N runs as well: the share of lost tracks."
 )
 @common("Folder for prediction.png.  [default: no picture]")
+@seed_option
 @json_option
 def command(
     kind: Literal["psn", "pda"],

@@ -11,6 +11,7 @@ from vidtrack.cli.options import (
     announce_compiling,
     association_options,
     common,
+    seed_option,
     settings_options,
     smooth_option,
     start_log,
@@ -37,6 +38,7 @@ Examples:
 )
 @click.argument("plots")
 @common("Folder for the results.  [default: runs/NAME]")
+@seed_option
 @settings_options
 @association_options
 @smooth_option
@@ -71,12 +73,12 @@ def command(
     """
     from vidtrack.cli.progress import progress, tell_outcome
     from vidtrack.cli.signals import Terminated, stoppable
-    from vidtrack.config import load
+    from vidtrack.config import Input, load
     from vidtrack.radar_run import RadarRun
 
     start_log(verbose, quiet)
     given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
-    settings = load(config_file, [*assignments, *given])
+    settings = load(config_file, [*assignments, *given], kind=Input.RADAR)
     announce_compiling(quiet)
     with RadarRun(plots, settings, output, force=force, rerun=rerun, decisions=decisions, seed=seed) as run:
         try:

@@ -23,7 +23,6 @@ Examples:
 def command(
     folder: Path,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -31,7 +30,7 @@ def command(
     """Rebuild tracks.parquet in DIR from tracks.csv, cut half-written lines, sort mot.txt and counts.csv.
 
     A killed run stays marked as interrupted in summary.json. A finished run is left as it is. Of a live run in
-    parts, every part is repaired. --seed is accepted for uniformity.
+    parts, every part is repaired.
     """
     from shutil import Error, copytree
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from vidtrack.cli.options import common, start_log
+from vidtrack.cli.options import common, seed_option, start_log
 
 
 @click.command(
@@ -19,6 +19,7 @@ Examples:
 )
 @click.argument("names", nargs=-1, metavar="[NAME ...]")
 @common("Folder for NAME.png and NAME.csv.  [default: reproduced]")
+@seed_option
 @click.option("--list", "listed", is_flag=True, help="Show the names and what each one is, and do nothing.")
 @click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Monte Carlo runs, or simulated videos.")
 def command(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vidtrack.cli.clutter import weibull_option
-from vidtrack.cli.options import common, start_log
+from vidtrack.cli.options import common, seed_option, start_log
 
 if TYPE_CHECKING:
     from vidtrack.detection.amplitude import Weibull
@@ -49,6 +49,7 @@ Examples:
 )
 @click.argument("scenario", type=click.Choice(VIDEO + RADAR), metavar="SCENARIO")
 @common("Folder to write.  [default: runs/SCENARIO]")
+@seed_option
 @click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15]")
 @click.option("--size", type=_Size(), help="The same scene at this size.  [default: 320x240, junction 240x180]")
 @click.option("--noise", default=2.0, show_default=True, help="Sensor noise, standard deviation in grey levels.")

@@ -54,7 +54,6 @@ def command(
     cells: float | None,
     pfa_max: float,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -66,7 +65,7 @@ def command(
     form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter and a gate of 4; --q, --cell and --weibull play no
     part. Where the closed form does not hold (SNR of 1.96 dB or less) or gives --pfa-max or more, p_fa is
     --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
-    strongest neighbour filter. --seed is accepted for uniformity.
+    strongest neighbour filter.
     """
     from vidtrack.cli.radar_problem import db_to_linear
     from vidtrack.detection.amplitude import RAYLEIGH

@@ -33,7 +33,6 @@ Examples:
 def command(
     source: str,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -48,18 +47,19 @@ def command(
     """Track the vehicles in SOURCE: a video file, an image folder or glob, or a MOT det.txt.
 
     The results' folder is printed. It holds tracks.csv, tracks.parquet, mot.txt, summary.json and
-    tracks.png. Ctrl-C ends with complete results up to then. --seed is accepted for uniformity:
-    tracking draws no random numbers.
+    tracks.png. Ctrl-C ends with complete results up to then.
     """
     from vidtrack.cli.progress import progress, tell_outcome
     from vidtrack.cli.signals import Terminated, stoppable
-    from vidtrack.config import load
+    from vidtrack.config import Input, load
     from vidtrack.run import Run
+    from vidtrack.video.detections import is_detections
     from vidtrack.video.recording import is_recording, recorded_settings
 
     start_log(verbose, quiet)
     base = recorded_settings(source) if is_recording(source) else None
-    settings = load(config_file, [*assignments, *chosen_settings(chosen)], base)
+    kind = Input.DETECTIONS if is_detections(source) else Input.VIDEO
+    settings = load(config_file, [*assignments, *chosen_settings(chosen)], base, kind)
     announce_compiling(quiet)
     with Run(
         source, settings, output, force=force, rerun=rerun, video=video, masks=save_masks, decisions=decisions

@@ -25,7 +25,6 @@ Examples:
 def command(
     run: Path,
     output: Path | None,
-    seed: int,
     force: bool,
     quiet: bool,
     verbose: int,
@@ -36,7 +35,7 @@ def command(
     run, in metres.
 
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
-    while tracking, with --rerun. --seed is accepted for uniformity.
+    while tracking, with --rerun.
     """
     start_log(verbose, quiet)  # before rerun, which starts its own log
     from contextlib import ExitStack, closing

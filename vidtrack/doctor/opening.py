@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import monotonic
 
-from vidtrack.config import Settings
+from vidtrack.config import Input, Settings
+from vidtrack.video.detections import is_detections
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.source import LiveSource
@@ -17,6 +18,13 @@ from vidtrack.video.source import Source, open_source
 def is_live(source: str) -> bool:
     """Whether this is a camera or a stream, not a file."""
     return "://" in source or source.isdecimal() or Path(source).is_char_device()
+
+
+def kind_of(source: str) -> Input:
+    """What the source is."""
+    if is_detections(source):
+        return Input.DETECTIONS
+    return Input.CAMERA if is_live(source) else Input.VIDEO
 
 
 def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Recording:

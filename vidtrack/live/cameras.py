@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from vidtrack.config import Settings, load, merged
+from vidtrack.config import Input, Settings, load, merged
 from vidtrack.errors import ConfigError
 from vidtrack.live.outputs import Extras
 from vidtrack.toml_file import read_toml
@@ -62,7 +62,7 @@ def settings_of(
 ) -> Settings:
     """Of all cameras, above them its own, above them --config and --set. Raises ConfigError, naming the camera."""
     try:
-        return load(path, assignments, merged(base, camera.settings))
+        return load(path, assignments, merged(base, camera.settings), Input.CAMERA)
     except ConfigError as error:
         raise ConfigError(f"camera {camera.name}: {error}") from None
 

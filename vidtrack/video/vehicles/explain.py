@@ -29,6 +29,7 @@ _OPEN = 0.72  # before a typical size is known: a region that fills less of its 
 _EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
 _LEAST_PX, _LEAST_HOLLOW_PX = 60, 300  # pixels of the mask; the shape of smaller regions is the grid's
 _AT_EDGE = 1.0  # px of the mask; a region this close to the picture's edge is cut by it
+_FILLED = 0.25  # least share of a region of weak foreground that is foreground
 _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
 
 
@@ -85,12 +86,19 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
 
 
 def _links(regions: Regions, weak: Image | None) -> Ints:
-    """(R,) the region of the weak mask (h, w) that each region lies in; its own negative number without one."""
+    """(R,) which regions a region of the weak mask (h, w) links: they have its number, others one of their own.
+
+    Weak foreground that is much more than the regions in it, as where the light flickers, links nothing.
+    """
     link = -1 - np.arange(regions.total)
-    if weak is not None:
-        _, inside = cv2.connectedComponents(weak)
-        found = inside[regions.row, regions.start]
-        link[regions.label[found > 0]] = found[found > 0]
+    if weak is None:
+        return link
+    count, inside, stats, _ = cv2.connectedComponentsWithStats(weak)
+    of_run = inside[regions.row, regions.start]
+    filled = np.bincount(of_run, regions.stop - regions.start, count) > _FILLED * stats[:, cv2.CC_STAT_AREA]
+    filled[0] = False  # the background
+    linked = filled[of_run]
+    link[regions.label[linked]] = of_run[linked]
     return link
 
 

@@ -1,0 +1,130 @@
+"""A setting that has no effect on the input at hand is refused when somebody asks for it."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel
+
+from vidtrack.config import Input, Settings, load, value_of
+from vidtrack.errors import ConfigError
+from vidtrack.explain import as_toml
+from vidtrack.radar_run import RadarRun
+from vidtrack.run import Run
+from vidtrack.settings.group import Group
+from vidtrack.settings.inputs import needs, reads
+from vidtrack.simulate.radar_scenarios import simulate_radar
+from vidtrack.simulate.radar_write import write_radar
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+
+
+def leaves(group=Settings, prefix=""):
+    """Class and name of each setting, by its dotted name."""
+    for name, info in group.model_fields.items():
+        kind = info.annotation
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            yield from leaves(kind, f"{prefix}{name}.")
+        else:
+            yield prefix + name, (group, name)
+
+
+@pytest.fixture
+def read(monkeypatch):
+    """The settings that were read, as (class, name)."""
+    seen = set()
+
+    def get(self, name):
+        seen.add((type(self), name))
+        return object.__getattribute__(self, name)
+
+    monkeypatch.setattr(Group, "__getattribute__", get, raising=False)
+    return seen
+
+
+def refused(kind, *assignments, file=None):
+    with pytest.raises(ConfigError) as error:
+        load(file, assignments, kind=kind)
+    return str(error.value)
+
+
+def track_video(folder):
+    source, lines = ("source.end_s", 1.0), ("output.lines", ["a:10,10,100,100"])
+    pictures = {"rerun": str(folder / "run.rrd"), "video": folder / "run.mp4"}
+    return Run(str(SAMPLES / "crossing.avi"), load(assignments=[source, lines]), folder / "run", **pictures)
+
+
+def track_detections(folder):
+    rows = [f"{k},-1,{10 + 3 * k},{20 + y},20,10,{0.5 + 0.01 * k},-1,-1,-1" for k in range(1, 40) for y in (0, 60)]
+    (folder / "det.txt").write_text("\n".join(rows))
+    chosen = load(assignments=[("source.fps", 25), ("output.lines", ["a:10,10,100,100"])])
+    return Run(str(folder / "det.txt"), chosen, folder / "run", rerun=str(folder / "run.rrd"))
+
+
+def track_plots(folder):
+    write_radar(simulate_radar("radar-tws", 0), folder)
+    return RadarRun(str(folder / "plots.csv"), load(), folder / "run", rerun=str(folder / "run.rrd"))
+
+
+OF_THE_FILE = {"radar.skip_bad_rows", "radar.position", *(f"radar.sigma_{name}" for name in (
+    "range_m", "azimuth_deg", "elevation_deg", "position_m", "doppler_m_s"))}  # fmt: skip
+"""What is read only where a file leaves it open."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "track"),
+    [(Input.VIDEO, track_video), (Input.DETECTIONS, track_detections), (Input.RADAR, track_plots)],
+)
+def test_what_is_said_to_have_an_effect_is_read(kind, track, tmp_path, read):
+    with track(tmp_path) as run:
+        for _ in run:
+            pass
+    fresh = Settings()
+    idle = []
+    for name, place in list(leaves()):
+        useful = reads(kind, name) and all(value_of(fresh, other) in values for other, values in needs(kind, name))
+        if useful and name not in OF_THE_FILE and place not in read:
+            idle.append(name)
+    assert idle == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "assignment", "nearest"),
+    [
+        (Input.RADAR, "tracker.coast_s=2", "radar.coast_scans"),
+        (Input.RADAR, "tracker.accel=2", "radar.accel"),
+        (Input.RADAR, "tracker.life=llr", "radar.life"),
+        (Input.RADAR, "tracker.euclidean_radius_px=2", "radar.euclidean_radius_m"),
+        (Input.DETECTIONS, "tracker.confirm_hits=2", "detections.confirm_hits"),
+        (Input.VIDEO, "detections.box_s=1", "tracker.box_s"),
+        (Input.CAMERA, "radar.accel=1", "tracker.accel"),
+    ],
+)
+def test_a_setting_of_another_input_is_refused_with_the_nearest_that_has_an_effect(kind, assignment, nearest):
+    name = assignment.partition("=")[0]
+    assert refused(kind, assignment) == f"setting {name} has no effect on {kind}; the nearest that has is {nearest}"
+
+
+def test_a_setting_that_another_one_switches_off_is_refused():
+    said = "setting tracker.n_scan has no effect with tracker.method=gnn; it needs tracker.method=split or mht"
+    assert refused(Input.VIDEO, "tracker.n_scan=3") == said
+    assert load(assignments=["tracker.n_scan=3", "tracker.method=mht"], kind=Input.VIDEO).tracker.n_scan == 3
+    assert "radar.life=llr" in refused(Input.RADAR, "tracker.false_track=0.01", "radar.life=m-of-n")
+    assert "detector.kind=disturbance" in refused(Input.VIDEO, "detector.kind=mog2", "detector.disturbance.holes=false")
+    assert "output.link=true" in refused(Input.VIDEO, "output.link_s=2")
+    assert load(assignments=["output.link_s=2"], kind=Input.DETECTIONS).output.link_s == 2
+
+
+def test_a_file_may_hold_settings_for_other_inputs_but_none_of_its_own_without_effect(tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text("[tracker]\ncoast_s = 2.0\n[blobs]\ncut = false\n[radar]\nparticles = 50\n")
+    assert load(path, kind=Input.VIDEO).tracker.coast_s == 2
+    assert "radar.estimator=particle" in refused(Input.RADAR, file=path)
+    path.write_text('[radar]\nestimator = "particle"\nparticles = 50\n[tracker]\ncoast_s = 2.0\n')
+    assert load(path, kind=Input.RADAR).radar.particles == 50
+
+
+@pytest.mark.parametrize("kind", Input)
+def test_what_config_prints_is_accepted_for_every_input(kind, tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text(as_toml(Settings()))
+    assert load(path, kind=kind) == Settings()
