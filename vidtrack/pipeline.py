@@ -138,6 +138,8 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         expected = tracker.predict(frame.time_s)
         driven = expected.box[has_driven(expected)]
         foreground = detector.apply(frame, driven)
+        if foreground.elsewhere and tracker.road:
+            tracker.road.forget()
         clock.append(perf_counter())
         scan = explain(foreground, expected, tracker.road, settings.blobs).scan(frame.time_s)
         clock.append(perf_counter())

@@ -7,6 +7,7 @@ import logging
 import cv2
 import numpy as np
 import pytest
+from drawn_tracks import drive
 
 from vidtrack import plane
 from vidtrack.config import BlobSettings, DetectorSettings, load
@@ -277,3 +278,16 @@ def test_points_are_chosen_again_where_there_were_too_few():
     for time_s in (0.5, 1.5, 2.0):
         camera.follow(luma, start(Picture(luma, none, none)), NONE_KNOWN, time_s)
     assert camera.fits
+
+
+def test_what_traffic_taught_is_forgotten_when_the_camera_looks_elsewhere():
+    world, other, found = World(), World(9), detector()
+    tracker = build_tracker(load().tracker, SHAPE[::-1])
+    drive(tracker.road.learn, lambda y: (40.0, 20.0), vehicles=6)
+    k = settle(found, world)
+    assert [found.apply(world.frame(k + j), NONE_KNOWN).elsewhere for j in range(5)] == 5 * [False]
+    frames = (other.frame(k + 5 + j) for j in range(60))
+    assert tracker.road.sizes.known
+    steps = list(video_steps(frames, found, tracker, load()))
+    assert sum(step.foreground.elsewhere for step in steps) == 1
+    assert not tracker.road.sizes.known

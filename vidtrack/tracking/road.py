@@ -22,8 +22,12 @@ class Road:
         """width, height of the picture [px]; wary: tracks must travel farther where others began in vain."""
         self._wary = wary
         self._width, self._height = width, height
-        self.sizes = SizeField(width, height)
-        self.restless = RestlessMap(width, height)
+        self.forget()
+
+    def forget(self) -> None:
+        """Nothing is known of the scene any more: the camera looks elsewhere."""
+        self.sizes = SizeField(self._width, self._height)
+        self.restless = RestlessMap(self._width, self._height)
 
     def learn(self, tracks: Tracks) -> None:
         """Take in the tracks of a scan."""

@@ -25,6 +25,7 @@ class Foreground:
     place     (2, 3) from the mask, enlarged by `step`, to the scene [source px]; None: it lies on it
     motion    (2, 3) from the scene to the picture [source px]; None: the camera is where it was in the first one
     warnings  what the user should know, each said once
+    elsewhere the camera looks elsewhere from now on, and the scene is another one
     surveyed  (4,) left, top, right, bottom of what the mask can show [source px of the scene]; None: not known
     """
 
@@ -36,6 +37,7 @@ class Foreground:
     motion: Floats | None = None
     surveyed: Floats | None = None
     warnings: tuple[str, ...] = ()
+    elsewhere: bool = False
 
     def reduced(self, shape: tuple[int, int]) -> Image:
         """(h, w) the mask in the processed picture of that shape."""
