@@ -19,6 +19,7 @@ FLOORS = (
     "radar_run",
     "pipeline",
     "radar_pipeline",
+    "box_pipeline",
     "steps",
     "serve",
     "simulate",
@@ -33,7 +34,9 @@ FLOORS = (
     "detection",
     "formats",
     "plane",
+    "rows",
     "scan",
+    "usable",
     "explain",
     "config",
     "settings",
@@ -141,16 +144,45 @@ def run(code):
     )
 
 
-def test_help_imports_nothing_heavy():
-    result = run(
-        "import sys\n"
-        "from vidtrack.cli import cli\n"
-        "cli.main(['--help'], standalone_mode=False)\n"
-        "heavy = {'numpy', 'cv2', 'numba', 'rerun', 'scipy', 'pydantic', 'pyarrow', 'av', 'rich'}\n"
-        "print(sorted(heavy & set(sys.modules)))"
-    )
+HEAVY = {
+    *("av", "cv2", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "pydantic", "rerun", "rich", "scipy"),
+    *("scipy.optimize", "scipy.spatial", "scipy.special", "scipy.stats", "starlette"),
+}
+COMPILED = {"numpy", "numba", "scipy", "scipy.special"}
+
+
+def heavy(code):
+    """The heavy libraries that a fresh process has loaded after this code."""
+    result = run(f"import sys\n{code}\nprint(*sorted({HEAVY} & set(sys.modules)))")
     assert result.returncode == 0, result.stderr
-    assert result.stdout.splitlines()[-1] == "[]"
+    return set(result.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["track", "--help"], ["radar", "--help"]])
+def test_help_imports_nothing_heavy(arguments):
+    assert not heavy(f"from vidtrack.cli import cli\ncli.main({arguments}, standalone_mode=False)")
+
+
+@pytest.mark.parametrize(
+    ("name", "needed"),
+    {
+        "Error": set(),
+        "Settings": {"pydantic"},
+        "Scan": {"numpy"},
+        "Tracks": {"numpy"},
+        "Tracker": COMPILED,
+        "FixedGainBank": COMPILED,
+        "box_tracker": {*COMPILED, "pydantic"},
+        "track": {*COMPILED, "pydantic", "cv2", "av"},
+        "track_plots": {*COMPILED, "pydantic", "pyarrow"},
+    }.items(),
+)
+def test_a_name_imports_what_it_needs(name, needed):
+    assert heavy(f"import vidtrack\nvidtrack.{name}") <= needed
+
+
+def test_no_part_needs_all_of_scipy_stats():
+    assert not users_of("scipy.stats")
 
 
 @pytest.mark.parametrize("first", ["Tracker", "track"])

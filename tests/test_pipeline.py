@@ -7,9 +7,10 @@ import pytest
 from command_line import SAMPLES
 
 from vidtrack import formats, score
+from vidtrack.box_pipeline import box_tracker, build_tracker
 from vidtrack.config import Settings, SourceSettings, TrackerSettings, load
 from vidtrack.errors import ConfigError, SourceError
-from vidtrack.pipeline import box_tracker, build_detector, build_tracker, has_driven, track, video_steps
+from vidtrack.pipeline import build_detector, has_driven, track, video_steps
 from vidtrack.run import Run
 from vidtrack.scan import Scan, Status
 from vidtrack.tracking.boxes import box_scan

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from vidtrack.associate.pda import PDA as PDA
     from vidtrack.associate.strongest import PSN as PSN
     from vidtrack.associate.strongest import StrongestNeighbour as StrongestNeighbour
+    from vidtrack.box_pipeline import box_tracker as box_tracker
     from vidtrack.config import Settings as Settings
     from vidtrack.config import load as load_settings  # noqa: F401
     from vidtrack.detection.threshold import ThresholdController as ThresholdController
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from vidtrack.estimate.particle import ParticleBank as ParticleBank
     from vidtrack.estimate.turn import CoordinatedTurn as CoordinatedTurn
     from vidtrack.estimate.unscented import UnscentedBank as UnscentedBank
-    from vidtrack.pipeline import box_tracker as box_tracker
     from vidtrack.pipeline import track as track
     from vidtrack.radar.sensors import PositionRangeRate as PositionRangeRate
     from vidtrack.radar.sensors import RangeAzimuth as RangeAzimuth
@@ -102,7 +102,7 @@ _HOME = {
     "Tracks": "scan",
     "UnscentedBank": "estimate.unscented",
     "box_scan": "tracking.boxes",
-    "box_tracker": "pipeline",
+    "box_tracker": "box_pipeline",
     "load_settings": "config",
     "track": "pipeline",
     "track_plots": "radar_pipeline",

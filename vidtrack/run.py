@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
+from vidtrack.box_pipeline import build_tracker
 from vidtrack.config import Settings
 from vidtrack.errors import SourceError
 from vidtrack.live.memory import Memory
@@ -24,7 +25,7 @@ from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
-from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.pipeline import build_detector, video_steps
 from vidtrack.steps import scan_steps
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
 from vidtrack.video.detections import Detections, is_detections, open_detections

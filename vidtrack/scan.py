@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.compiled import kernel
 from vidtrack.errors import ScanError
 
 if TYPE_CHECKING:
@@ -73,6 +72,8 @@ class Scan:
     pixel: float = 1.0
 
     def __post_init__(self) -> None:
+        from vidtrack.usable import check_covariances, check_measurements  # loads the compiler; types do without
+
         z, R = np.asarray(self.z, dtype=float, order="C"), np.asarray(self.R, dtype=float, order="C")
         if z.shape == (0,):  # an empty list does not say how many components its measurements have
             z = z.reshape(0, *R.shape[-1:])
@@ -87,13 +88,13 @@ class Scan:
             raise ScanError(f"R must be ({count}, {dim}, {dim}) or ({dim}, {dim}) to match z, not {R.shape}")
         if not isfinite(self.t):
             raise ScanError(f"the scan's time is {self.t}; it must be a finite number of seconds")
-        _refuse_bad_measurements(z, R)
+        check_measurements(z, R)
         if noise is None and count:
             noise = R.sum(axis=0) / count
         if noise is not None and noise.shape != (dim, dim):
             raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
         if noise is not None and (self.noise is not None or not count):  # not checked as part of R
-            _refuse_no_covariance(noise[None], "R" if self.noise is None else "noise")
+            check_covariances(noise[None], "R" if self.noise is None else "noise")
         object.__setattr__(self, "noise", noise)
         object.__setattr__(self, "t", float(self.t))
         object.__setattr__(self, "z", z)
@@ -139,74 +140,6 @@ class Scan:
         return weak
 
 
-@kernel
-def _surely_usable(z: Floats, R: Floats) -> bool:
-    """Whether all measurements in the plane are finite and their covariances clearly positive definite."""
-    for i in range(len(z)):
-        xx, yy, xy = R[i, 0, 0], R[i, 1, 1], R[i, 0, 1]
-        finite = np.isfinite(z[i, 0]) and np.isfinite(z[i, 1]) and np.isfinite(xx + yy + xy)
-        if not (finite and xx > 0 and xy == R[i, 1, 0] and xx * yy - xy * xy > 1e-12 * max(xx, yy) ** 2):
-            return False
-    return True
-
-
-def _refuse_bad_measurements(z: Floats, R: Floats) -> None:
-    """Raise ScanError naming the first measurement that is not finite or has no valid covariance."""
-    if z.shape[1] == 2 and _surely_usable(z, R):
-        return
-    finite = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
-    if not finite.all():
-        i = int(np.argmin(finite))
-        raise ScanError(f"measurement {i} is not finite: z={z[i]}, R={R[i].tolist()}; drop it before the scan is made")
-    _refuse_no_covariance(R, "R of measurement {}")
-
-
-def check_states(x: Floats, P: Floats) -> None:
-    """Raise ScanError naming the first of the states x (B, n), P (B, n, n) that no filter could go on from."""
-    finite = np.isfinite(x).all(axis=1)
-    if not finite.all():
-        i = int(np.argmin(finite))
-        raise ScanError(f"state {i} is not finite: {x[i]}")
-    _refuse_no_covariance(P, "P of state {}", least=-1e-9)  # a part of a state may be known exactly
-
-
-def _refuse_no_covariance(R: Floats, name: str, least: float = 1e-14) -> None:
-    """Raise ScanError for the first of R (B, m, m) that is not a covariance; {} in `name` becomes its index.
-
-    least  share of the largest element that every eigenvalue must exceed
-    """
-    finite = np.isfinite(R).all(axis=(1, 2))
-    if not finite.all():
-        i = int(np.argmin(finite))
-        raise ScanError(f"{name.format(i)} is not finite: {R[i].tolist()}")
-    scale = np.abs(R).max(axis=(1, 2), initial=np.finfo(float).tiny)
-    symmetric = np.abs(R - np.swapaxes(R, 1, 2)).max(axis=(1, 2), initial=0.0) <= 1e-9 * scale
-    if not symmetric.all():
-        i = int(np.argmin(symmetric))
-        raise ScanError(f"{name.format(i)} is not symmetric: {R[i].tolist()}")
-    if R.shape[1] == 2:  # the common case without a decomposition
-        determinant = R[:, 0, 0] * R[:, 1, 1] - R[:, 0, 1] * R[:, 1, 0]
-        positive = (R[:, 0, 0] > least * scale) & (determinant > least * scale**2)
-    else:
-        smallest = np.linalg.eigvalsh(R)[:, 0] if len(R) else np.empty(0)
-        positive = smallest > least * scale
-    if not positive.all():
-        i = int(np.argmin(positive))
-        raise ScanError(f"{name.format(i)} is not positive definite: {R[i].tolist()}; give it a variance above zero")
-
-
-@kernel
-def starts(row: Ints, rows: int) -> Ints:
-    """(rows + 1,) index of each row's first entry in the sorted `row` (B,); the last element is B."""
-    start = np.empty(rows + 1, np.int64)
-    b = 0
-    for t in range(rows + 1):
-        while b < len(row) and row[b] < t:
-            b += 1
-        start[t] = b
-    return start
-
-
 @dataclass(frozen=True, slots=True)
 class Decision:
     """What an associator decided: how K successor rows come from T rows and M measurements.
@@ -228,11 +161,6 @@ class Decision:
     inflation: Floats | None = None
     spread: bool = True
     approximate: Mask | None = None
-
-    @property
-    def start(self) -> Ints:
-        """(K + 1,) the weights of successor k are start[k]..start[k + 1]."""
-        return starts(self.row, len(self.parent))
 
     def without(self, rows: Mask) -> Decision:
         """The same decision with a plain miss, without inflation, in these rows (K,)."""

@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
+from vidtrack.box_pipeline import build_tracker
 from vidtrack.config import Settings
-from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.pipeline import build_detector, video_steps
 from vidtrack.scan import Status
 from vidtrack.simulate.clip import simulate
 from vidtrack.video.frame import Frame

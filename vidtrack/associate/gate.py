@@ -14,7 +14,8 @@ from vidtrack.associate.grid import cells
 from vidtrack.compiled import kernel, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.scan import Floats, Ints, Mask, Scan, starts
+from vidtrack.rows import starts
+from vidtrack.scan import Floats, Ints, Mask, Scan
 
 Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
 FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from vidtrack.estimate.model import Columns, at_rest, check
 from vidtrack.scan import Floats, Ints
@@ -104,6 +103,8 @@ class Singer(Columns):
 
     def _discretised(self, dt: float) -> tuple[Floats, Floats]:
         """F and Q (3, 3) of one axis: da/dt = -a / hold_s + w, of intensity 2 accel^2 / hold_s (Van Loan 1978)."""
+        from scipy.linalg import expm
+
         if dt > LONG * self.hold_s:  # the matrix below holds exp(dt / hold_s)
             F, Q = self._discretised(dt / 2)
             return F @ F, F @ Q @ F.T + Q

@@ -6,8 +6,6 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
-from scipy.optimize import brentq
 
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
@@ -54,6 +52,8 @@ def steady_prediction(model: Motion, dt: float, sigma: float) -> Floats:
 
     Raises ConfigError for a model whose filter does not settle.
     """
+    from scipy.linalg import solve_discrete_are
+
     nobody = np.zeros((1, model.states))
     F = model.transition(dt, nobody)[0]
     Q = model.process_noise(dt, nobody, np.zeros((1, model.states, model.states)), np.zeros(1, int), np.ones(1))[0]
@@ -79,5 +79,7 @@ def alpha_beta_gamma(index: float) -> tuple[float, float, float]:
 
     With s = sqrt(1 - alpha): beta = 2 (1 - s)^2, gamma = 2 (1 - s)^3 / (1 + s), index = gamma / s.
     """
+    from scipy.optimize import brentq
+
     s = brentq(lambda s: 2 * (1 - s) ** 3 - index * s * (1 + s), 0.0, 1.0, xtol=1e-16)
     return 1 - s**2, 2 * (1 - s) ** 2, 2 * (1 - s) ** 3 / (1 + s)

@@ -12,7 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from vidtrack.compiled import specialised
-from vidtrack.scan import Floats, Ints, starts
+from vidtrack.rows import starts
+from vidtrack.scan import Floats, Ints
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats, Floats], Floats]

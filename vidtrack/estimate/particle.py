@@ -12,6 +12,7 @@ from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
 from vidtrack.estimate.parts import in_parts
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
+from vidtrack.rows import starts
 from vidtrack.scan import Decision, Floats, Ints, Scan
 
 PART = 50_000
@@ -112,7 +113,7 @@ class ParticleBank:
         """Successor rows from the weights of a decision; x, P are those before the particles are chosen anew."""
         parent, rows = decision.parent, len(decision.parent)
         seen = self._seen(sensor)
-        start = decision.start
+        start = starts(decision.row, rows)
         weight, log_weight = np.empty((rows, self.number)), np.empty((rows, self.number))
         x, P = _empty(rows, self.model.states)
 

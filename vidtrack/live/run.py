@@ -11,6 +11,7 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
+from vidtrack.box_pipeline import build_tracker
 from vidtrack.config import Settings
 from vidtrack.live.keep import Keep
 from vidtrack.live.memory import Memory, NoStateFile, StateFile
@@ -20,7 +21,7 @@ from vidtrack.live.recorder import NoRecorder, Recorder
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
-from vidtrack.pipeline import build_detector, build_tracker, video_steps
+from vidtrack.pipeline import build_detector, video_steps
 from vidtrack.traffic.lines import LineCounter, parse_lines
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address

@@ -14,7 +14,8 @@ from vidtrack.config import OutputSettings
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.model import Motion
 from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.scan import COASTING, Floats, Ints, Tracks, starts
+from vidtrack.rows import starts
+from vidtrack.scan import COASTING, Floats, Ints, Tracks
 from vidtrack.tracking.boxes import absolute, longer
 
 PROBABILITY = 0.999

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.stats import chi2
 
+from vidtrack.associate.gate import quantile
 from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def region(ax: Axes, centre: Floats, cov: Floats, probability: float, **look: An
     from matplotlib.patches import Ellipse
 
     variance, axis = np.linalg.eigh(cov)
-    width, height = 2 * np.sqrt(chi2.ppf(probability, 2) * variance)
+    width, height = 2 * np.sqrt(quantile(probability, 2) * variance)
     angle = np.degrees(np.arctan2(axis[1, 0], axis[0, 0]))
     ax.add_patch(Ellipse((centre[0], centre[1]), width, height, angle=angle, **{"fill": False, "lw": 1.2, **look}))
 

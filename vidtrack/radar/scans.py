@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from vidtrack.config import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
@@ -70,6 +69,8 @@ class Measurements:
         """The sensor of a scan whose plots z (M, m) were measured at these times (M,) from the scan's."""
         if np.ptp(offset) < SIMULTANEOUS_S:
             return self.sensor
+        from scipy.spatial import KDTree
+
         return Sweep(self.sensor, KDTree(self.sensor.locate(z, R)[0]), offset, self.speed)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from vidtrack.formats import Table
 from vidtrack.scan import Floats, Ints
@@ -41,8 +41,8 @@ def consistency(values: Floats, dim: int, confidence: float = 0.95) -> Consisten
     if count == 0:
         return None
     tail = (1 - confidence) / 2
-    low, high = chi2.ppf([tail, 1 - tail], count * dim) / count
-    inside = np.mean(values <= chi2.ppf(confidence, dim))
+    low, high = 2 * gammaincinv(count * dim / 2, [tail, 1 - tail]) / count  # chi-square quantiles
+    inside = np.mean(values <= 2 * gammaincinv(dim / 2, confidence))
     return Consistency(float(values.mean()), float(low), float(high), float(inside), count)
 
 

@@ -23,7 +23,7 @@ from vidtrack.estimate.model import Motion
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.estimate.smoother import smoothing_gain
-from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Mask, Scan, Tracks, check_states
+from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Decision, Event, Floats, Ints, Mask, Scan, Tracks
 from vidtrack.tracking.association import Association, at_once, deferred
 from vidtrack.tracking.births import pieces
 from vidtrack.tracking.border import EXIT_S, Border
@@ -37,6 +37,7 @@ from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.road import Road
 from vidtrack.tracking.sharing import Sharing
 from vidtrack.tracking.snapshot import snapshot
+from vidtrack.usable import check_states
 
 
 class Tracker:
