@@ -112,7 +112,7 @@ class TrackerSettings(Group):
     """s; a track is given up this long after its last evidence"""
     hidden_s: float = Field(2.0, ge=0)
     """s; the same for a vehicle inside a blob that it shares, where nothing could be seen of it"""
-    idle_s: float | None = Field(3.0, gt=0)
+    idle_s: float | None = Field(4.0, gt=0)
     """s; m-of-n: a track of a video that stands still for so long and has never travelled ends; None: it stays"""
     idle_travel: float = Field(1.2, ge=0)
     """object sizes; what has been this far from its start has travelled, and may stand as long as it likes"""

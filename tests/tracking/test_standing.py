@@ -14,9 +14,9 @@ from vidtrack.tracking.tracker import Tracker
 
 
 def test_what_never_travelled_and_stands_still_ends():
-    seen = play(default_tracker(confirm_travel=0.0), lambda t: [[100, 100, 40, 20]], 4.0)
+    seen = play(default_tracker(confirm_travel=0.0), lambda t: [[100, 100, 40, 20]], 5.0)
     ((gone, number),) = events(seen, "delete")
-    assert 3.0 < gone < 3.2
+    assert 4.0 < gone < 4.2
     assert number == seen[0].id[0]
     (reason,) = (e.reason for tracks in seen for e in tracks.events if e.kind == "delete")
     assert reason == "never travelled and stands still"
