@@ -6,30 +6,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel
+from settings_tree import places
 
-from vidtrack.config import Settings, load, names
+from vidtrack.config import Settings, load, names, value_of
 from vidtrack.errors import ConfigError
 from vidtrack.explain import as_toml
 
-
-def leaves(group=Settings, prefix=""):
-    """(dotted name, field) of every setting that is not a group."""
-    for name, info in group.model_fields.items():
-        kind = info.annotation
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            yield from leaves(kind, f"{prefix}{name}.")
-        else:
-            yield prefix + name, info
-
-
-LEAVES = dict(leaves())
-
-
-def value_of(settings, name):
-    for part in name.split("."):
-        settings = getattr(settings, part)
-    return settings
+LEAVES = {name: group.model_fields[field] for name, (group, field) in places()}
 
 
 @pytest.mark.parametrize("name", LEAVES)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from pydantic import BaseModel
+from settings_tree import places
 
 from vidtrack.config import Input, Settings, load, value_of
 from vidtrack.errors import ConfigError
@@ -16,16 +16,6 @@ from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 
 SAMPLES = Path(__file__).parents[1] / "samples"
-
-
-def leaves(group=Settings, prefix=""):
-    """Class and name of each setting, by its dotted name."""
-    for name, info in group.model_fields.items():
-        kind = info.annotation
-        if isinstance(kind, type) and issubclass(kind, BaseModel):
-            yield from leaves(kind, f"{prefix}{name}.")
-        else:
-            yield prefix + name, (group, name)
 
 
 @pytest.fixture
@@ -80,7 +70,7 @@ def test_what_is_said_to_have_an_effect_is_read(kind, track, tmp_path, read):
             pass
     fresh = Settings()
     idle = []
-    for name, place in list(leaves()):
+    for name, place in list(places()):
         useful = reads(kind, name) and all(value_of(fresh, other) in values for other, values in needs(kind, name))
         if useful and name not in OF_THE_FILE and place not in read:
             idle.append(name)

@@ -79,7 +79,6 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
 }
 """Groups and settings that have an effect only where another setting has one of these values."""
 _OTHER_LIFE = {Input.RADAR: "radar.life"}
-_LINKED_UNLESS_TOLD = (Input.DETECTIONS,)
 
 
 def reads(kind: Input, name: str) -> bool:
@@ -89,8 +88,8 @@ def reads(kind: Input, name: str) -> bool:
 
 def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Other settings without which this one has no effect, each with the values that it must have."""
-    if name == "output.link_s":
-        yield "output.link", (True, None) if kind in _LINKED_UNLESS_TOLD else (True,)
+    if name == "output.link_s":  # stored detections are linked unless told otherwise
+        yield "output.link", (True, None) if kind is Input.DETECTIONS else (True,)
     for part, (other, values) in _NEEDS.items():
         if _is_within(name, part):
             yield _OTHER_LIFE.get(kind, other) if other == "tracker.life" else other, values

@@ -32,10 +32,10 @@ class Foreground:
     mask: Image
     strength: NDArray
     step: int
-    weak: Image | None = None
     place: Floats | None = None
     motion: Floats | None = None
     surveyed: Floats | None = None
+    weak: Image | None = None
     warnings: tuple[str, ...] = ()
     elsewhere: bool = False
 

@@ -78,8 +78,9 @@ class Disturbance:
         if not self._camera.trusted:
             mask = np.zeros_like(mask)
         place, motion = self._camera.place, self._camera.motion
-        elsewhere = self._changed_s > self._settings.relearn_s and self._camera.lost_s > 0
-        if self._changed_s > self._settings.relearn_s:
+        anew = self._changed_s > self._settings.relearn_s
+        elsewhere = anew and self._camera.lost_s > 0
+        if anew:
             self._scene = self._start(picture, frame.time_s)
         foreground = self._view.foreground(mask, strength, place, motion)
         return replace(foreground, weak=weak, warnings=self._camera.warnings(), elsewhere=elsewhere)

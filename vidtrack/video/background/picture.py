@@ -84,7 +84,7 @@ class View:
                 back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
                 keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
             mask = np.where(keep > 127, mask, np.uint8(0))
-        return Foreground(mask, strength, self.step, None, *self._views(place, motion))
+        return Foreground(mask, strength, self.step, *self._views(place, motion))
 
     def _views(self, place: Floats, motion: Floats) -> tuple[Floats | None, Floats | None, Floats]:
         """From the mask to the scene and from there to the picture, None where they are the same, and where in the

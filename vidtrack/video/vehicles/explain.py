@@ -91,7 +91,7 @@ def _links(regions: Regions, weak: Image | None) -> Ints:
     Weak foreground that is much more than the regions in it, as where the light flickers, links nothing.
     """
     link = -1 - np.arange(regions.total)
-    if weak is None:
+    if weak is None or regions.total < 2:  # nothing to link
         return link
     count, inside, stats, _ = cv2.connectedComponentsWithStats(weak)
     of_run = inside[regions.row, regions.start]
