@@ -7,7 +7,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from cameras import Picture, Script, script_of
+from cameras import HANG_S, Picture, Script, script_of
 from click.testing import CliRunner
 
 from vidtrack.cli import cli
@@ -38,23 +38,33 @@ class Leaving(Script):
 
 @pytest.fixture
 def seen(monkeypatch, compiled):
-    """Lets the doctor see this connection, and nobody after it."""
+    """Lets the doctor see this connection, and nobody after it; the sources that it opened."""
+    opened = []
 
     def see(connection):
         connect = script_of(connection)
-        monkeypatch.setattr(opening, "LiveSource", lambda *given: LiveSource(*given, connect=connect))
+
+        def open_it(*given):
+            opened.append(LiveSource(*given, connect=connect))
+            return opened[-1]
+
+        monkeypatch.setattr(opening, "LiveSource", open_it)
+        return opened
 
     return see
 
 
 def test_what_was_seen_is_told_and_that_it_is_gone(seen, monkeypatch):
     camera = Leaving()
-    seen(camera)
+    opened = seen(camera)
 
     class Watch(examine.Watch):
         def _seen(self, frames):
             for frame in super()._seen(frames):
                 camera.leave.set()
+                until = time.monotonic() + HANG_S
+                while opened[0].stats.state == "running" and time.monotonic() < until:
+                    time.sleep(0.01)  # the watch may end with this picture
                 yield frame
 
     monkeypatch.setattr(examine, "Watch", Watch)
