@@ -158,6 +158,27 @@ def test_a_soft_shadow_is_not_foreground():
     assert covered(play(disturbance(shadow=False), street, 2), 60, 50) == 0
 
 
+def shown_after(factor, seen_through):
+    """Share that is foreground of what drove past for 4 s, with `factor` times the road's light; it may be a shadow."""
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    for k in range(40):
+        place = np.s_[50:74], np.s_[2 * k : 2 * k + 40]
+        values = factor * (street.road[place] if seen_through else street.road.mean())
+        detector.apply(street.frame(2 + k / 10, region=(*place, values)), NONE_KNOWN)
+    return covered(play(detector, street, 0.1, start=6, region=(*place, values)), place[1].start, 50)
+
+
+@pytest.mark.parametrize("factor", [0.3, 0.35, 0.4, 0.45])
+def test_in_sunlight_hard_shadow_is_learnt_not_to_be_foreground(factor):
+    assert shown_after(factor, seen_through=True) < 0.15
+
+
+@pytest.mark.parametrize("factor", [0.3, 0.35, 0.4, 0.45])
+def test_a_dark_car_does_not_pass_for_hard_shadow(factor):
+    assert shown_after(factor, seen_through=False) > 0.9
+
+
 def test_the_shadow_of_a_person_is_not_foreground_though_it_is_all_edge():
     street, detector = Street(), disturbance()
     play(detector, street, 2)

@@ -21,7 +21,7 @@ from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
-from vidtrack.video.background.shadow import mark_shadow, reclaim
+from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -37,7 +37,7 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
-    STATE = ("_view", "_change", "_camera", "_scene", "_time_s", "_start_s", "_frames", "_contrast", "_veil")
+    STATE = ("_view", "_change", "_camera", "_scene", "_time_s", "_start_s", "_frames", "_contrast", "_veil", "_sunlight")
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
@@ -49,6 +49,7 @@ class Disturbance:
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
         self._contrast, self._veil = np.float32(1), 0.0
+        self._sunlight = Sunlight()
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
@@ -95,7 +96,7 @@ class Disturbance:
         s, scene = self._settings, self._scene
         if s.exposure:
             follow_gain(picture, scene, np.float32(self._view.black))
-        strength, hit, weak_hit = self._disturbed(picture, scene)
+        strength, hit, weak_hit = self._disturbed(picture, scene, dt)
         mask, weak = np.empty_like(hit), np.empty_like(hit)
         majority(hit, s.majority_px, mask)
         majority(weak_hit, s.majority_px, weak)
@@ -142,7 +143,7 @@ class Disturbance:
     def _unsure(self) -> bool:
         return self._time_s - self._start_s < _UNSURE_S
 
-    def _disturbed(self, picture: Picture, scene: Scene) -> tuple[NDArray[np.float32], Image, Image]:
+    def _disturbed(self, picture: Picture, scene: Scene, dt: float) -> tuple[NDArray[np.float32], Image, Image]:
         """Strength, hits (1 disturbed, SHADOW, or 0), and the same from a weaker strength on."""
         s = self._settings
         strength = np.empty(picture.luma.shape, np.float32)
@@ -152,7 +153,8 @@ class Disturbance:
         floor *= self._contrast if s.contrast else np.float32(1)
         disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak)
         if s.shadow:
-            mark_shadow(seen, scene, self._black, weak)
+            count = mark_shadow(seen, scene, self._black, self._sunlight.tolerance, weak)
+            self._sunlight.learn(count, weak.size, dt)
         hit = np.where(strength > 1, weak, np.uint8(0))
         if s.shadow and s.amid:
             reclaim(hit)

@@ -1,12 +1,14 @@
-"""Soft shadow: the scene seen darker by one factor."""
+"""Shadow: the scene seen darker by one factor."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vidtrack.compiled import kernel
+from vidtrack.scan import Floats
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import connect, find_runs
 
@@ -15,52 +17,125 @@ if TYPE_CHECKING:  # the scene needs SHADOW
     from vidtrack.video.background.scene import Levels, Scene
 
 SHADOW = np.uint8(2)  # value of a hit that is shadow
-_DARKEST, _LIGHTEST = np.float32(0.5), np.float32(0.97)  # share of the scene's light
+_LIGHTEST = np.float32(0.97)  # share of the scene's light
+_GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
 _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
-_TEXTURE, _TEXTURE_SHARE = np.float32(2), np.float32(0.22)  # grey levels, and share of the scene's light: soft edges
-_GREY_SHARE = np.float32(0.05)  # the same where no colour helps to tell shadow from dark paint
 _REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
 _LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
 _NEUTRAL = np.float32(128)  # chroma of grey
+_BINS = 20  # of the share of light that is left, from 0 to 1
+_HARDEST, _MILDEST = 5, 13  # the bins that the sun's shadows are in: there is always light of the sky
+_STRUCTURE = np.float32(6)  # luminance differences that a shadow leaves and a body hides; fewer tell nothing
+_SEEN = np.float32(0.5)  # share of the structure by which it may be missed
+_FORGET_S = 60.0  # time constant with which it is forgotten how dark the shadows were
+_LEAST = 2e-3  # share of the picture, times seconds, of darkened structure before it tells of the light
+_PEAK = 0.07  # least share of the darkened structure that is seen in two neighbouring bins, in sunlight
+_TAIL = 0.05  # least share of that peak in the bins beside it that are shadow too
+
+
+class Tolerance(NamedTuple):
+    """What passes for shadow.
+
+    darkest        least share of the scene's light
+    chroma_share   share of the scene's colour by which the chroma planes may miss the factor, beside _CHROMA
+    texture        grey levels by which luminance differences may miss the factor: soft edges
+    texture_share  the same as a share of the scene's light
+    """
+
+    darkest: np.float32
+    chroma_share: np.float32
+    texture: np.float32
+    texture_share: np.float32
+
+
+SOFT = Tolerance(np.float32(0.5), np.float32(0), np.float32(2), np.float32(0.22))
+_HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3))
+
+
+class Sunlight:
+    """Learns whether the sun casts hard shadows, and how dark, from the structure of the scene that is darker.
+
+    A body hides the structure. A shadow leaves it, and all shadows of one sun are of the same darkness.
+    """
+
+    STATE = ("_count",)
+
+    def __init__(self) -> None:
+        self._count = np.zeros(_BINS + 1)
+
+    def learn(self, count: Floats, pixels: int, dt: float) -> None:
+        """Take the counts of `mark_shadow` in a picture of so many pixels, dt [s] after the last one."""
+        self._count = self._count * math.exp(-dt / _FORGET_S) + count * dt / pixels
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """What passes for shadow in this light."""
+        shadow, darkened = self._count[_HARDEST:_MILDEST], self._count[_BINS]
+        pairs = shadow[:-1] + shadow[1:]
+        least = int(pairs.argmax())
+        peak = pairs[least]
+        if darkened < _LEAST or peak < _PEAK * darkened:
+            return SOFT
+        while least > 0 and shadow[least - 1] > _TAIL * peak:
+            least -= 1
+        return _HARD._replace(darkest=min(_HARD.darkest, np.float32((least + _HARDEST) / _BINS)))
 
 
 @kernel(error_model="numpy")
-def mark_shadow(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> None:
+def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: Tolerance, hit: Image) -> Floats:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's, times one factor r.
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
+    Returns (_BINS + 1,): the number of pixels, by r, in which the scene's structure is seen, and that of all in which
+    there is structure and less light.
     """
+    count = np.zeros(_BINS + 1)
     row, start, stop = find_runs(hit, False)
     coloured = len(picture.cb) > 0
-    share = _TEXTURE_SHARE if coloured else _GREY_SHARE
+    share = tolerance.texture_share if coloured else _GREY_SHARE
     for k in range(len(row)):
         y = row[k]
         for x in range(start[k], stop[k]):
             light = scene.luma[y, x] - black
             r = (np.float32(picture.luma[y, x]) - black) / light
-            if not _DARKEST <= r < _LIGHTEST or (coloured and not _same_colour(picture, scene, y // 2, x // 2, r)):
+            if not r < _LIGHTEST:
                 continue
-            if _texture_error(picture.luma, scene.luma, y, x, r) < _TEXTURE + share * light:
+            missed, structure = _texture(picture.luma, scene.luma, y, x, r)
+            count[_BINS] += structure > _STRUCTURE
+            if r * _BINS < _HARDEST:
+                continue
+            off, colour = _colour(picture, scene, y // 2, x // 2, r) if coloured else (np.float32(0), np.float32(0))
+            count[int(r * _BINS)] += structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA
+            if (
+                r >= tolerance.darkest
+                and off < _CHROMA + tolerance.chroma_share * colour
+                and missed < tolerance.texture + share * light
+            ):
                 hit[y, x] = SHADOW
+    return count
 
 
 @kernel(inline="always")
-def _same_colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> bool:
-    blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * (scene.cb[y, x] - _NEUTRAL)
-    red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * (scene.cr[y, x] - _NEUTRAL)
-    return max(abs(blue), abs(red)) < _CHROMA
+def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
+    """Grey levels by which the scene's colour, times r, is missed, and the colour itself."""
+    blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
+    off_blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * blue
+    off_red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * red
+    return max(abs(off_blue), abs(off_red)), max(abs(blue), abs(red))
 
 
 @kernel(inline="always")
-def _texture_error(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> np.float32:
+def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
+    """Luminance differences by which those of the scene, times r, are missed, and these themselves."""
     h, w = luma.shape
     up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
-    across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - r * (scene[y, right] - scene[y, left])
-    along = np.float32(luma[down, x]) - np.float32(luma[up, x]) - r * (scene[down, x] - scene[up, x])
-    return abs(across) + abs(along)
+    across, along = r * (scene[y, right] - scene[y, left]), r * (scene[down, x] - scene[up, x])
+    off_across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - across
+    off_along = np.float32(luma[down, x]) - np.float32(luma[up, x]) - along
+    return abs(off_across) + abs(off_along), abs(across) + abs(along)
 
 
 @kernel
