@@ -48,13 +48,15 @@ if TYPE_CHECKING:
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
     from vidtrack.tracking.boxes import box_scan as box_scan
+    from vidtrack.tracking.deferred.mht import MHT as MHT
+    from vidtrack.tracking.deferred.splitting import Split as Split
     from vidtrack.tracking.formation import Formation as Formation
     from vidtrack.tracking.formation import GroupTracker as GroupTracker
-    from vidtrack.tracking.groups import Groups as Groups
     from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
     from vidtrack.tracking.log_ratio import LogRatio as LogRatio
-    from vidtrack.tracking.mht import MHT as MHT
-    from vidtrack.tracking.splitting import Split as Split
+    from vidtrack.tracking.occlusion.occlusion import Occlusion as Occlusion
+    from vidtrack.tracking.picture import NoPicture as NoPicture
+    from vidtrack.tracking.picture import Picture as Picture
     from vidtrack.tracking.tracker import Tracker as Tracker
 
 _HOME = {
@@ -71,19 +73,21 @@ _HOME = {
     "GeneralizedNN": "associate.generalized_nn",
     "GreedyGNN": "associate.hard",
     "GroupTracker": "tracking.formation",
-    "Groups": "tracking.groups",
     "IMMBank": "estimate.imm",
     "JPDA": "associate.jpda",
     "KalmanBank": "estimate.kalman",
     "LifeCycle": "tracking.lifecycle",
     "LikelihoodGate": "associate.gate",
     "LogRatio": "tracking.log_ratio",
-    "MHT": "tracking.mht",
+    "MHT": "tracking.deferred.mht",
     "NN": "associate.hard",
+    "NoPicture": "tracking.picture",
+    "Occlusion": "tracking.occlusion.occlusion",
     "OutputError": "errors",
     "PDA": "associate.pda",
     "PSN": "associate.strongest",
     "ParticleBank": "estimate.particle",
+    "Picture": "tracking.picture",
     "PlotFormatError": "errors",
     "PositionRangeRate": "radar.sensors",
     "RangeAzimuth": "radar.sensors",
@@ -93,7 +97,7 @@ _HOME = {
     "Settings": "config",
     "Singer": "estimate.acceleration",
     "SourceError": "errors",
-    "Split": "tracking.splitting",
+    "Split": "tracking.deferred.splitting",
     "Status": "scan",
     "StoppedEarly": "errors",
     "StrongestNeighbour": "associate.strongest",
