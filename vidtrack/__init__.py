@@ -50,13 +50,13 @@ if TYPE_CHECKING:
     from vidtrack.tracking.boxes import box_scan as box_scan
     from vidtrack.tracking.deferred.mht import MHT as MHT
     from vidtrack.tracking.deferred.splitting import Split as Split
-    from vidtrack.tracking.formation import Formation as Formation
-    from vidtrack.tracking.formation import GroupTracker as GroupTracker
+    from vidtrack.tracking.formation.groups import Formation as Formation
+    from vidtrack.tracking.formation.groups import GroupTracker as GroupTracker
     from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
     from vidtrack.tracking.log_ratio import LogRatio as LogRatio
     from vidtrack.tracking.occlusion.occlusion import Occlusion as Occlusion
-    from vidtrack.tracking.picture import NoPicture as NoPicture
-    from vidtrack.tracking.picture import Picture as Picture
+    from vidtrack.tracking.picture.picture import NoPicture as NoPicture
+    from vidtrack.tracking.picture.picture import Picture as Picture
     from vidtrack.tracking.tracker import Tracker as Tracker
 
 _HOME = {
@@ -67,12 +67,12 @@ _HOME = {
     "Error": "errors",
     "FixedGainBank": "estimate.fixed_gain",
     "FormatError": "errors",
-    "Formation": "tracking.formation",
+    "Formation": "tracking.formation.groups",
     "GNN": "associate.hard",
     "Gate": "associate.gate",
     "GeneralizedNN": "associate.generalized_nn",
     "GreedyGNN": "associate.hard",
-    "GroupTracker": "tracking.formation",
+    "GroupTracker": "tracking.formation.groups",
     "IMMBank": "estimate.imm",
     "JPDA": "associate.jpda",
     "KalmanBank": "estimate.kalman",
@@ -81,13 +81,13 @@ _HOME = {
     "LogRatio": "tracking.log_ratio",
     "MHT": "tracking.deferred.mht",
     "NN": "associate.hard",
-    "NoPicture": "tracking.picture",
+    "NoPicture": "tracking.picture.picture",
     "Occlusion": "tracking.occlusion.occlusion",
     "OutputError": "errors",
     "PDA": "associate.pda",
     "PSN": "associate.strongest",
     "ParticleBank": "estimate.particle",
-    "Picture": "tracking.picture",
+    "Picture": "tracking.picture.picture",
     "PlotFormatError": "errors",
     "PositionRangeRate": "radar.sensors",
     "RangeAzimuth": "radar.sensors",

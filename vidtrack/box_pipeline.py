@@ -7,13 +7,13 @@ from vidtrack.associate.shape import Shape
 from vidtrack.associate.trust import EQUAL, Trust
 from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.tracking.border import EXIT_S
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.occlusion.sharing import Exclusive
-from vidtrack.tracking.picture import Picture
-from vidtrack.tracking.road import Road
+from vidtrack.tracking.picture.border import EXIT_S
+from vidtrack.tracking.picture.picture import Picture
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.tracker import Tracker
 
 

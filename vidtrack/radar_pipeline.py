@@ -15,7 +15,7 @@ from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.scan import Tracks
 from vidtrack.steps import scan_steps
 from vidtrack.tracking.methods import life, rule
-from vidtrack.tracking.picture import NoPicture
+from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
 
 

@@ -6,7 +6,7 @@ from blob_scene import confirmed_ids, default_tracker, events, nearest_id, play
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Status
 from vidtrack.tracking.lifecycle import LifeCycle
-from vidtrack.tracking.picture import Picture
+from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.tracker import Tracker
 
 

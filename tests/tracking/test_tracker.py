@@ -15,7 +15,7 @@ from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Scan, Status
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.occlusion.occlusion import Occlusion
-from vidtrack.tracking.picture import Picture
+from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.tracker import Tracker
 
 EYE = np.eye(2)

@@ -7,7 +7,7 @@ a blob without own edge   by how far its size is off                 all
 a detector's box          max(jitter longer side, 0.5 px)^2 I        none
 a file of boxes           the same, with the jitter of `file_noise`   none
 
-What a radar's plots say of their own errors is in `radar.sensors`.
+A radar's plots state their own errors, see `radar.scans`.
 """
 
 from __future__ import annotations

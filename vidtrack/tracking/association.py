@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.associate.problem import Problem
 from vidtrack.scan import Decision, Event, Ints, Mask, Tracks
 from vidtrack.tracking.choices import heaviest
-from vidtrack.tracking.picture import View
+from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
 
 

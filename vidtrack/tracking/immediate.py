@@ -14,7 +14,7 @@ from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.occlusion.sharing import Sharing
-from vidtrack.tracking.picture import View
+from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
 
 CLAIMED = 0.1

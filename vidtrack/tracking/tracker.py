@@ -30,10 +30,10 @@ from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.immediate import Immediate
 from vidtrack.tracking.lifecycle import Life, LifeCycle
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
-from vidtrack.tracking.picture import Picture, Surroundings, View
+from vidtrack.tracking.picture.picture import Picture, Surroundings, View
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
-from vidtrack.tracking.road import Road
 from vidtrack.tracking.snapshot import snapshot
 from vidtrack.usable import check_states
 

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Decision, Status
-from vidtrack.tracking.border import Border
 from vidtrack.tracking.boxes import overlapping
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.occlusion import Occlusion
-from vidtrack.tracking.picture import View
+from vidtrack.tracking.picture.border import Border
+from vidtrack.tracking.picture.picture import View
 
 SPEED = 60.0
 

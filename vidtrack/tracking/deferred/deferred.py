@@ -12,7 +12,7 @@ from vidtrack.scan import CONFIRMED, Event, Ints, Mask, Tracks
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.deferred.forest import Forest
-from vidtrack.tracking.picture import View
+from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
 
 UNSURE = 0.01

@@ -25,7 +25,7 @@ from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.occlusion.claims import claims
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.sharing import Exclusive
-from vidtrack.tracking.picture import View
+from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
 
 SETTLED = 5

@@ -10,7 +10,7 @@ import numpy as np
 from vidtrack.estimate.bank import Estimator
 from vidtrack.scan import Decision, Event, Floats, Ints, Mask
 from vidtrack.tracking.association import Association
-from vidtrack.tracking.picture import View
+from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
 
 

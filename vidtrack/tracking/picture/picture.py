@@ -11,10 +11,10 @@ from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
-from vidtrack.tracking.border import EXIT_S, Border
 from vidtrack.tracking.boxes import absolute, follow, longer
+from vidtrack.tracking.picture.border import EXIT_S, Border
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
-from vidtrack.tracking.road import Road
 
 
 class View(NamedTuple):
