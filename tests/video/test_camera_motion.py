@@ -177,7 +177,7 @@ def test_a_blob_at_the_edge_of_the_picture_is_cut_by_it_at_every_size(size):
     tracker.step(scan)
     box = scan.box.copy()
     box[:, :2] += scan.z
-    cut = tracker.border.sides(box)
+    cut = tracker.picture.border.sides(box)
     assert cut[:, 2].any()
     assert cut[:, 3].any()
     assert not cut[:, :2].any()
