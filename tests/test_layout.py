@@ -196,7 +196,7 @@ def test_public_names_are_what_they_say_in_any_order(first):
         "assert inspect.isfunction(vt.track), vt.track\n"
         "assert inspect.isclass(vt.Tracker)\n"
         "assert issubclass(vt.ScanError, vt.Error)\n"
-        "import vidtrack.tracking.groups\n"
+        "import vidtrack.tracking.register\n"
         "assert inspect.isfunction(vt.track), vt.track\n"
     )
     assert result.returncode == 0, result.stderr

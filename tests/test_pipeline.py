@@ -7,13 +7,15 @@ import pytest
 from command_line import SAMPLES
 
 from vidtrack import formats, score
-from vidtrack.box_pipeline import box_tracker, build_tracker
+from vidtrack.box_pipeline import box_tracker, build_blob_tracker, build_box_tracker
 from vidtrack.config import Settings, SourceSettings, TrackerSettings, load
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.pipeline import build_detector, has_driven, track, video_steps
 from vidtrack.run import Run
 from vidtrack.scan import Scan, Status
 from vidtrack.tracking.boxes import box_scan
+from vidtrack.tracking.occlusion.occlusion import Occlusion
+from vidtrack.tracking.occlusion.sharing import Exclusive
 from vidtrack.video.frame import Frame
 from vidtrack.video.source import open_source
 
@@ -55,7 +57,7 @@ def test_the_crossing_vehicles_keep_their_identities(tmp_path):
 def test_steps_carry_everything_about_a_frame():
     settings = load(assignments=["source.end_s=2"])
     with open_source(str(CROSSING), settings.source) as source:
-        tracker = build_tracker(settings.tracker, (source.width, source.height))
+        tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         steps = list(video_steps(source, build_detector(settings), tracker, settings))
     last = steps[-1]
     assert last.foreground.mask.shape == last.frame.shape
@@ -86,7 +88,7 @@ def test_a_mask_that_is_no_picture_is_refused(tmp_path):
 
 def test_only_vehicles_that_drove_protect_the_scene():
     """A confirmed track 1.5 times its size from where it began has driven; what a car left behind has not."""
-    tracker = build_tracker(TrackerSettings(), (320, 240))
+    tracker = build_blob_tracker(TrackerSettings(), (320, 240))
     box = np.tile([-10.0, -5.0, 20.0, 10.0], (2, 1))
     driven = []
     for k in range(20):
@@ -102,10 +104,17 @@ def test_settings_reach_the_tracker(method, distance):
     settings = load(
         assignments=[f"tracker.method={method}", f"tracker.distance={distance}", "tracker.merged_blobs=false"]
     )
-    tracker = build_tracker(settings.tracker)
-    assert type(tracker.associate).__name__.lower() == method
+    tracker = build_blob_tracker(settings.tracker)
+    assert type(tracker.timing.rule).__name__.lower() == method
     assert tracker.gate.distance == distance
-    assert tracker.sharing is None
+    assert tracker.sharing == Exclusive()
+
+
+@pytest.mark.parametrize(("method", "sharing"), [("gnn", Occlusion()), ("mht", Exclusive()), ("split", Exclusive())])
+def test_blobs_are_shared_where_decisions_do_not_wait(method, sharing):
+    settings = load(assignments=[f"tracker.method={method}"])
+    assert build_blob_tracker(settings.tracker).sharing == sharing
+    assert build_box_tracker(settings.tracker, settings.detections).sharing == Exclusive()
 
 
 def test_boxes_of_a_detector_become_tracks_with_identities():
@@ -121,8 +130,8 @@ def test_boxes_of_a_detector_become_tracks_with_identities():
 
 def test_stored_detections_are_seen_with_a_probability_of_their_own():
     settings = load(assignments=["tracker.detection_probability=0.7", "detections.detection_probability=0.6"])
-    assert build_tracker(settings.tracker).rates.detection_probability == 0.7
-    assert build_tracker(settings.tracker, whole=settings.detections).rates.detection_probability == 0.6
+    assert build_blob_tracker(settings.tracker).rates.detection_probability == 0.7
+    assert build_box_tracker(settings.tracker, settings.detections).rates.detection_probability == 0.6
 
 
 def test_a_mirrored_video_gives_mirrored_tracks():
@@ -132,7 +141,7 @@ def test_a_mirrored_video_gives_mirrored_tracks():
 
     def tracks(frames):
         bounds = frames[0].shape[::-1]
-        tracker = build_tracker(Settings().tracker, bounds)
+        tracker = build_blob_tracker(Settings().tracker, bounds)
         return [step.tracks for step in video_steps(frames, build_detector(Settings()), tracker, Settings())]
 
     with open_source(str(SAMPLES / "junction.avi"), SourceSettings()) as source:

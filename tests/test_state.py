@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLES
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings, load
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.pipeline import build_detector, video_steps
@@ -20,7 +20,7 @@ class Pipeline:
     def __init__(self, settings):
         self.settings = settings
         self.detector = build_detector(settings)
-        self.tracker = build_tracker(settings.tracker, (320, 240))
+        self.tracker = build_blob_tracker(settings.tracker, (320, 240))
 
     def steps(self, frames):
         return list(video_steps(frames, self.detector, self.tracker, self.settings))
@@ -80,6 +80,33 @@ def test_other_settings_do_not_fit(frames):
         pipeline.steps(frames[:3])
     with pytest.raises(FormatError, match="other settings"):
         restore(ours, gather(paper))
+
+
+@pytest.mark.parametrize(
+    ("saved", "now"),
+    [
+        ("tracker.method=mht", "tracker.method=gnn"),
+        ("tracker.method=gnn", "tracker.method=mht"),
+        ("tracker.method=split", "tracker.method=mht"),
+        ("tracker.merged_blobs=false", "tracker.merged_blobs=true"),
+        ("tracker.merged_blobs=true", "tracker.merged_blobs=false"),
+    ],
+)
+def test_a_state_of_other_policies_is_refused(frames, saved, now):
+    old, new = (Pipeline(load(assignments=[setting])) for setting in (saved, now))
+    old.steps(frames[:20])
+    with pytest.raises(FormatError, match="other settings"):
+        restore(new, gather(old))
+
+
+def test_a_state_of_an_earlier_version_is_refused_in_one_line(frames):
+    """Before decisions and pictures were parts of their own, these were the tracker's names."""
+    pipeline = Pipeline(Settings())
+    pipeline.steps(frames[:20])
+    old = {name.replace("picture.road", "road"): value for name, value in gather(pipeline).items()}
+    with pytest.raises(FormatError, match="another version made it") as refused:
+        restore(Pipeline(Settings()), old | {"tracker.forest": None})
+    assert "\n" not in str(refused.value)
 
 
 def test_arrays_of_another_kind_do_not_reach_compiled_code(frames):

@@ -29,7 +29,7 @@ import numpy as np
 from peers.environment import python_of
 
 from vidtrack import formats, score
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_box_tracker
 from vidtrack.config import Settings, SourceSettings
 from vidtrack.scan import Floats, Ints, Status
 from vidtrack.video.detections import open_detections
@@ -139,7 +139,7 @@ def run_ours(data: Traffic) -> Outcome:
         frame = np.repeat(np.arange(len(data.start) - 1), np.diff(data.start))
         formats.write_mot(path, formats.box_table(frame, np.full(len(frame), -1), data.box))
         detections = open_detections(str(path), settings)
-    tracker = build_tracker(settings.tracker, (data.side, data.side), whole=detections.settings)
+    tracker = build_box_tracker(settings.tracker, detections.settings, (data.side, data.side))
     scans = [scan for _, _, scan in detections]
     seconds, rows = np.empty(len(scans)), []
     for frame, scan in enumerate(scans):

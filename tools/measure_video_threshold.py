@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.detection.amplitude import RAYLEIGH
 from vidtrack.detection.threshold import ThresholdController
@@ -36,7 +36,7 @@ def main() -> None:
 
     with open_source(given.video, settings.source) as source:
         bounds = source.width, source.height
-        tracker = build_tracker(settings.tracker, bounds)
+        tracker = build_blob_tracker(settings.tracker, bounds)
         steps = list(video_steps(source, build_detector(settings), tracker, settings))
     scans = [replace(step.scan, amplitude=level * step.scan.amplitude) for step in steps]
     amplitude = np.concatenate([scan.amplitude for scan in scans])
@@ -44,7 +44,7 @@ def main() -> None:
     cell = settings.blobs.min_area_share * bounds[0] * bounds[1]
     controller = ThresholdController(snr, cell, p_fa_max=float(RAYLEIGH.survival(level)))
 
-    plain, own = build_tracker(settings.tracker, bounds), build_tracker(settings.tracker, bounds)
+    plain, own = build_blob_tracker(settings.tracker, bounds), build_blob_tracker(settings.tracker, bounds)
     own.threshold = controller
     thresholds, differ = [], 0
     for scan in scans:

@@ -48,13 +48,15 @@ if TYPE_CHECKING:
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
     from vidtrack.tracking.boxes import box_scan as box_scan
-    from vidtrack.tracking.formation import Formation as Formation
-    from vidtrack.tracking.formation import GroupTracker as GroupTracker
-    from vidtrack.tracking.groups import Groups as Groups
+    from vidtrack.tracking.deferred.mht import MHT as MHT
+    from vidtrack.tracking.deferred.splitting import Split as Split
+    from vidtrack.tracking.formation.groups import Formation as Formation
+    from vidtrack.tracking.formation.groups import GroupTracker as GroupTracker
     from vidtrack.tracking.lifecycle import LifeCycle as LifeCycle
     from vidtrack.tracking.log_ratio import LogRatio as LogRatio
-    from vidtrack.tracking.mht import MHT as MHT
-    from vidtrack.tracking.splitting import Split as Split
+    from vidtrack.tracking.occlusion.occlusion import Occlusion as Occlusion
+    from vidtrack.tracking.picture.picture import NoPicture as NoPicture
+    from vidtrack.tracking.picture.picture import Picture as Picture
     from vidtrack.tracking.tracker import Tracker as Tracker
 
 _HOME = {
@@ -65,25 +67,27 @@ _HOME = {
     "Error": "errors",
     "FixedGainBank": "estimate.fixed_gain",
     "FormatError": "errors",
-    "Formation": "tracking.formation",
+    "Formation": "tracking.formation.groups",
     "GNN": "associate.hard",
     "Gate": "associate.gate",
     "GeneralizedNN": "associate.generalized_nn",
     "GreedyGNN": "associate.hard",
-    "GroupTracker": "tracking.formation",
-    "Groups": "tracking.groups",
+    "GroupTracker": "tracking.formation.groups",
     "IMMBank": "estimate.imm",
     "JPDA": "associate.jpda",
     "KalmanBank": "estimate.kalman",
     "LifeCycle": "tracking.lifecycle",
     "LikelihoodGate": "associate.gate",
     "LogRatio": "tracking.log_ratio",
-    "MHT": "tracking.mht",
+    "MHT": "tracking.deferred.mht",
     "NN": "associate.hard",
+    "NoPicture": "tracking.picture.picture",
+    "Occlusion": "tracking.occlusion.occlusion",
     "OutputError": "errors",
     "PDA": "associate.pda",
     "PSN": "associate.strongest",
     "ParticleBank": "estimate.particle",
+    "Picture": "tracking.picture.picture",
     "PlotFormatError": "errors",
     "PositionRangeRate": "radar.sensors",
     "RangeAzimuth": "radar.sensors",
@@ -93,7 +97,7 @@ _HOME = {
     "Settings": "config",
     "Singer": "estimate.acceleration",
     "SourceError": "errors",
-    "Split": "tracking.splitting",
+    "Split": "tracking.deferred.splitting",
     "Status": "scan",
     "StoppedEarly": "errors",
     "StrongestNeighbour": "associate.strongest",

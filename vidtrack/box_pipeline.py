@@ -1,16 +1,19 @@
-"""The tracker that the settings describe, for blobs or a detector's boxes. No pictures, and no OpenCV."""
+"""The trackers that the settings describe, of blobs and of a detector's boxes. No pictures, and no OpenCV."""
 
 from __future__ import annotations
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
-from vidtrack.associate.trust import Trust
+from vidtrack.associate.trust import EQUAL, Trust
 from vidtrack.config import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.tracking.border import EXIT_S
-from vidtrack.tracking.groups import Groups
+from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import life, rule
-from vidtrack.tracking.road import Road
+from vidtrack.tracking.occlusion.occlusion import Occlusion
+from vidtrack.tracking.occlusion.sharing import Exclusive
+from vidtrack.tracking.picture.border import EXIT_S
+from vidtrack.tracking.picture.picture import Picture
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.tracker import Tracker
 
 
@@ -23,62 +26,101 @@ def box_tracker(settings: Settings | None = None, bounds: tuple[float, float] | 
     stream cannot: `tracker.accel` holds then, and every box may start a track.
     """
     settings = settings or Settings()
-    return build_tracker(settings.tracker, bounds, whole=settings.detections)
+    return build_box_tracker(settings.tracker, settings.detections, bounds)
 
 
-def build_tracker(
+def build_blob_tracker(
     settings: TrackerSettings,
     bounds: tuple[float, float] | None = None,
     *,
-    whole: DetectionSettings | None = None,
+    explain: bool = False,
+    smooth: bool = False,
+) -> Tracker:
+    """The tracker of blobs within bounds (width, height) [px]: a blob may be a part of a vehicle, or several.
+
+    explain  keep each scan's choices, for decisions.csv and rerun
+    smooth   keep what a smoother needs
+    """
+    associate = rule(settings)
+    merging = settings.merged_blobs and not isinstance(associate, ForestRule)
+    return Tracker(
+        model=_motion(settings, settings.accel),
+        associate=associate,
+        gate=_gate(settings),
+        life=life(
+            settings.life,
+            settings,
+            settings.confirm_hits,
+            settings.confirm_window,
+            confirm_s=settings.confirm_s,
+            confirm_travel=settings.confirm_travel,
+            coast_s=settings.coast_s,
+            hidden_s=settings.hidden_s,
+            coast_scans=None,
+            idle_s=settings.idle_s,
+            idle_travel=settings.idle_travel,
+        ),
+        picture=Picture(bounds, road=Road(*bounds, wary=settings.restless) if bounds else None, box_s=settings.box_s),
+        sharing=Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap) if merging else Exclusive(),
+        detection_probability=settings.detection_probability,
+        clutter_density=settings.clutter_density,
+        explain=explain,
+        smooth=smooth,
+    )
+
+
+def build_box_tracker(
+    settings: TrackerSettings,
+    detections: DetectionSettings,
+    bounds: tuple[float, float] | None = None,
+    *,
     pace: float = 1.0,
     explain: bool = False,
     smooth: bool = False,
 ) -> Tracker:
-    """The tracker that the settings describe, for scans of boxes in pixels within bounds (width, height).
+    """The tracker of a detector's boxes within bounds (width, height) [px]: each box is one whole object.
 
-    whole    settings for stored detections, where each box is one whole object: boxes may overlap but are never
-             shared, their size and score are evidence, and M hits of N confirm a track even if it does not move
+    Boxes may overlap but are never shared, their size and score are evidence, and M hits of N confirm a track even if
+    it does not move.
+
     pace     seconds of the scans' clock in a second of the settings; not 1 where the rate of the scans is assumed
     explain  keep each scan's choices, for decisions.csv and rerun
     smooth   keep what a smoother needs
     """
-    accel = (settings.accel if whole is None or whole.accel is None else whole.accel) / pace**2
     return Tracker(
-        model=ConstantVelocity(
-            dim=2,
-            accel=accel,
-            cross=accel * settings.cross / settings.accel,
-            speed=settings.speed / pace,
-            hold_s=settings.hold_s * pace,
-            per_size=True,
-        ),
+        model=_motion(settings, settings.accel if detections.accel is None else detections.accel, pace),
         associate=rule(settings),
-        gate=Gate(settings.gate_probability, settings.distance, settings.euclidean_radius_px),
+        gate=_gate(settings),
         life=life(
             settings.life,
             settings,
-            (whole or settings).confirm_hits,
-            (whole or settings).confirm_window,
-            confirm_s=0.0 if whole else settings.confirm_s,
-            confirm_travel=0.0 if whole else settings.confirm_travel,
+            detections.confirm_hits,
+            detections.confirm_window,
             coast_s=settings.coast_s * pace,
             hidden_s=settings.hidden_s * pace,
             coast_scans=None,
-            idle_s=None if whole else settings.idle_s,
-            idle_travel=settings.idle_travel,
         ),
-        groups=Groups(cover=settings.group_cover, overlap=settings.blob_overlap)
-        if settings.merged_blobs and not whole
-        else None,
-        shape=Shape() if whole else None,
-        trust=Trust(whole.sure_score) if whole and whole.sure_score is not None else None,
-        road=Road(*bounds, wary=settings.restless) if bounds and not whole else None,
-        bounds=bounds,
-        detection_probability=(whole or settings).detection_probability,
+        picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace, exit_s=EXIT_S * pace),
+        trust=EQUAL if detections.sure_score is None else Trust(detections.sure_score),
+        detection_probability=detections.detection_probability,
         clutter_density=settings.clutter_density,
-        box_s=(whole or settings).box_s * pace,
-        exit_s=EXIT_S * pace,
         explain=explain,
         smooth=smooth,
     )
+
+
+def _motion(settings: TrackerSettings, accel: float, pace: float = 1.0) -> ConstantVelocity:
+    """Nearly constant velocity in the picture, accelerations in object sizes; `cross` in proportion to `accel`."""
+    accel = accel / pace**2
+    return ConstantVelocity(
+        dim=2,
+        accel=accel,
+        cross=accel * settings.cross / settings.accel,
+        speed=settings.speed / pace,
+        hold_s=settings.hold_s * pace,
+        per_size=True,
+    )
+
+
+def _gate(settings: TrackerSettings) -> Gate:
+    return Gate(settings.gate_probability, settings.distance, settings.euclidean_radius_px)

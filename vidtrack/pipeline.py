@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.output.sink import Step
 from vidtrack.scan import TENTATIVE, Mask, Tracks
@@ -35,7 +35,7 @@ def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[
     settings = settings or Settings()
     with open_source(str(path), settings.source) as source:
         detector = build_detector(settings)
-        tracker = build_tracker(settings.tracker, (source.width, source.height))
+        tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
             yield step.frame, step.shown

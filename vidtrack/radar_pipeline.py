@@ -15,6 +15,7 @@ from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.scan import Tracks
 from vidtrack.steps import scan_steps
 from vidtrack.tracking.methods import life, rule
+from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
 
 
@@ -47,6 +48,7 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
         associate=rule(common),
         gate=Gate(common.gate_probability, common.distance, radar.euclidean_radius_m),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
+        picture=NoPicture(),
         detection_probability=radar.detection_probability,
         clutter_density=radar.clutter_density,
         surveyed=surveyed(found),

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker, build_box_tracker
 from vidtrack.config import Settings
 from vidtrack.errors import SourceError
 from vidtrack.live.memory import Memory
@@ -71,14 +71,12 @@ class Run:
             stack.callback(opened.close)
             spare(opened.place, output, masks, video)
             self._pace = opened.pace if isinstance(opened, Detections) else 1.0
-            self._tracker = build_tracker(
-                settings.tracker,
-                (opened.width, opened.height),
-                whole=opened.settings if isinstance(opened, Detections) else None,
-                pace=self._pace,
-                explain=decisions or rerun is not None,
-                smooth=settings.output.smooth,
-            )
+            bounds = opened.width, opened.height
+            keep = {"explain": decisions or rerun is not None, "smooth": settings.output.smooth}
+            if isinstance(opened, Detections):
+                self._tracker = build_box_tracker(settings.tracker, opened.settings, bounds, pace=opened.pace, **keep)
+            else:
+                self._tracker = build_blob_tracker(settings.tracker, bounds, **keep)
             scene: Callable[[], Image] | None = None
             if isinstance(opened, Detections):
                 scans = ((index, scan) for index, _, scan in opened)

@@ -50,18 +50,14 @@ def gather(thing: Any, prefix: str = "") -> State:
     return found
 
 
-def restore(thing: Any, state: State, prefix: str = "") -> None:
+def restore(thing: Any, state: State) -> None:
     """Set the state that `gather` found in an object made with the same settings. Raises FormatError for a misfit."""
-    for name in _names(thing):
-        value = getattr(thing, name)
-        if hasattr(value, "STATE"):
-            restore(value, state, f"{prefix}{name}.")
-        elif hasattr(value, "_fields"):
-            setattr(thing, name, type(value)(*(_get(state, f"{prefix}{name}.{field}") for field in value._fields)))
-        else:
-            found = _get(state, prefix + name)
-            _check(prefix + name, value, found)
-            setattr(thing, name, tuple(found) if isinstance(found, list) else found)
+    left = state.keys() - _restored(thing, state, "")
+    if left:
+        raise FormatError(
+            f"nothing here takes the saved state's {min(left)}: other settings or another version made it; "
+            "give it those, or remove it"
+        )
 
 
 def write_state(path: Path, state: State) -> None:
@@ -97,6 +93,25 @@ def read_state(path: Path) -> State:
         raise FormatError(f"cannot read the state {path}: {error.strerror or error}") from None
     except _DAMAGE:
         raise FormatError(f"{path} is not a saved state, or it is damaged; remove it to start anew") from None
+
+
+def _restored(thing: Any, state: State, prefix: str) -> set[str]:
+    """Set the state of an object and its parts; returns the names that were used."""
+    used = set()
+    for name in _names(thing):
+        value = getattr(thing, name)
+        if hasattr(value, "STATE"):
+            used |= _restored(value, state, f"{prefix}{name}.")
+        elif hasattr(value, "_fields"):
+            names = [f"{prefix}{name}.{field}" for field in value._fields]
+            setattr(thing, name, type(value)(*(_get(state, each) for each in names)))
+            used |= set(names)
+        else:
+            found = _get(state, prefix + name)
+            _check(prefix + name, value, found)
+            setattr(thing, name, tuple(found) if isinstance(found, list) else found)
+            used.add(prefix + name)
+    return used
 
 
 def _unpacked(name: str, value: tuple[Any, ...]) -> State:

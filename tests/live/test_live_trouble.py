@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.pipeline import build_detector, video_steps
 from vidtrack.scan import Status
@@ -37,7 +37,7 @@ class Seen:
 
     def __init__(self, size, frames):
         settings = Settings()
-        tracker = build_tracker(settings.tracker, size)
+        tracker = build_blob_tracker(settings.tracker, size)
         self.detector = build_detector(settings)
         self.confirmed, self.alive = {}, {}
         for step in video_steps(frames, self.detector, tracker, settings):

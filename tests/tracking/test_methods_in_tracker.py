@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidtrack as vt
-from vidtrack.tracking.association import CLAIMED
+from vidtrack.tracking.immediate import CLAIMED
 from vidtrack.tracking.methods import METHODS
 
 ALL = {**METHODS, "greedy": vt.GreedyGNN, "jpda-star": lambda: vt.JPDA(star=True)}

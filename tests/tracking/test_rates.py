@@ -107,7 +107,6 @@ def test_numbers_for_each_run_stay_with_their_run_when_tracks_die():
         {"clutter_density": -1e-5},
         {"clutter_density": np.inf},
         {"clutter_density": None, "surveyed": 0.0},
-        {"box_s": 0.0},
     ],
 )
 def test_what_is_no_rate_is_refused(given):

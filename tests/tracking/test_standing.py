@@ -1,15 +1,12 @@
 """What stands: queues of vehicles that drove in stay, what never travelled ends; changed shapes are followed."""
 
-import numpy as np
 import pytest
 from blob_scene import confirmed_ids, default_tracker, events, nearest_id, play
 
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Status
-from vidtrack.tracking.boxes import overlapping
-from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
-from vidtrack.tracking.sharing import Sharing
+from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.tracker import Tracker
 
 
@@ -24,7 +21,7 @@ def test_what_never_travelled_and_stands_still_ends():
 
 def test_without_idle_s_it_stays():
     life = LifeCycle(coast_s=1.0, coast_scans=None)
-    tracker = Tracker(life=life, bounds=(320.0, 240.0))
+    tracker = Tracker(life=life, picture=Picture((320.0, 240.0)))
     seen = play(tracker, lambda t: [[100, 100, 40, 20]], 8.0, fps=5)
     assert not events(seen, "delete")
 
@@ -60,23 +57,6 @@ def test_a_track_continues_on_what_is_left_of_its_blob():
     assert confirmed_ids(seen) == {number}
     assert seen[-1].id.tolist() == [number]
     assert not events(seen, "delete")
-
-
-def test_catch_gives_each_idle_track_the_free_blob_that_it_overlaps_most():
-    tracks = np.array([[0.0, 0, 40, 20], [100.0, 0, 40, 20], [200.0, 0, 40, 20]])
-    blobs = np.array([[10.0, 0, 40, 20], [2.0, 0, 40, 20], [130.0, 0, 40, 20], [200.0, 0, 14, 20]])
-    everyone, all_free = np.ones(3, bool), np.ones(4, bool)
-    sharing = Sharing(Groups(), 0.3)
-    assert sharing.catch(tracks, blobs, everyone, all_free).tolist() == [1, -1, 3]
-    assert sharing.catch(tracks, blobs, everyone, np.array([True, False, True, True])).tolist() == [0, -1, 3]
-    assert sharing.catch(tracks, blobs, np.array([False, True, True]), all_free).tolist() == [-1, -1, 3]
-    assert sharing.catch(tracks, np.empty((0, 4)), everyone, np.empty(0, bool)).tolist() == [-1] * 3
-
-
-def test_of_two_tracks_on_one_blob_the_one_that_overlaps_it_more_has_it():
-    tracks = np.array([[0.0, 0, 40, 20], [6.0, 0, 40, 20], [np.nan, 0, 40, 20]])
-    blob = np.array([[8.0, 0, 40, 20]])
-    assert overlapping(tracks, blob, np.ones(3, bool), np.ones(1, bool), 0.3).tolist() == [-1, 0, -1]
 
 
 def test_a_tentative_track_is_confirmed_before_it_joins_a_group():

@@ -13,8 +13,9 @@ from vidtrack.associate.hard import GNN, NN
 from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Scan, Status
-from vidtrack.tracking.groups import Groups
 from vidtrack.tracking.lifecycle import LifeCycle
+from vidtrack.tracking.occlusion.occlusion import Occlusion
+from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.tracker import Tracker
 
 EYE = np.eye(2)
@@ -83,8 +84,8 @@ def test_promises_hold_for_any_sequence_of_scans(seed, rule, boxes):
         ConstantVelocity(accel=20.0, cross=5.0, speed=60.0, hold_s=0.5),
         rule,
         life=LifeCycle(coast_s=1.0, coast_scans=None),
-        groups=Groups() if boxes else None,
-        bounds=SIZE,
+        sharing=Occlusion() if boxes else None,
+        picture=Picture(SIZE),
     )
     before, newest = None, 0
     for scan in wandering_scans(rng, 25, boxes):

@@ -10,7 +10,7 @@ import pytest
 from drawn_tracks import drive
 
 from vidtrack import plane
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import BlobSettings, DetectorSettings, load
 from vidtrack.output.sink import Step
 from vidtrack.pipeline import build_detector, video_steps
@@ -162,7 +162,7 @@ def test_what_is_surveyed_moves_with_the_camera_and_ends_where_whole_pixels_end(
 @pytest.mark.parametrize("size", [(2560, 1440), (1600, 1200), (1366, 768), (2048, 1536), (320, 240), (1920, 1080)])
 def test_a_blob_at_the_edge_of_the_picture_is_cut_by_it_at_every_size(size):
     width, height = size
-    detector, tracker = build_detector(load()), build_tracker(load().tracker, size)
+    detector, tracker = build_detector(load()), build_blob_tracker(load().tracker, size)
     rng = np.random.default_rng(3)
     ground = cv2.resize(rng.uniform(80, 140, (height // 40, width // 40)), size).astype(np.uint8)
     half = np.full((height // 2, width // 2), 128, np.uint8)
@@ -177,7 +177,7 @@ def test_a_blob_at_the_edge_of_the_picture_is_cut_by_it_at_every_size(size):
     tracker.step(scan)
     box = scan.box.copy()
     box[:, :2] += scan.z
-    cut = tracker.border.sides(box)
+    cut = tracker.picture.border.sides(box)
     assert cut[:, 2].any()
     assert cut[:, 3].any()
     assert not cut[:, :2].any()
@@ -210,7 +210,9 @@ def follow(world, motions, cars, lines=()) -> tuple[list[Step], LineCounter]:
     settings = load()
     frames = (world.frame(k, motion, cars(k)) for k, motion in enumerate(motions))
     counter, steps = LineCounter(lines), []
-    for step in video_steps(frames, build_detector(settings), build_tracker(settings.tracker, SHAPE[::-1]), settings):
+    for step in video_steps(
+        frames, build_detector(settings), build_blob_tracker(settings.tracker, SHAPE[::-1]), settings
+    ):
         counter.step(step.index, step.tracks)
         steps.append(step)
     counter.close()
@@ -283,7 +285,7 @@ def test_points_are_chosen_again_where_there_were_too_few():
 
 def test_what_traffic_taught_is_forgotten_when_the_camera_looks_elsewhere():
     world, other, found = World(), World(9), detector()
-    tracker = build_tracker(load().tracker, SHAPE[::-1])
+    tracker = build_blob_tracker(load().tracker, SHAPE[::-1])
     drive(tracker.road.learn, lambda y: (40.0, 20.0), vehicles=6)
     k = settle(found, world)
     assert [found.apply(world.frame(k + j), NONE_KNOWN).elsewhere for j in range(5)] == 5 * [False]

@@ -8,7 +8,7 @@ from drawn_tracks import drive, tracks_of
 
 from vidtrack import plane
 from vidtrack.config import BlobSettings
-from vidtrack.tracking.road import Road
+from vidtrack.tracking.picture.road import Road
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.vehicles.explain import explain
 

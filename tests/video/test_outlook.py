@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidtrack.tracking.road import Road
+from vidtrack.tracking.picture.road import Road
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame
 from vidtrack.video.vehicles.outlook import Outlook

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.objects import ObjectMeter, finer
@@ -109,7 +109,7 @@ class Watch:
             yield frame
 
     def _tracker(self, settings: Settings) -> Tracker:
-        return build_tracker(settings.tracker, self._bounds)
+        return build_blob_tracker(settings.tracker, self._bounds)
 
 
 def _reception(stats: SourceStats, dropped: int = 0) -> Reception:

@@ -11,7 +11,7 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.live.keep import Keep
 from vidtrack.live.memory import Memory, NoStateFile, StateFile
@@ -136,7 +136,7 @@ class LiveRun:
     def _remembered(self, explain: bool) -> Memory:
         """Detector and tracker, as an earlier run left them if there was one."""
         source, settings = self._source, self._settings
-        tracker = build_tracker(settings.tracker, (source.width, source.height), explain=explain)
+        tracker = build_blob_tracker(settings.tracker, (source.width, source.height), explain=explain)
         memory = Memory(build_detector(settings), tracker, source.like)
         if self._state_file.found is not None:
             memory.restore(self._state_file.found)

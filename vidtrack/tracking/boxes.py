@@ -7,26 +7,21 @@ from numpy.typing import ArrayLike
 
 from vidtrack.compiled import kernel
 from vidtrack.errors import ScanError
+from vidtrack.estimate.noise import BOX_JITTER, box_noise
 from vidtrack.scan import Floats, Ints, Mask, Scan
-
-JITTER = 0.05
-"""Standard deviation of a box's centre, in its longer sides, where nobody measured it."""
 
 SAME = 0.65
 """Intersection over union; two boxes of a frame that have more are of one object. Among the 40,000 boxes of MOT15 and
 KITTI 57 pairs of two objects have more than .6 and 16 more than .7; a detector that finds objects under two names gives
 a thousand in a minute."""
 
-LEAST_SIGMA_PX = 0.5
-"""No detector says better where a box's centre is."""
 
-
-def box_scan(t: float, box: ArrayLike, score: ArrayLike | None = None, jitter: float = JITTER) -> Scan:
+def box_scan(t: float, box: ArrayLike, score: ArrayLike | None = None, jitter: float = BOX_JITTER) -> Scan:
     """The boxes that a detector found at time t [s]: their centres are the measurements.
 
     box     (M, 4) left, top, width, height in the picture [px]; an empty list where nothing was found
     score   (M,) confidence
-    jitter  standard deviation of a centre, in longer sides of its box; at least LEAST_SIGMA_PX are assumed
+    jitter  standard deviation of a centre, in longer sides of its box; at least half a pixel is assumed
 
     Corners x1, y1, x2, y2 have the same shape and pass unnoticed: give np.hstack([c[:, :2], c[:, 2:] - c[:, :2]]).
     Raises ScanError for another shape, negative sizes, NaN.
@@ -36,8 +31,7 @@ def box_scan(t: float, box: ArrayLike, score: ArrayLike | None = None, jitter: f
     if boxes.ndim != 2 or boxes.shape[1] != 4:
         raise ScanError(f"boxes must be (M, 4) left, top, width, height, not {boxes.shape}")
     size = boxes[:, 2:]
-    sigma = np.maximum(jitter * longer(boxes), LEAST_SIGMA_PX)
-    R = sigma[:, None, None] ** 2 * np.eye(2)
+    R = box_noise(longer(boxes), jitter)
     scores = None if score is None else np.asarray(score, dtype=float)
     return Scan(t, boxes[:, :2] + size / 2, R, box=np.hstack([-size / 2, size]), score=scores)
 

@@ -8,17 +8,17 @@ from typing import Any
 from vidtrack.associate import methods
 from vidtrack.associate.hard import Associator
 from vidtrack.config import TrackerSettings
-from vidtrack.tracking.forest import Deferred
+from vidtrack.tracking.deferred.forest import ForestRule
+from vidtrack.tracking.deferred.mht import MHT
+from vidtrack.tracking.deferred.splitting import Split
 from vidtrack.tracking.lifecycle import Life, LifeCycle
 from vidtrack.tracking.log_ratio import LogRatio
-from vidtrack.tracking.mht import MHT
-from vidtrack.tracking.splitting import Split
 
-METHODS: dict[str, Callable[[], Associator | Deferred]] = {**methods.METHODS, "split": Split, "mht": MHT}
+METHODS: dict[str, Callable[[], Associator | ForestRule]] = {**methods.METHODS, "split": Split, "mht": MHT}
 """Those that decide in one scan, and those that wait."""
 
 
-def rule(settings: TrackerSettings) -> Associator | Deferred:
+def rule(settings: TrackerSettings) -> Associator | ForestRule:
     """The association method of these settings."""
     if settings.method == "mht":
         return MHT(n_scan=settings.n_scan)

@@ -21,14 +21,14 @@ class Register:
 
     id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest),
     start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
-    group and group_since_s (tracks on one blob), score (log-odds that it is a target), best (highest score since it
-    was confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time
-    seen on a blob of its own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when
-    it last moved on by REST of its size). Where a smoother needs them also
+    merged (number of the tracks on its blob, -1 alone) and merged_since_s, score (log-odds that it is a target), best
+    (highest score since it was confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s
+    (time seen on a blob of its own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and
+    when it last moved on by REST of its size). Where a smoother needs them also
     prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
-    STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "group", "group_since_s",
+    STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
              "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
@@ -44,8 +44,8 @@ class Register:
         self.history = np.empty(0, np.int64)
         self.start = np.empty((0, dim))
         self.box = np.empty((0, 4))
-        self.group = np.empty(0, np.int64)
-        self.group_since_s = np.empty(0)
+        self.merged = np.empty(0, np.int64)
+        self.merged_since_s = np.empty(0)
         self.score = np.empty(0)
         self.best = np.empty(0)
         self.run = np.empty(0, np.int64)
@@ -95,7 +95,7 @@ class Register:
 
     def settle(self) -> None:
         """Set the status of confirmed rows by this scan: confirmed, coasting or merged."""
-        _settle(self.status, self.history, self.group)
+        _settle(self.status, self.history, self.merged)
 
     def append(
         self, t: float, position: Floats, box: Floats, score: float, run: Ints, label: Ints | None = None
@@ -112,7 +112,7 @@ class Register:
             "history": 1,
             "start": position,
             "box": box,
-            "group": -1,
+            "merged": -1,
             "score": score,
             "best": score,
             "run": run,
@@ -165,11 +165,11 @@ def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats)
 
 
 @kernel
-def _settle(status: np.ndarray, history: Ints, group: Ints) -> None:
+def _settle(status: np.ndarray, history: Ints, merged: Ints) -> None:
     for i in range(len(status)):
         if status[i] != TENTATIVE:
             status[i] = CONFIRMED if history[i] & 1 else COASTING
-        if group[i] >= 0:
+        if merged[i] >= 0:
             status[i] = MERGED
 
 

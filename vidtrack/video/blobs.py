@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vidtrack import plane
 from vidtrack.compiled import kernel
 from vidtrack.config import BlobSettings
+from vidtrack.estimate.noise import blob_noise
 from vidtrack.scan import Floats, Ints, Scan
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.regions import Regions, find_regions
@@ -43,15 +44,8 @@ class Blobs:
         return len(self.area)
 
     def scan(self, time_s: float) -> Scan:
-        """The blobs as measurements: z the centroids, boxes relative to them.
-
-        R = (jitter_px step)^2 I + jitter_share^2 cov: the border is uncertain by a part of a processed pixel, and
-        what is missed or added at an end moves the centroid along the extent for many frames. From frame to frame
-        centroids of vehicles jitter by 0.1 to 0.25 px at 240 to 360 rows; the defaults are above that, because
-        shadow and parts that look like the road come and go slowly.
-        """
-        lasting = self.settings.jitter_share**2 * self.cov
-        R = lasting + (self.settings.jitter_px * self.step) ** 2 * np.eye(2)
+        """The blobs as measurements: z the centroids, boxes relative to them."""
+        R, lasting = blob_noise(self.cov, self.step, self.settings.jitter_px, self.settings.jitter_share)
         box = self.box.copy()
         box[:, :2] -= self.centroid
         return Scan(

@@ -11,9 +11,10 @@ import numpy as np
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config import DetectionSettings, Settings
 from vidtrack.errors import ConfigError, SourceError
+from vidtrack.estimate.noise import BOX_JITTER
 from vidtrack.formats import read_mot
 from vidtrack.scan import Floats, Scan
-from vidtrack.tracking.boxes import JITTER, box_scan, doubles
+from vidtrack.tracking.boxes import box_scan, doubles
 from vidtrack.video.habits import Chains, Habits, habits, natural_rate
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.span import Span
@@ -50,7 +51,7 @@ class Detections:
                many frames a second of theirs has, and whatever rate is assumed, their tracks are the same
 
     Doubles, boxes of an object that another box of the frame shows as well, are left out.
-    z is the centre of a box, R the square of its jitter (at least LEAST_SIGMA_PX). The score is the share
+    z is the centre of a box, R as `box_noise` has it. The score is the share
     of the file's detections that do not score higher: scales differ between detectors, only the order
     counts. Where all score the same, or nothing, scans have no scores. Frames without a line are empty scans, up to
     the sequence's length.
@@ -98,7 +99,7 @@ class Detections:
             time_s = index / self.fps
             self.stats.frames_read += 1
             score = self._score[rows] if self._ranked else None
-            yield index, time_s, box_scan(time_s, self._box[rows], score, self.settings.jitter or JITTER)
+            yield index, time_s, box_scan(time_s, self._box[rows], score, self.settings.jitter or BOX_JITTER)
 
     def close(self) -> None:
         """Nothing stays open: the file was read as a whole."""

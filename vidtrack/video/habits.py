@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.compiled import kernel
+from vidtrack.estimate.noise import file_noise
 from vidtrack.scan import Floats, Ints, Mask
 
 REACH, ALIKE = 0.5, 1.35
@@ -133,12 +134,8 @@ def _motion(
 ) -> tuple[float | None, float | None]:
     """Jitter and acceleration from the second differences of centres (N, 2) along chains of boxes.
 
-    follower (N,) is the same object's box in the next frame, -1 for none. The variance of
-    (c(t) - 2 c(t + lag) + c(t + 2 lag)) / size is 6 jitter^2 + 2/3 accel^2 hold_s lag^3 on each axis, if boxes err
-    independently and the acceleration is white; lags of 1, 2, 4, ... frames tell the two apart.
+    follower (N,) is the same object's box in the next frame, -1 for none. Lags are 1, 2, 4, ... frames.
     """
-    from scipy.optimize import nnls
-
     lags, variances = [], []
     frames = 1
     while frames <= max(2.0, LONGEST_S * fps):
@@ -152,10 +149,7 @@ def _motion(
         follower, frames = end, 2 * frames
     if len(lags) < 2:
         return None, None
-    lag, variance = np.array(lags), np.array(variances)
-    terms = np.column_stack([np.full(len(lag), 6.0), 2 / 3 * hold_s * lag**3])
-    parts, _ = nnls(terms / variance[:, None], np.ones(len(lag)))
-    jitter, accel = MARGIN * np.sqrt(parts)
+    jitter, accel = MARGIN * np.array(file_noise(np.array(lags), np.array(variances), hold_s))
     return float(jitter), max(float(accel), LEAST_ACCEL)
 
 

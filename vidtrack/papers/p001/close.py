@@ -12,7 +12,7 @@ from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
 from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
-from vidtrack.tracking.forest import Deferred
+from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import METHODS
 from vidtrack.tracking.tracker import Tracker
 
@@ -54,7 +54,7 @@ class Pair:
         truth = np.stack(path)
         return cls(truth, truth + SIGMA * rng.normal(size=truth.shape), rng.random(truth.shape[:3]) < DETECTION)
 
-    def tracked(self, rule: Associator | Deferred) -> list[Tracks]:
+    def tracked(self, rule: Associator | ForestRule) -> list[Tracks]:
         """All runs as one bank."""
         runs = np.repeat(np.arange(self.truth.shape[1]), 2).reshape(-1, 2)
         tracker = Tracker(

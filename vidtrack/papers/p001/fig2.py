@@ -14,8 +14,9 @@ from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
 from vidtrack.scan import Scan
 from vidtrack.tracking.choices import heaviest
-from vidtrack.tracking.mht import MHT, HypothesisForest
-from vidtrack.tracking.splitting import Split
+from vidtrack.tracking.deferred.deferred import Deferred
+from vidtrack.tracking.deferred.mht import MHT, HypothesisForest
+from vidtrack.tracking.deferred.splitting import Split
 from vidtrack.tracking.tracker import Tracker
 
 if TYPE_CHECKING:
@@ -79,8 +80,9 @@ def counted(scan: Scan) -> tuple[int, int]:
         tracker.step(scan)
         made.append(tracker)
     branching, multiple = made
-    assert isinstance(multiple.forest, HypothesisForest)
-    in_clusters = np.diff(multiple.forest.hypotheses.first)
+    assert isinstance(multiple.timing, Deferred)
+    assert isinstance(multiple.timing.forest, HypothesisForest)
+    in_clusters = np.diff(multiple.timing.forest.hypotheses.first)
     return int((branching.register.id <= 2).sum()), int(in_clusters.prod())
 
 

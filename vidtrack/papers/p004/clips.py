@@ -10,7 +10,7 @@ import av
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import DetectorSettings, Settings, TrackerSettings
 from vidtrack.papers import style
 from vidtrack.pipeline import build_detector, video_steps
@@ -72,13 +72,13 @@ def frames(clip: Clip) -> Iterator[Frame]:
 def by_default(clip: Clip) -> list[Tracks]:
     """Tracks of each frame by the whole pipeline with its default settings, where the tracker helps the detector."""
     settings = Settings()
-    tracker = build_tracker(settings.tracker, clip.size)
+    tracker = build_blob_tracker(settings.tracker, clip.size)
     return [step.tracks for step in video_steps(frames(clip), build_detector(settings), tracker, settings)]
 
 
 def follow(watched: Watched, settings: TrackerSettings, scans: list[Scan] | None = None) -> list[Tracks]:
     """Tracks of each frame; scans stand in for those of the clip."""
-    tracker = build_tracker(settings, watched.clip.size)
+    tracker = build_blob_tracker(settings, watched.clip.size)
     return [tracker.step(scan) for scan in (watched.scans if scans is None else scans)]
 
 

@@ -11,7 +11,7 @@ from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import Associator
 from vidtrack.estimate.motion import ConstantVelocity
 from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
-from vidtrack.tracking.forest import Deferred
+from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
 
@@ -56,7 +56,7 @@ def drive(
     return np.stack(path)
 
 
-def track(targets: Targets, model: ConstantVelocity, associate: Associator | Deferred, gate: Gate) -> Floats:
+def track(targets: Targets, model: ConstantVelocity, associate: Associator | ForestRule, gate: Gate) -> Floats:
     """Positions (K - 1, N, 2) of the tracks of all targets from frame 1 on, started there by two points.
 
     Row n starts on target n; nothing is born or deleted, so that every run ends with a track for each target.

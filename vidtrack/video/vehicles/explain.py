@@ -8,8 +8,8 @@ import numpy as np
 from vidtrack import plane
 from vidtrack.config import BlobSettings
 from vidtrack.scan import TENTATIVE, Floats, Ints, Tracks
-from vidtrack.tracking.road import Road
-from vidtrack.tracking.sizes import SizeField
+from vidtrack.tracking.picture.road import Road
+from vidtrack.tracking.picture.sizes import SizeField
 from vidtrack.video.blobs import Blobs, measured
 from vidtrack.video.foreground import Foreground, enlargement
 from vidtrack.video.frame import Image

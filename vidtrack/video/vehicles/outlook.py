@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.tracking.road import Road
+from vidtrack.tracking.picture.road import Road
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame
 

@@ -12,7 +12,7 @@ from vidtrack.associate.gate import Gate
 from vidtrack.associate.redundancy import linked
 from vidtrack.errors import ConfigError
 from vidtrack.scan import TENTATIVE, Event, Ints, Scan, Tracks
-from vidtrack.tracking.members import Members, rows_of
+from vidtrack.tracking.formation.members import Members, rows_of
 from vidtrack.tracking.tracker import Tracker
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vidtrack.tracking.border import Border
+from vidtrack.tracking.picture.border import Border
 
 PICTURE = Border(100, 80)
 BOXES = np.array([[1.0, 20.0, 10.0, 10.0], [50.0, 1.0, 10.0, 10.0], [95.0, 75.0, 10.0, 10.0], [50.0, 40.0, 10.0, 10.0]])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.scan import Floats, Tracks
-from vidtrack.tracking.restless import RestlessMap
-from vidtrack.tracking.sizes import SizeField
+from vidtrack.tracking.picture.restless import RestlessMap
+from vidtrack.tracking.picture.sizes import SizeField
 
 _CAUTION = 3.0  # times as far must a track travel to be confirmed where the picture is restless
 _FASTEST = 1.2  # times as large can a vehicle become from one scan to the next

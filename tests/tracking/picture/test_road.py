@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from vidtrack.scan import TENTATIVE
 from vidtrack.state import gather, restore
-from vidtrack.tracking.restless import RestlessMap
-from vidtrack.tracking.road import Road
-from vidtrack.tracking.sizes import SizeField
+from vidtrack.tracking.picture.restless import RestlessMap
+from vidtrack.tracking.picture.road import Road
+from vidtrack.tracking.picture.sizes import SizeField
 
 WIDTH, HEIGHT = 320, 240
 

@@ -7,7 +7,7 @@ import numpy as np
 from vidtrack.associate.kbest import k_best
 from vidtrack.compiled import kernel
 from vidtrack.scan import Floats, Ints, Mask
-from vidtrack.tracking.hypotheses import Hypotheses, log_sum
+from vidtrack.tracking.deferred.hypotheses import Hypotheses, log_sum
 
 NEVER = -1e6
 """ln of the likelihood of what cannot be seen. The fewest such factors win."""

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from vidtrack.box_pipeline import build_tracker
+from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import TrackerSettings
 from vidtrack.scan import Scan
 
@@ -12,7 +12,7 @@ SIZE = (320.0, 240.0)
 
 def default_tracker(bounds=SIZE, **settings):
     """The tracker that `vidtrack track` uses."""
-    return build_tracker(TrackerSettings(**settings), bounds)
+    return build_blob_tracker(TrackerSettings(**settings), bounds)
 
 
 def centred(x, y, width, height):

@@ -7,8 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Status
-from vidtrack.tracking.groups import Groups
+from vidtrack.scan import Decision, Status
+from vidtrack.tracking.boxes import overlapping
+from vidtrack.tracking.occlusion.edges import from_edges
+from vidtrack.tracking.occlusion.occlusion import Occlusion
+from vidtrack.tracking.picture.border import Border
+from vidtrack.tracking.picture.picture import View
 
 SPEED = 60.0
 
@@ -130,7 +134,8 @@ def test_one_shared_blob_is_two_deaths_and_a_birth_without_groups():
 def measure(predicted, relative, var, on, blobs):
     """Positions by the edges of blobs that no border cuts and that hide nobody."""
     whole, nobody = np.zeros((len(blobs), 4), bool), np.zeros(len(blobs), bool)
-    return Groups().measure(predicted, relative, var, on, blobs, whole, nobody)
+    rule = Occlusion()
+    return from_edges(predicted, relative, var, on, blobs, whole, nobody, rule.gate, rule.edge, 1.0)
 
 
 numbers = st.floats(-1e4, 1e4)
@@ -166,10 +171,39 @@ def test_a_lone_members_edges_are_those_of_its_blob():
     assert (R < 20**2).all()
 
 
+def catch(tracks, blobs, idle, free):
+    """The blob that each track (T,) continues on, and which of the free blobs (M,) still are."""
+    view = View(blobs, blobs, tracks, np.full(len(tracks), 9), Border(), 0.3)
+    busy = np.flatnonzero(~idle)
+    elsewhere = np.full(len(busy), len(blobs))
+    got = Decision(np.arange(len(tracks)), busy, elsewhere, np.ones(len(busy)), idle.astype(float))
+    shared, still = Occlusion().catch(view, got, np.full(len(tracks), -1), free.copy())
+    return shared.tolist(), still.tolist()
+
+
+def test_catch_gives_each_idle_track_the_free_blob_that_it_overlaps_most():
+    tracks = np.array([[0.0, 0, 40, 20], [100.0, 0, 40, 20], [200.0, 0, 40, 20]])
+    blobs = np.array([[10.0, 0, 40, 20], [2.0, 0, 40, 20], [130.0, 0, 40, 20], [200.0, 0, 14, 20]])
+    everyone, all_free, one_less = np.ones(3, bool), np.ones(4, bool), np.array([True, False, True, True])
+    assert catch(tracks, blobs, everyone, all_free) == ([1, -1, 3], [True, False, True, False])
+    assert catch(tracks, blobs, everyone, one_less) == (
+        [0, -1, 3],
+        [False, False, True, False],
+    )
+    assert catch(tracks, blobs, np.array([False, True, True]), all_free) == ([-1, -1, 3], [True, True, True, False])
+    assert catch(tracks, np.empty((0, 4)), everyone, np.empty(0, bool)) == ([-1] * 3, [])
+
+
+def test_of_two_tracks_on_one_blob_the_one_that_overlaps_it_more_has_it():
+    tracks = np.array([[0.0, 0, 40, 20], [6.0, 0, 40, 20], [np.nan, 0, 40, 20]])
+    blob = np.array([[8.0, 0, 40, 20]])
+    assert overlapping(tracks, blob, np.ones(3, bool), np.ones(1, bool), 0.3).tolist() == [-1, 0, -1]
+
+
 @pytest.mark.parametrize("cover", [0.0, -1.0, 1.1])
 def test_a_cover_that_makes_no_sense_is_refused(cover):
     with pytest.raises(ConfigError, match=str(cover)):
-        Groups(cover=cover)
+        Occlusion(cover=cover)
 
 
 def in_two_pieces(apart_s):

@@ -21,7 +21,7 @@ def standing(rule, positions, gate):
 
 def branches(tracker):
     """{(track, measurement or None)} of all rows."""
-    newest = tracker.forest.window.past[:, 0]
+    newest = tracker.timing.forest.window.past[:, 0]
     rows = zip(tracker.register.id.tolist(), newest.tolist(), strict=True)
     return {(track, j if j >= 0 else None) for track, j in rows}
 
@@ -82,7 +82,7 @@ def test_the_number_of_branches_is_bounded():
     for k in range(20):
         tracker.step(vt.Scan(float(k), rng.uniform(0, 30, (30, 2)), np.eye(2)))
         assert np.unique(tracker.register.id, return_counts=True)[1].max() <= 6
-        assert len(tracker.bank) == len(tracker.register) == len(tracker.forest.window)
+        assert len(tracker.bank) == len(tracker.register) == len(tracker.timing.forest.window)
 
 
 @pytest.mark.parametrize("wrong", [{"n_scan": 0}, {"leaves": 0}, {"branches": 0}, {"probability": 1.0}])

@@ -10,9 +10,9 @@ from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
 from vidtrack.scan import TENTATIVE, Event, Floats, Ints, Mask
-from vidtrack.tracking.forest import Growth, Window, one_each
-from vidtrack.tracking.generation import NEVER, agreeing, children, likeliest
-from vidtrack.tracking.hypotheses import Hypotheses, surviving
+from vidtrack.tracking.deferred.forest import Growth, Window, one_each
+from vidtrack.tracking.deferred.generation import NEVER, agreeing, children, likeliest
+from vidtrack.tracking.deferred.hypotheses import Hypotheses, surviving
 from vidtrack.tracking.register import Register
 
 SURE = 0.9
@@ -32,7 +32,7 @@ class MHT:
 
     A track is confirmed when its life cycle says so and hardly a hypothesis doubts it. What is shown is the likeliest
     hypothesis of the moment, so a later scan may contradict a row already written. Blobs that several vehicles share
-    (Groups) are not recognised.
+    (Occlusion) are not recognised.
     """
 
     n_scan: int = 3

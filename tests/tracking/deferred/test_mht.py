@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 import vidtrack as vt
 from vidtrack.associate.trust import Trust
 from vidtrack.state import gather, restore
-from vidtrack.tracking.generation import likeliest
-from vidtrack.tracking.hypotheses import Hypotheses, kept
+from vidtrack.tracking.deferred.generation import likeliest
+from vidtrack.tracking.deferred.hypotheses import Hypotheses, kept
 from vidtrack.tracking.methods import rule
 
 UNPRUNED = {"n_scan": 20, "hypotheses": 100_000, "threshold": 0.0, "mass": 1.0, "branches": 1000}
@@ -37,7 +37,7 @@ def scan(t, *z):
 
 def probabilities(tracker):
     """Of all hypotheses over all clusters, falling."""
-    found = tracker.forest.hypotheses
+    found = tracker.timing.forest.hypotheses
     clusters = [np.exp(found.log_p[a:b]) for a, b in zip(found.first[:-1], found.first[1:], strict=True)]
     return np.sort([np.prod(p) for p in product(*clusters)])[::-1]
 
@@ -196,7 +196,7 @@ def test_a_later_scan_corrects_an_earlier_choice():
         last = tracker.step(scan(t, z))
     track = last.id.tolist().index(1)
     assert last.x[track] == pytest.approx([8.2, 1.8], abs=0.6)
-    path = tracker.forest.window.past[tracker.forest.shown[0]]
+    path = tracker.timing.forest.window.past[tracker.timing.forest.shown[0]]
     assert path.tolist() == [4, 3, 2, 1], "of the first scan it now has the second measurement"
 
 
@@ -210,7 +210,7 @@ def test_limits_of_the_probabilities(detection, clutter, gate):
     tracker.add(0.0, np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)))
     for t, z in ((0.0, ()), (1.0, (0.0, 1.0, 50.0)), (2.0, (0.5,)), (3.0, ())):
         tracks = tracker.step(scan(t, *z))
-        found = tracker.forest.hypotheses
+        found = tracker.timing.forest.hypotheses
         assert np.isfinite(found.log_p).all()
         np.testing.assert_allclose(probabilities(tracker).sum(), 1.0)
         assert np.isfinite(tracks.x).all()
@@ -223,7 +223,7 @@ def test_what_was_seen_long_ago_costs_nothing():
     for k in range(12):
         one = vt.Scan(float(k), rng.uniform(0, 40, (10, 2)), np.eye(2))
         if k == 6:
-            window = old.forest.window
+            window = old.timing.forest.window
             window.past[window.past >= 0] += 10**12
             window.seen += 10**12
         np.testing.assert_array_equal(young.step(one).x, old.step(one).x)
@@ -248,7 +248,7 @@ def test_a_tentative_track_keeps_its_name_while_it_is_doubted():
     for k in range(8):
         tracks = tracker.step(scan(float(k), 2.0 * k))
         ids.append(tracks.id.tolist())
-        doubts += len(tracker.forest.hypotheses.best) == 0
+        doubts += len(tracker.timing.forest.hypotheses.best) == 0
     assert doubts >= 2
     assert all(1 in known for known in ids)
     assert tracks.status[tracks.id == 1] == [vt.Status.CONFIRMED]
@@ -292,9 +292,9 @@ def test_the_set_of_hypotheses_stays_bounded():
     rows = []
     for k in range(30):
         tracker.step(vt.Scan(float(k), rng.uniform(0, 60, (40, 2)), np.eye(2)))
-        found = tracker.forest.hypotheses
+        found = tracker.timing.forest.hypotheses
         assert np.diff(found.first).max() <= 30
-        assert len(tracker.bank) == len(tracker.register) == len(tracker.forest.window)
+        assert len(tracker.bank) == len(tracker.register) == len(tracker.timing.forest.window)
         np.testing.assert_array_equal(np.unique(found.leaf), np.arange(len(tracker.bank)))
         rows.append(len(tracker.bank))
     assert max(rows[15:]) < 2 * max(rows[:15]) + 100
@@ -309,7 +309,7 @@ def test_hypotheses_are_exclusive_and_runs_never_meet(seed):
     for k in range(12):
         z, run = rng.uniform(0, 40, (12, 2)), np.sort(rng.integers(0, 3, 12))
         tracks = tracker.step(vt.Scan(float(k), z, np.eye(2), run=run))
-        found, newest = tracker.forest.hypotheses, tracker.forest.window.past[:, 0]
+        found, newest = tracker.timing.forest.hypotheses, tracker.timing.forest.window.past[:, 0]
         for h in range(len(found.log_p)):
             leaves = found.leaf[found.start[h] : found.start[h + 1]]
             used = newest[leaves][newest[leaves] >= 0]

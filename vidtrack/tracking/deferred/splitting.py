@@ -10,8 +10,8 @@ from scipy.special import chdtri
 from vidtrack.associate.problem import Problem
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Event, Floats, Ints, Mask
-from vidtrack.tracking.forest import Growth, Window, one_each
-from vidtrack.tracking.generation import NEVER, likeliest
+from vidtrack.tracking.deferred.forest import Growth, Window, one_each
+from vidtrack.tracking.deferred.generation import NEVER, likeliest
 from vidtrack.tracking.register import Register
 
 

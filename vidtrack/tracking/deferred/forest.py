@@ -55,7 +55,7 @@ class Forest(Protocol):
 
 
 @runtime_checkable
-class Deferred(Protocol):
+class ForestRule(Protocol):
     """An association rule that decides some scans later: MHT, Split."""
 
     def forest(self) -> Forest:

@@ -1,0 +1,1 @@
+"""Decisions that wait for later scans: track splitting and multiple hypotheses."""

@@ -1,0 +1,76 @@
+"""Decisions some scans later: a row is one of the possible histories of a track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vidtrack.associate.problem import Problem
+from vidtrack.associate.trust import Trust
+from vidtrack.scan import CONFIRMED, Event, Ints, Mask, Tracks
+from vidtrack.tracking.association import Association
+from vidtrack.tracking.births import distinct
+from vidtrack.tracking.deferred.forest import Forest
+from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.register import Register
+
+UNSURE = 0.01
+"""Factor on the likelihood of a detection with a low score: more of these are false."""
+
+
+@dataclass(frozen=True, slots=True)
+class Deferred:
+    """Scans wait for what comes after them. No measurement is shared.
+
+    forest  the histories of all tracks
+    trust   which scores may start a track
+    births  whether measurements start tracks
+    """
+
+    forest: Forest
+    trust: Trust
+    births: bool
+
+    STATE = ("forest",)
+
+    def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
+        """Grow the forest; the register's rows become their successors."""
+        pairs, sure = problem.pairs, self.trust.sure(problem.scan)
+        log_l = pairs.log_l + np.where(sure, 0.0, np.log(UNSURE))[pairs.measurement]
+        problem = replace(problem, pairs=replace(pairs, log_l=log_l))
+        starts = distinct(problem.scan, sure & self.births)
+        return Association.exclusive(*self.forest.grow(problem, register, starts, events))
+
+    def shown(self, rows: int) -> Mask:
+        """(rows,) one row of each track that is believed at present."""
+        shown = np.zeros(rows, bool)
+        shown[self.forest.shown[self.forest.shown < rows]] = True
+        return shown
+
+    def visible(self, tracks: Tracks) -> Tracks:
+        """Those that are shown, in the order of their ids."""
+        shown = self.forest.shown
+        return tracks.only(shown[np.argsort(tracks.id[shown])])
+
+    def settle(self, register: Register, t: float, events: list[Event]) -> None:
+        """Choose the rows that are shown."""
+        self.forest.settle(register, t, events)
+
+    def confirm(self, ready: Mask, register: Register) -> Mask:
+        """Confirm all rows of the tracks whose shown row is ready (T,), if hardly a history is without them."""
+        ready = ready & self.forest.sure & self.shown(len(ready))
+        register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
+        return ready
+
+    def ended(self, ids: Ints, going: Mask, why: Mask) -> Ints:
+        """Ids of the tracks of which no row stays."""
+        return np.setdiff1d(ids[why], ids[~going])
+
+    def keep(self, kept: Mask) -> None:
+        """Drop all rows but these."""
+        self.forest.keep(kept)
+
+    def add(self, count: int) -> None:
+        """Append tracks of one history each."""
+        self.forest.add(count)

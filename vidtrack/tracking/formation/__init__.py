@@ -1,0 +1,1 @@
+"""Targets too close together to be followed one by one."""

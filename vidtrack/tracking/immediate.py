@@ -1,0 +1,95 @@
+"""Decisions in the scan itself: a row is a track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.associate.hard import GNN, HARD, Associator
+from vidtrack.associate.problem import Problem
+from vidtrack.associate.trust import Trust
+from vidtrack.scan import CONFIRMED, TENTATIVE, Decision, Event, Ints, Mask, Tracks
+from vidtrack.tracking.association import Association
+from vidtrack.tracking.births import distinct
+from vidtrack.tracking.choices import heaviest
+from vidtrack.tracking.occlusion.sharing import Sharing
+from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.register import Register
+
+CLAIMED = 0.1
+"""A measurement whose weights over all tracks sum to more than this starts no track."""
+
+
+@dataclass(frozen=True, slots=True)
+class Immediate:
+    """Each scan is decided at once and for good.
+
+    rule     association rule
+    sharing  what happens when targets share a measurement
+    trust    which scores may start a track
+    births   whether measurements that belong to no track start one
+    """
+
+    rule: Associator
+    sharing: Sharing
+    trust: Trust
+    births: bool
+
+    STATE = ()
+
+    def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
+        """Confirmed tracks first, then the measurements that they share, then tentative tracks."""
+        pairs, count = problem.pairs, problem.measurements
+        confirmed = register.status != TENTATIVE
+        sure = self.trust.sure(problem.scan)
+        decision = self.trust.decide(self.rule, problem, confirmed, sure)
+        shared, hides = self.sharing.claim(view, decision, confirmed, count)
+        decision = decision.without(shared >= 0)
+        free = hides & ~_claimed(decision, count)
+        open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
+        if np.count_nonzero(open_to_all):
+            second = self.trust.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
+            free &= ~_claimed(second, count)
+            decision = decision.joined(second)
+        shared, free = self.sharing.catch(view, decision, shared, free)
+        free &= sure & self.births
+        if not self.rule.gated_births:
+            free[pairs.measurement] = False
+        return Association(problem, decision, heaviest(decision), shared, hides, distinct(problem.scan, free))
+
+    @property
+    def _starter(self) -> Associator:
+        """The rule for tentative tracks: whole measurements, as weights of clutter would keep them alive for ever."""
+        return self.rule if isinstance(self.rule, HARD) else GNN()
+
+    def shown(self, rows: int) -> Mask:
+        """(rows,) all."""
+        return np.ones(rows, bool)
+
+    def visible(self, tracks: Tracks) -> Tracks:
+        """All."""
+        return tracks
+
+    def settle(self, register: Register, t: float, events: list[Event]) -> None:
+        """Every row is shown."""
+
+    def confirm(self, ready: Mask, register: Register) -> Mask:
+        """Confirm all that are ready."""
+        register.status[ready] = CONFIRMED
+        return ready
+
+    def ended(self, ids: Ints, going: Mask, why: Mask) -> Ints:
+        """Ids of the rows that go because of `why`."""
+        return ids[why]
+
+    def keep(self, kept: Mask) -> None:
+        """Nothing is remembered of a row."""
+
+    def add(self, count: int) -> None:
+        """Nothing is remembered of a row."""
+
+
+def _claimed(decision: Decision, measurements: int) -> Mask:
+    """(M,) measurements that tracks claim."""
+    return np.bincount(decision.measurement, decision.beta, measurements) > CLAIMED

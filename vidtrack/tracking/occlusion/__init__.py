@@ -1,0 +1,1 @@
+"""Several targets on one measurement: what their tracks take from it."""

@@ -1,0 +1,66 @@
+"""Which tracks share a blob, and which blobs hide somebody: by predicted boxes and by what each track was assigned."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.compiled import kernel
+from vidtrack.estimate.noise import edge_sigma
+from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.tracking.boxes import best_cover
+
+ONE_SIDED = 4.0
+"""Standard deviations an edge is off, while the opposite one is within one, when part of a vehicle is hidden."""
+
+
+@kernel(error_model="numpy")
+def claims(
+    predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats,
+    cover: float, growth: float, edge: float, pixel: float,
+) -> tuple[Ints, Mask]:  # fmt: skip
+    """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.
+
+    predicted (T, 4) boxes, taken (T,) measurement of each track or -1, confirmed (T,), whole (T,) tracks whose box is
+    reliable and inside the picture, blobs (M, 4) boxes, whose edges are uncertain by a pixel.
+    """
+    shared = _blob_of(predicted, taken, confirmed, blobs, cover)
+    explained = np.zeros(len(blobs))
+    for t in range(len(shared)):
+        own = shared[t] < 0 and taken[t] >= 0
+        if own and confirmed[t] and whole[t] and _changed(predicted[t], blobs[taken[t]], growth, edge, pixel):
+            shared[t] = taken[t]
+        if shared[t] >= 0:
+            explained[shared[t]] += predicted[t, 2] * predicted[t, 3]
+    return shared, ~(explained >= 0.5 * blobs[:, 2] * blobs[:, 3])
+
+
+@kernel
+def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, cover: float) -> Ints:
+    """(T,) the blob each track shares with others, or lies on without being assigned it; -1 for all others."""
+    shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
+    orphans = np.flatnonzero(confirmed & (taken < 0))
+    blob, share = best_cover(predicted[orphans], blobs)
+    for k in range(len(orphans)):
+        if share[k] >= cover:
+            shared[orphans[k]] = blob[k]
+            claims[blob[k]] += 1
+    hosts = np.flatnonzero(confirmed & (taken >= 0))
+    for t in hosts:
+        claims[taken[t]] += 1
+    for t in hosts:  # a nearest neighbour may be everybody's
+        if claims[taken[t]] > 1:
+            shared[t] = taken[t]
+    return shared
+
+
+@kernel(error_model="numpy")
+def _changed(box: Floats, blob: Floats, growth: float, edge: float, pixel: float) -> bool:
+    """Whether a blob (4,) has another size than the vehicle's box (4,), or one edge where it was and the other not."""
+    ratio = blob[2] * blob[3] / (box[2] * box[3])
+    changed = ratio > growth or ratio < 1 / growth
+    for axis in range(2):
+        sigma = edge_sigma(box[2 + axis], edge, pixel)
+        near = abs(blob[axis] - box[axis]) / sigma
+        far = abs(blob[axis] + blob[2 + axis] - box[axis] - box[2 + axis]) / sigma
+        changed |= min(near, far) < 1 and max(near, far) > ONE_SIDED
+    return changed

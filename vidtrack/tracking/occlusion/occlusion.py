@@ -1,0 +1,170 @@
+"""The occlusion model: tracks whose vehicles merge into one blob stay tracks, and are updated by its edges.
+
+A confirmed track that got no measurement of its own, but whose predicted box lies on a blob, lives on that
+blob together with whoever else is on it. So does a track whose blob has suddenly become much larger or
+smaller than the vehicle. The blob's centroid belongs to none of them; its edges do: the left edge is that of
+the leftmost track, and so on. Each track is updated by the edges it can claim and otherwise follows its own
+motion, so that it still knows who it is when the blob splits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vidtrack.errors import ConfigError
+from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.noise import as_if_new, middle_variance
+from vidtrack.estimate.sensor import POSITION
+from vidtrack.scan import Decision, Event, Floats, Ints, Mask, Scan
+from vidtrack.tracking.association import Association
+from vidtrack.tracking.births import pieces
+from vidtrack.tracking.boxes import absolute, overlapping
+from vidtrack.tracking.choices import heaviest
+from vidtrack.tracking.occlusion.claims import claims
+from vidtrack.tracking.occlusion.edges import from_edges
+from vidtrack.tracking.occlusion.sharing import Exclusive
+from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.register import Register
+
+SETTLED = 5
+"""Updates after which a track's box is reliable."""
+SLOW = 5.0
+"""A box follows a blob of another size this many times more slowly than its own."""
+ALONE = Exclusive()
+"""What holds of measurements without an extent."""
+
+
+@dataclass(slots=True)
+class Occlusion:
+    """How tracks share blobs. It numbers what is merged: each tracker needs its own.
+
+    cover  share of a track's predicted box that a blob must cover to carry it
+    edge   standard deviation of a blob's edge, as a share of the track's box side
+    gate   standard deviations within which an edge is accepted as the track's; half of it where the blob
+           hides somebody whose edge it may be
+    growth a blob whose area is more than this many times the predicted box, or less than the inverse,
+           is not the vehicle alone or not all of it
+    known_s, part_s   a track seen alone for less than known_s that stays merged for part_s was never a vehicle
+           but a part of one
+    overlap least intersection over union of a track with a blob that it continues on, whatever its shape
+
+    Raises ConfigError for a cover out of range.
+    """
+
+    cover: float = 0.5
+    edge: float = 0.1
+    gate: float = 2.0
+    growth: float = 2.5
+    known_s: float = 0.4
+    part_s: float = 1.0
+    overlap: float = 0.3
+    _made: int = field(default=0, init=False)
+
+    STATE = ("_made",)
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cover <= 1:
+            raise ConfigError(f"occlusion cover is {self.cover}; it must lie in 0..1")
+
+    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+        """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.
+
+        The edges count where a track shares its blob with others, lies on a blob that it was not assigned, or where
+        its blob no longer fits the vehicle.
+        """
+        if view is None:
+            return ALONE.claim(view, decision, confirmed, count)
+        reliable = (view.hits > SETTLED) & ~view.border.cut(view.predicted)
+        return claims(
+            view.predicted, heaviest(decision), confirmed, reliable, view.blobs,
+            self.cover, self.growth, self.edge, view.border.pixel,
+        )  # fmt: skip
+
+    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+        """`shared` (T,) and `free` (M,) after tracks that got nothing took the free blob that each overlaps most.
+
+        The blob's shape has changed so much that its centroid left the gate; it is still where the vehicle is.
+        """
+        if view is None:
+            return shared, free
+        idle = (heaviest(decision) < 0) & (shared < 0)
+        untaken = free & (np.bincount(shared[shared >= 0], minlength=len(free)) == 0)
+        caught = overlapping(view.predicted, view.blobs, idle, untaken, self.overlap)
+        free[caught[caught >= 0]] = False
+        return np.where(caught >= 0, caught, shared), free
+
+    def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
+        """Update the tracks on shared blobs by the edges they can claim, dt seconds after the last scan."""
+        shared, hides, t = found.shared, found.hides, found.problem.scan.t
+        leans = shared >= 0
+        rows = leans.nonzero()[0]
+        if view is None or not len(rows):
+            return
+        blobs, border = view.blobs, view.border
+        position, velocity = bank.model.position, bank.model.velocity
+        x, box, on = bank.x[rows], register.box[rows], shared[rows]
+        predicted = absolute(box, x.take(position, axis=1))
+        before = absolute(predicted, -dt * x.take(velocity, axis=1))
+        var = bank.P.diagonal(axis1=1, axis2=2)[rows].take(position, axis=1)
+        cut = border.sides(blobs)
+        z, R, own = from_edges(predicted, box, var, on, blobs, cut, hides, self.gate, self.edge, border.pixel)
+
+        lost = (own == 0) & (np.bincount(on, minlength=len(blobs))[on] == 1)  # measured by the middle of its blob
+        blob = blobs[on[lost]]
+        z[lost] = blob[:, :2] + blob[:, 2:] / 2 - box[lost, :2] - box[lost, 2:] / 2
+        R[lost] = middle_variance(blob[:, 2:], predicted[lost, 2:])
+        own[lost] = 1
+
+        beta0 = (~leans).astype(float)
+        edges = Decision(np.arange(len(shared)), rows, np.arange(len(rows)), np.ones(len(rows)), beta0)
+        bank.update(edges, Scan(t, z, as_if_new(R, dt)[:, :, None] * np.eye(2)), POSITION)
+        told = rows[own > 0]
+        register.history[told] |= 1
+        register.updated_s[told] = t
+
+        # A vehicle that the border cut, and whose blob it still cuts, reaches to the border: the rest comes in.
+        xy = bank.x[rows].take(position, axis=1)
+        box = absolute(border.reaching(absolute(box, xy), border.sides(before) & cut[on]), -xy)
+        alone = (np.bincount(on)[on] == 1) & ~hides[on]  # if its blob stays as it is, the vehicle is so
+        box[alone] += -np.expm1(-dt / (SLOW * view.box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
+        register.box[rows] = box
+
+    def parts(self, register: Register, t: float) -> Mask:
+        """(T,) merged tracks that were hardly ever seen alone and do not split off: parts of another one's vehicle."""
+        strange = (register.merged >= 0) & (register.alone_s < self.known_s)
+        if not np.count_nonzero(strange):
+            return strange
+        for number in np.unique(register.merged[strange]):
+            together = np.flatnonzero(register.merged == number)
+            strange[together[register.alone_s[together].argmax()]] = False
+        return strange & (t - register.merged_since_s > self.part_s)
+
+    def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
+        """Merged tracks keep their common number and its start for as long as any of them stay together."""
+        on = shared[shared >= 0]
+        if not (len(on) or np.count_nonzero(register.merged >= 0)):
+            return
+        merged = np.full(len(shared), -1)
+        for blob in (np.bincount(on) > 1).nonzero()[0]:
+            on_it = (shared == blob).nonzero()[0]
+            number = register.merged[on_it].max()
+            if number < 0 or np.count_nonzero(merged == number):
+                number = self._made
+                self._made += 1
+            merged[on_it] = number
+            joined = on_it[register.merged[on_it] != number]
+            if not len(joined):
+                continue
+            register.merged_since_s[joined] = t
+            reason = f"tracks {', '.join(str(i) for i in register.id[on_it])} share one blob"
+            events.extend(Event.each(t, register.id[joined], "merge", reason))
+        alone = ((merged < 0) & (register.merged >= 0)).nonzero()[0]
+        register.merged_since_s[alone] = np.nan
+        events.extend(Event.each(t, register.id[alone], "split", "alone on its blob again"))
+        register.merged = merged
+
+    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
+        """Those of the blobs born (B,) that are no pieces of known vehicles, boxes (V, 4)."""
+        return born if view is None else born[~pieces(view.blobs[born], known)]

@@ -1,0 +1,71 @@
+"""What happens when targets share a measurement: the interface, and nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from vidtrack.estimate.bank import Estimator
+from vidtrack.scan import Decision, Event, Floats, Ints, Mask
+from vidtrack.tracking.association import Association
+from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.register import Register
+
+
+class Sharing(Protocol):
+    """Which tracks share a measurement, and what updates them: `Exclusive`, nobody and nothing, or `Occlusion`.
+
+    A view is what the picture shows in a scan; None where measurements have no extent.
+    """
+
+    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+        """(T,) the measurement whose edges update each track, -1: none; (M,) those that may hide another target.
+
+        decision  about the confirmed (T,) tracks and all `count` measurements
+        """
+
+    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+        """`shared` (T,) and `free` (M,) after tracks that got nothing took free measurements that they overlap."""
+
+    def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
+        """Update the tracks on shared measurements by the edges they can claim, dt seconds after the last scan."""
+
+    def parts(self, register: Register, t: float) -> Mask:
+        """(T,) tracks that are no targets but parts of one that they share measurements with."""
+
+    def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
+        """Note which tracks are together on one of the shared (T,) measurements, and tell of it."""
+
+    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
+        """Those of the free measurements born (B,) that are no pieces of known targets, boxes (V, 4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusive:
+    """Each measurement is of one target."""
+
+    STATE = ()
+
+    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+        """No track shares any, and all may be of somebody new."""
+        return np.full(len(confirmed), -1), np.ones(count, bool)
+
+    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+        """No track continues on what its gate does not hold."""
+        return shared, free
+
+    def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
+        """Nothing is shared."""
+
+    def parts(self, register: Register, t: float) -> Mask:
+        """(T,) none."""
+        return np.zeros(len(register), bool)
+
+    def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
+        """Nobody is together."""
+
+    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
+        """All of them."""
+        return born

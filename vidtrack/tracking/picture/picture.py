@@ -1,0 +1,191 @@
+"""What only a picture tells a tracker: boxes, the border, and the road; and its null sibling."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from vidtrack.associate.problem import Problem
+from vidtrack.associate.shape import Shape
+from vidtrack.errors import ConfigError
+from vidtrack.estimate.bank import Estimator
+from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
+from vidtrack.tracking.boxes import absolute, follow, longer
+from vidtrack.tracking.picture.border import EXIT_S, Border
+from vidtrack.tracking.picture.road import Road
+from vidtrack.tracking.register import Register
+
+
+class View(NamedTuple):
+    """What the picture shows in a scan.
+
+    blobs      (M, 4) boxes of the measurements
+    relative   (M, 4) the same, relative to the measurements
+    predicted  (T, 4) boxes of the tracks
+    hits       (T,) updates of the tracks so far
+    border     of what was surveyed
+    box_s      s; time constant with which the box of a track follows that of its measurement
+    """
+
+    blobs: Floats
+    relative: Floats
+    predicted: Floats
+    hits: Ints
+    border: Border
+    box_s: float
+
+
+class Surroundings(Protocol):
+    """What is known of where targets move: a `Picture`, or `NoPicture`."""
+
+    @property
+    def area(self) -> float | None:
+        """What is surveyed, in px^2; None: not known."""
+
+    @property
+    def road(self) -> Road | None:
+        """What traffic taught about the scene; None: nothing."""
+
+    def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
+        """Change the sizes of boxes as their tracks move from states `before` (T, n) to those of the bank."""
+
+    def view(self, scan: Scan, register: Register, bank: Estimator) -> View | None:
+        """What the scan shows; None where measurements have no boxes."""
+
+    def weigh(self, problem: Problem, view: View | None) -> Problem:
+        """The problem with what boxes tell of each pair."""
+
+    def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
+        """Move the boxes of tracks towards those of the measurements that they have taken (T,)."""
+
+    def left(self, register: Register, bank: Estimator, t: float) -> Mask:
+        """(T,) tracks without a hit in this scan that are beyond the border, or were leaving when last seen."""
+
+    def size(self, box: Floats, xy: Floats) -> Floats:
+        """(T,) sizes by which objects at xy (T, d) must travel to be believed."""
+
+    def learn(self, tracks: Tracks) -> None:
+        """Take in the tracks of a scan."""
+
+
+class NoPicture:
+    """Measurements are points, and what is surveyed has no border."""
+
+    STATE = ()
+
+    @property
+    def area(self) -> None:
+        """Not known."""
+
+    @property
+    def road(self) -> None:
+        """Nothing."""
+
+    def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
+        """Nothing has a box."""
+
+    def view(self, scan: Scan, register: Register, bank: Estimator) -> None:
+        """Nothing."""
+
+    def weigh(self, problem: Problem, view: View | None) -> Problem:
+        """The problem as it is."""
+        return problem
+
+    def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
+        """Nothing has a box."""
+
+    def left(self, register: Register, bank: Estimator, t: float) -> Mask:
+        """(T,) none."""
+        return np.zeros(len(register), bool)
+
+    def size(self, box: Floats, xy: Floats) -> Floats:
+        """(T,) zeros."""
+        return np.zeros(len(box))
+
+    def learn(self, tracks: Tracks) -> None:
+        """Points teach nothing."""
+
+
+class Picture:
+    """The picture of a camera. It learns, if it has a road: each tracker needs its own.
+
+    bounds  (width, height) px; a track that leaves them is deleted; None: as each scan says, else no border
+    shape   how the size of boxes counts in the association; None: it does not
+    road    what traffic teaches about the scene, scan by scan; None: nothing
+    box_s   time constant [s] with which a track's box follows its measurements' boxes
+    exit_s  a track that is leaving over the border is deleted this long [s] after its last evidence
+
+    Raises ConfigError for a time constant that is not above zero.
+    """
+
+    STATE = ("road",)
+
+    def __init__(
+        self,
+        bounds: tuple[float, float] | None = None,
+        *,
+        shape: Shape | None = None,
+        road: Road | None = None,
+        box_s: float = 0.3,
+        exit_s: float = EXIT_S,
+    ) -> None:
+        if not box_s > 0:
+            raise ConfigError(f"box_s is {box_s}; it must be above zero")
+        self.area = bounds[0] * bounds[1] if bounds else None
+        self.shape = shape
+        self.road = road
+        self.box_s = box_s
+        self.exit_s = exit_s
+        self.border = Border(*bounds) if bounds else Border()
+
+    def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
+        """Far vehicles look small: boxes grow on their way from states `before` (T, n)."""
+        if self.road:
+            boxes = (absolute(register.box, x.take(bank.model.position, axis=1)) for x in (before, bank.x))
+            register.box *= self.road.growth(*boxes)
+
+    def view(self, scan: Scan, register: Register, bank: Estimator) -> View | None:
+        """What the scan shows within its border; None where measurements have no boxes."""
+        self.border = self.border.of(scan)
+        if scan.box is None:
+            return None
+        predicted = absolute(register.box, bank.x.take(bank.model.position, axis=1))
+        return View(absolute(scan.box, scan.z), scan.box, predicted, bank.hits, self.border, self.box_s)
+
+    def weigh(self, problem: Problem, view: View | None) -> Problem:
+        """The problem with the likelihood of sizes."""
+        if self.shape is None or view is None:
+            return problem
+        return problem.having(self.shape.weigh(problem.pairs, view.predicted, view.blobs))
+
+    def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
+        """Move the boxes of tracks towards those that they have taken (T,); one that the border cuts is copied."""
+        if view is None:
+            return
+        share = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / bank.hits)
+        follow(register.box, view.relative, taken, self.border.cut(view.blobs), share)
+        if bank.model.per_size:
+            rows = (taken >= 0).nonzero()[0]
+            bank.scale[rows] = longer(register.box)[rows]
+
+    def left(self, register: Register, bank: Estimator, t: float) -> Mask:
+        """(T,) tracks without a hit in this scan that are beyond the border, or were leaving when last seen."""
+        left = register.history & 1 == 0
+        missed = left.nonzero()[0]
+        if len(missed):
+            x = bank.x[missed]
+            xy, v = x.take(bank.model.position, axis=1), x.take(bank.model.velocity, axis=1)
+            going = self.border.leaving(absolute(register.box[missed], xy), v)
+            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > self.exit_s)
+        return left
+
+    def size(self, box: Floats, xy: Floats) -> Floats:
+        """(T,) longer sides, of specks that of the least object; more where the picture is restless."""
+        size = np.fmax(longer(box), self.border.speck)  # NaN where there is no box
+        return size * self.road.caution(xy) if self.road else size
+
+    def learn(self, tracks: Tracks) -> None:
+        """Show the road the tracks of a scan."""
+        if self.road:
+            self.road.learn(tracks)
