@@ -7,7 +7,7 @@ from command_line import SAMPLES
 from vidtrack.box_pipeline import build_tracker
 from vidtrack.config import Settings, load
 from vidtrack.errors import ConfigError, FormatError
-from vidtrack.pipeline import build_detector, video_steps
+from vidtrack.run.video import build_detector, video_steps
 from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.video.source import open_source
 

@@ -39,11 +39,11 @@ if TYPE_CHECKING:
     from vidtrack.estimate.particle import ParticleBank as ParticleBank
     from vidtrack.estimate.turn import CoordinatedTurn as CoordinatedTurn
     from vidtrack.estimate.unscented import UnscentedBank as UnscentedBank
-    from vidtrack.pipeline import track as track
     from vidtrack.radar.sensors import PositionRangeRate as PositionRangeRate
     from vidtrack.radar.sensors import RangeAzimuth as RangeAzimuth
     from vidtrack.radar.sensors import RangeAzimuthElevation as RangeAzimuthElevation
-    from vidtrack.radar_pipeline import track_plots as track_plots
+    from vidtrack.run.radar import track_plots as track_plots
+    from vidtrack.run.video import track as track
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
@@ -104,8 +104,8 @@ _HOME = {
     "box_scan": "tracking.boxes",
     "box_tracker": "box_pipeline",
     "load_settings": "config",
-    "track": "pipeline",
-    "track_plots": "radar_pipeline",
+    "track": "run.video",
+    "track_plots": "run.radar",
 }
 __all__ = sorted(_HOME)
 

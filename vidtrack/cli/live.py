@@ -17,8 +17,8 @@ from vidtrack.cli.tracking import chosen_settings, tracking_options
 
 if TYPE_CHECKING:
     from vidtrack.config import Settings
-    from vidtrack.live.outputs import Extras
     from vidtrack.output.status import LiveStatus
+    from vidtrack.run.live.outputs import LiveExtras
     from vidtrack.serve.page import Page
 
 _TELL_S = 60.0
@@ -85,7 +85,7 @@ def command(
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_many import are_many, track_many
         from vidtrack.config import Input, load
-        from vidtrack.live.outputs import Extras
+        from vidtrack.run.live.outputs import LiveExtras
         from vidtrack.video.live.address import secrets
 
         hidden = [text for source in sources for text in secrets(source)]
@@ -94,7 +94,7 @@ def command(
         given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
         settings = load(config_file, given, kind=Input.CAMERA)
         announce_compiling(quiet)
-        extras = Extras(rerun, video, save_masks, decisions, state, record)
+        extras = LiveExtras(rerun, video, save_masks, decisions, state, record)
         with _page(http, http_token) as page:
             if page is not None and not quiet:
                 click.echo(f"vidtrack: the page is at {page.url}", err=True)
@@ -112,14 +112,14 @@ def _track_one(
     source: str,
     settings: Settings,
     output: Path | None,
-    extras: Extras,
+    extras: LiveExtras,
     page: Page | None,
     *,
     force: bool,
     quiet: bool,
 ) -> None:
     from vidtrack.cli.signals import stopping
-    from vidtrack.live.run import LiveRun
+    from vidtrack.run.live.run import LiveRun
     from vidtrack.serve.camera import Camera
 
     with LiveRun(source, settings, output, extras, force=force) as run, stopping(run.stop):

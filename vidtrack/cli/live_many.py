@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from vidtrack.live.many import Many, Worker
-    from vidtrack.live.outputs import Extras
+    from vidtrack.run.live.many import Many, Supervisor
+    from vidtrack.run.live.outputs import LiveExtras
     from vidtrack.serve.page import Page
 
 _TELL_S = 60.0
@@ -26,7 +26,7 @@ def are_many(sources: Sequence[str]) -> bool:
 def track_many(
     sources: Sequence[str],
     output: Path | None,
-    extras: Extras,
+    extras: LiveExtras,
     config_file: Path | None,
     assignments: Iterable[str | tuple[str, Any]],
     page: Page | None,
@@ -37,10 +37,10 @@ def track_many(
 ) -> int:
     """Track all until a signal; the exit code is 0 unless every camera failed by itself."""
     from vidtrack.cli.signals import stopping
-    from vidtrack.live.cameras import extras_of, listed, named, settings_of
-    from vidtrack.live.many import Many
-    from vidtrack.live.worker import Job
     from vidtrack.output.folder import open_run, usable
+    from vidtrack.run.live.cameras import extras_of, listed, named, settings_of
+    from vidtrack.run.live.many import Many
+    from vidtrack.run.live.worker import Job
 
     for_all: Mapping[str, Any] = {}
     if len(sources) == 1:
@@ -61,12 +61,12 @@ def track_many(
         while many.running(_LOOK_S):
             if not quiet and time.monotonic() - told_s > _TELL_S:
                 told_s = time.monotonic()
-                for name, worker in many.workers.items():
-                    click.echo(f"{name}: {_line(worker)}", err=True)
+                for name, supervisor in many.supervisors.items():
+                    click.echo(f"{name}: {_line(supervisor)}", err=True)
     if not quiet:
         _print_table(many)
     click.echo(folder)
-    codes = [worker.exit_code or 0 for worker in many.workers.values() if worker.error]
+    codes = [supervisor.exit_code or 0 for supervisor in many.supervisors.values() if supervisor.error]
     return max(1, *codes) if len(codes) == len(jobs) else 0
 
 
@@ -75,17 +75,17 @@ def _show(page: Page, many: Many) -> None:
 
     page.show(
         {
-            name: Camera(worker.status, worker.picture, stale_s=2 * worker.job.settings.live.timeout_s)
-            for name, worker in many.workers.items()
+            name: Camera(supervisor.status, supervisor.picture, stale_s=2 * supervisor.job.settings.live.timeout_s)
+            for name, supervisor in many.supervisors.items()
         }
     )
 
 
-def _line(worker: Worker) -> str:
+def _line(supervisor: Supervisor) -> str:
     """A camera in one line."""
-    if worker.error is not None:
-        return f"ended: {worker.error}"
-    status = worker.status()
+    if supervisor.error is not None:
+        return f"ended: {supervisor.error}"
+    status = supervisor.status()
     if "frame" not in status:
         return str(status["state"])
     reading = status["reading"]

@@ -74,15 +74,17 @@ def command(
     from vidtrack.cli.progress import progress, tell_outcome
     from vidtrack.cli.signals import Terminated, stoppable
     from vidtrack.config import Input, load
-    from vidtrack.radar_run import RadarRun
+    from vidtrack.run.radar import run_plots
+    from vidtrack.run.run import Extras
 
     start_log(verbose, quiet)
     given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
     settings = load(config_file, [*assignments, *given], kind=Input.RADAR)
     announce_compiling(quiet)
-    with RadarRun(plots, settings, output, force=force, rerun=rerun, decisions=decisions, seed=seed) as run:
+    extras = Extras(rerun=rerun, decisions=decisions)
+    with run_plots(plots, settings, output, extras, force=force, seed=seed) as run:
         try:
-            for _ in stoppable(progress(run, run.scans, run.name, quiet, unit="scan")):
+            for _ in stoppable(progress(run, run.count, run.name, quiet, unit="scan")):
                 pass  # the sinks have seen it
         except (KeyboardInterrupt, Terminated):
             click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)

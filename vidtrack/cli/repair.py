@@ -35,9 +35,9 @@ def command(
     from shutil import Error, copytree
 
     from vidtrack.errors import StoppedEarly
-    from vidtrack.live.keep import parts_of
     from vidtrack.output.folder import open_run, spare
     from vidtrack.output.repair import repair
+    from vidtrack.run.live.retention import parts_of
 
     start_log(verbose, quiet)
     if output is not None and folder.is_dir():

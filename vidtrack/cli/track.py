@@ -52,7 +52,8 @@ def command(
     from vidtrack.cli.progress import progress, tell_outcome
     from vidtrack.cli.signals import Terminated, stoppable
     from vidtrack.config import Input, load
-    from vidtrack.run import Run
+    from vidtrack.run.files import run_file
+    from vidtrack.run.run import Extras
     from vidtrack.video.detections import is_detections
     from vidtrack.video.recording import is_recording, recorded_settings
 
@@ -61,11 +62,10 @@ def command(
     kind = Input.DETECTIONS if is_detections(source) else Input.VIDEO
     settings = load(config_file, [*assignments, *chosen_settings(chosen)], base, kind)
     announce_compiling(quiet)
-    with Run(
-        source, settings, output, force=force, rerun=rerun, video=video, masks=save_masks, decisions=decisions
-    ) as run:
+    extras = Extras(rerun, video, save_masks, decisions)
+    with run_file(source, settings, output, extras, force=force) as run:
         try:
-            for _ in stoppable(progress(run, run.frames, run.name, quiet)):
+            for _ in stoppable(progress(run, run.count, run.name, quiet)):
                 pass  # the sinks have seen it
         except (KeyboardInterrupt, Terminated):
             click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
