@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from vidtrack.cli import COMMANDS
+
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "vidtrack"
 FLOORS = (
@@ -153,7 +155,7 @@ def heavy(code):
     return set(result.stdout.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["track", "--help"], ["radar", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
 def test_help_imports_nothing_heavy(arguments):
     assert not heavy(f"from vidtrack.cli import cli\ncli.main({arguments}, standalone_mode=False)")
 

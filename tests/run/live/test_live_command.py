@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import fields
 from pathlib import Path
 
 import command_line
@@ -17,7 +18,7 @@ from click.testing import CliRunner
 from patient import start
 
 from vidtrack.cli import cli
-from vidtrack.cli.live import _amount, _live_settings
+from vidtrack.cli.live import LiveOptions, amount
 from vidtrack.cli.signals import Terminated, stopping
 from vidtrack.config import load
 from vidtrack.errors import OutputError
@@ -185,14 +186,20 @@ def test_a_wrong_place_leaves_the_folder_free_for_the_next_try(camera, tmp_path,
 
 
 def test_amounts_become_settings():
-    assert _live_settings(every_frame=True, roll="10m", keeps=("7d", "1.5GB")) == [
+    def given(**chosen):
+        unsaid = {field.name: None for field in fields(LiveOptions)} | {"assignments": (), "lines": (), "keeps": ()}
+        return LiveOptions(**(unsaid | chosen)).given()
+
+    assert given(every_frame=True, roll="10m", keeps=("7d", "1.5GB"), assignments=("blobs.cut=false",)) == [
+        "blobs.cut=false",
         ("live.every_frame", True),
         ("live.roll_s", 600.0),
         ("live.keep_s", 604800.0),
         ("live.keep_bytes", 1.5e9),
     ]
-    assert _live_settings(every_frame=False, roll=None, keeps=()) == []
-    assert _amount("--roll", "2 h", {"live.roll_s": {"h": 3600.0}}) == ("live.roll_s", 7200.0)
+    assert given() == []
+    assert given(start=0.0, lines=("a:1,2,3,4",)) == [("source.start_s", 0.0), ("output.lines", ["a:1,2,3,4"])]
+    assert amount("--roll", "2 h", {"live.roll_s": {"h": 3600.0}}) == ("live.roll_s", 7200.0)
 
 
 def test_help_shows_three_examples():
