@@ -105,7 +105,7 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 def test_rerun_is_imported_where_recordings_are_made():
-    assert users_of("rerun") == {"output.recorder", "output.rerun", "output.rerun_radar"}
+    assert users_of("rerun") == {"output.rerun_recording", "output.rerun", "output.rerun_radar"}
 
 
 def test_opencv_is_used_where_there_are_pictures():

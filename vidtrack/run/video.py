@@ -1,4 +1,4 @@
-"""Pictures become tracks: source, detector, tracker, frame by frame. Read this file after `tracking/tracker.py`."""
+"""Pictures become tracks: source, detector, tracker, frame by frame. Read this file after `run.py`."""
 
 from __future__ import annotations
 

@@ -5,8 +5,7 @@ from contextlib import ExitStack
 import pytest
 
 from vidtrack.errors import ConfigError, OutputError
-from vidtrack.run.live.outputs import LiveExtras
-from vidtrack.run.live.places import lock_extras, lock_folder
+from vidtrack.run.live.outputs import LiveExtras, lock_extras, lock_folder
 
 
 def folder_for(output, extras, in_blocks=False):

@@ -6,17 +6,21 @@ import logging
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Thread
 
 from vidtrack.errors import Error, StoppedEarly
-from vidtrack.output.counts import crossing_lines
+from vidtrack.output.counts import HEADER, crossing_lines
+from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import writing
-from vidtrack.output.linefile import Every
-from vidtrack.output.repair import repair
+from vidtrack.output.linefile import Every, LineFile, sort_rows
+from vidtrack.output.mot import MotFile
+from vidtrack.output.plot import TrajectoryPlot
+from vidtrack.output.repair import add_parquet, repair
 from vidtrack.output.sink import Step
-from vidtrack.run.live.part import Part, count
+from vidtrack.output.summary import Summary
+from vidtrack.output.tables import VIDEO, csv_text, track_rows
 from vidtrack.run.live.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.sinks import Subject
 
@@ -30,7 +34,7 @@ class Parts:
 
     root       the run's folder
     subject    its crossings go into each part's counts.csv
-    open_part  makes a part in a folder
+    decisions  each part has decisions.csv
     roll_s     length of a part by the clock: 3600 goes from one full hour to the next; None: root is the only part
 
     Parts that an earlier run could not finish are repaired meanwhile.
@@ -40,12 +44,13 @@ class Parts:
         self,
         root: Path,
         subject: Subject,
-        open_part: Callable[[Path], Part],
+        decisions: bool,
         roll_s: float | None,
         retention: Retention,
     ) -> None:
         self._root = root
-        self._open_part = open_part
+        self._subject = subject
+        self._decisions = decisions
         self._roll_s = roll_s
         self._retention = retention
         self._counter = subject.counter
@@ -97,7 +102,7 @@ class Parts:
         with writing(self._root):
             self._folder = self._root if self._roll_s is None else new_part(self._root)
         try:
-            self._part = self._open_part(self._folder)
+            self._part = Part(self._folder, self._subject, self._decisions)
         except StoppedEarly:
             if self._folder != self._root:
                 shutil.rmtree(self._folder, ignore_errors=True)
@@ -121,3 +126,70 @@ class Parts:
         thread = Thread(target=run, name="finish-part", daemon=True)
         thread.start()
         self._finishing.append(thread)
+
+
+class Part:
+    """The same files as those of a run over a video: tables that grow, and what is made of them at the end.
+
+    subject  its counter counts on through all parts
+
+    Raises StoppedEarly when the disk refuses.
+    """
+
+    def __init__(self, folder: Path, subject: Subject, decisions: bool) -> None:
+        self.folder = folder
+        with ExitStack() as stack:  # if the disk is full, what is open by then is closed
+            self._summary = subject.summary(folder)
+            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in VIDEO) + "\n")
+            stack.callback(self._tracks.close)
+            self._mot = MotFile(folder / "mot.txt")
+            stack.callback(self._mot.close)
+            self._counts = self._decisions = None
+            if subject.counter is not None:
+                self._counts = LineFile(folder / "counts.csv", HEADER)
+                stack.callback(self._counts.close)
+            if decisions:
+                self._decisions = DecisionLog(folder / "decisions.csv")
+                stack.callback(self._decisions.close)
+            self._plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines)
+            self._files = stack.pop_all()
+
+    def write(self, steps: Sequence[Step], crossings: str) -> None:
+        """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
+        shown = [step.in_picture() for step in steps if len(step.tracks)]
+        if shown:
+            _write(self._tracks, csv_text(track_rows(shown)))
+        if self._counts is not None and crossings:
+            _write(self._counts, crossings)
+        for step in steps:
+            self._mot.step(step)
+            self._plot.step(step)
+            if self._decisions is not None:
+                self._decisions.step(step)
+        self._mot.flush()
+        count(self._summary, steps)
+
+    def finish(self) -> None:
+        """Close the tables, sort them, and add tracks.parquet and tracks.png."""
+        with ExitStack() as stack:
+            self._summary.interrupted = False
+            stack.callback(self._summary.close)
+            stack.callback(self._plot.close)
+            stack.callback(add_parquet, self.folder)
+            if self._counts is not None:
+                stack.callback(sort_rows, self._counts.path, columns=1, header=True)
+            stack.push(self._files)
+
+
+def count(summary: Summary, steps: Sequence[Step]) -> None:
+    """Bring a summary up to date; if the disk refuses it now, the next one says the same and more."""
+    for step in steps:
+        with suppress(StoppedEarly):
+            summary.step(step)
+
+
+def _write(file: LineFile, lines: str) -> None:
+    """Bring lines to the disk, safe from a power cut."""
+    file.add(lines)
+    file.flush()
+    file.sync()

@@ -17,8 +17,7 @@ from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
-from vidtrack.run.live.outputs import LiveExtras, Outputs
-from vidtrack.run.live.places import lock_extras, lock_folder
+from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
 from vidtrack.run.live.recorder import NoRecorder, Recorder
 from vidtrack.run.live.retention import Retention
 from vidtrack.run.run import recorded

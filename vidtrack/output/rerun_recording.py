@@ -40,7 +40,7 @@ _STATES = {"tentative": (255, 200, 0), "confirmed": (0, 200, 80), "coasting": (1
 _GONE = "gone"
 
 
-class Recorder:
+class RerunRecording:
     """Sink that records tracks' lives, numbers, times and decisions; what it looks like is drawn by its children.
 
     target    FILE.rrd; "spawn": a viewer that is started here; "serve": on loopback, for viewers of this machine
