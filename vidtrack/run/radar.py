@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from vidtrack.associate.gate import Gate
@@ -66,14 +67,17 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
     def summary(folder: Path) -> Summary:
         return Summary(folder / "summary.json", path, settings, lambda: account | tracker.rates.as_dict(), unit="scans")
 
-    def sinks(folder: Path) -> Iterator[Sink]:
-        return radar_sinks(folder, settings, extras, found.dim)
+    yield Pipeline(
+        name=Path(path).stem,
+        place=Path(path),
+        count=found.count,
+        steps=scan_steps(found, tracker, settings.tracker.redundant),
+        summary=summary,
+        sinks=partial(radar_sinks, settings, extras, found.dim),
+    )
 
-    steps = scan_steps(found, tracker, settings.tracker.redundant)
-    yield Pipeline(Path(path).stem, Path(path), found.count, steps, summary, sinks)
 
-
-def radar_sinks(folder: Path, settings: Settings, extras: Extras, dim: int) -> Iterator[Sink]:
+def radar_sinks(settings: Settings, extras: Extras, dim: int, folder: Path) -> Iterator[Sink]:
     """All sinks of a run over plots in `dim` dimensions."""
     table = TrackTable(folder, RADAR if dim == 2 else RADAR_3D)
     plot = RadarPlot(folder / "tracks.png", settings.radar.position[:2])

@@ -105,8 +105,14 @@ def file_pipeline(
 
     counter = line_counter(settings, source.width, source.height)
     subject = Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter)
-    sinks = partial(file_sinks, subject, extras, tracker.model, link_s, hold_s)
-    return Pipeline(source.name, source.place, source.frames, steps, subject.summary, sinks)
+    return Pipeline(
+        name=source.name,
+        place=source.place,
+        count=source.frames,
+        steps=steps,
+        summary=subject.summary,
+        sinks=partial(file_sinks, subject, extras, tracker.model, link_s, hold_s),
+    )
 
 
 def file_sinks(

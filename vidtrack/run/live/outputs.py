@@ -76,7 +76,7 @@ def lock_extras(extras: LiveExtras, output: Path | None, locks: ExitStack) -> No
 
 
 def lock_folder(
-    output: Path | None, name: str, extras: LiveExtras, locks: ExitStack, *, force: bool, in_blocks: bool
+    output: Path | None, name: str, extras: LiveExtras, locks: ExitStack, *, force: bool, in_parts: bool
 ) -> Path:
     """A new folder, or that of an earlier run in parts, which is continued; other runs are kept out.
 
@@ -84,7 +84,7 @@ def lock_folder(
     """
     if output is not None:
         locks.enter_context(exclusive(usable(output)))  # before `force` deletes what another one writes
-        continued = in_blocks and parts_of(output)
+        continued = in_parts and parts_of(output)
         return output if continued or _is_ours(output, extras) else open_run(output, name, force)
     folder = open_run(None, name, force)
     locks.enter_context(exclusive(folder))

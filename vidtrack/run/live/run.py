@@ -81,7 +81,7 @@ class LiveRun:
                 self._checkpoint.gather()  # what cannot be saved is refused now
             counter = line_counter(settings, source.width, source.height)
             shown, scene = self._address.shown, self._checkpoint.detector.scene
-            self.folder = lock_folder(output, self.name, extras, locks, force=force, in_blocks=roll_s is not None)
+            self.folder = lock_folder(output, self.name, extras, locks, force=force, in_parts=roll_s is not None)
             retention.roots.append(self.folder)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
             subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter)
