@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from vidtrack.config import Settings
@@ -16,12 +15,12 @@ from vidtrack.output.linked import Linked
 from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
-from vidtrack.output.sink import Sink, Step
+from vidtrack.output.sink import Sink
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
-from vidtrack.run.run import Extras, Pipeline
+from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
 from vidtrack.video.detections import Detections
@@ -67,26 +66,14 @@ def line_counter(settings: Settings, width: int, height: int) -> LineCounter | N
     return LineCounter(lines) if lines else None
 
 
-def file_pipeline(
+def file_subject(
     path: str,
     source: Source | Recording | Detections,
-    steps: Iterable[Step],
     tracker: Tracker,
     settings: Settings,
-    extras: Extras,
-    *,
     scene: Callable[[], Image] | None,
-    link_s: float | None,
-    hold_s: float,
-) -> Pipeline:
-    """The steps of a source that ends, with all their sinks.
-
-    path           as the user wrote it
-    scene          see Subject
-    link_s, hold_s  see file_sinks
-
-    Raises ConfigError for lines that are not in the picture.
-    """
+) -> Subject:
+    """A source that ends, `path` as the user wrote it. Raises ConfigError for lines that cannot be counted over."""
     stats = source.stats
 
     def reading() -> dict[str, object]:
@@ -104,19 +91,11 @@ def file_pipeline(
         }
 
     counter = line_counter(settings, source.width, source.height)
-    subject = Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter)
-    return Pipeline(
-        name=source.name,
-        place=source.place,
-        count=source.frames,
-        steps=steps,
-        summary=subject.summary,
-        sinks=partial(file_sinks, subject, extras, tracker.model, link_s, hold_s),
-    )
+    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter)
 
 
 def file_sinks(
-    subject: Subject, extras: Extras, motion: Motion, link_s: float | None, hold_s: float, folder: Path
+    subject: Subject, extras: Extras, folder: Path, *, motion: Motion, link_s: float | None, hold_s: float
 ) -> Iterator[Sink]:
     """All sinks of a source that ends.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
@@ -54,7 +55,7 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
 
     Raises SourceError, FormatError, ConfigError, OutputError.
     """
-    from vidtrack.run.sinks import file_pipeline  # who only tracks needs no tables
+    from vidtrack.run.sinks import file_sinks, file_subject  # who only tracks needs no tables
 
     recorded = is_recording(path)
     with (
@@ -68,16 +69,16 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         detector = build_detector(settings)
         if isinstance(source, Recording):
             source.remember = Checkpoint(detector, tracker, source.like).restore
-        yield file_pipeline(
-            path,
-            source,
-            video_steps(source, detector, tracker, settings),
-            tracker,
-            settings,
-            extras,
-            scene=detector.scene,
-            link_s=settings.output.link_s if settings.output.link else None,
-            hold_s=LIVE_HOLD_S if recorded else HOLD_S,
+        subject = file_subject(path, source, tracker, settings, detector.scene)
+        link_s = settings.output.link_s if settings.output.link else None
+        hold_s = LIVE_HOLD_S if recorded else HOLD_S
+        yield Pipeline(
+            name=source.name,
+            place=source.place,
+            count=source.frames,
+            steps=video_steps(source, detector, tracker, settings),
+            summary=subject.summary,
+            sinks=partial(file_sinks, subject, extras, motion=tracker.model, link_s=link_s, hold_s=hold_s),
         )
 
 
