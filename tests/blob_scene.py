@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import TrackerSettings
+from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.scan import Scan
 
 SIZE = (320.0, 240.0)

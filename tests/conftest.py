@@ -10,7 +10,7 @@ settings.register_profile("unhurried", deadline=None)  # a busy machine is no fa
 settings.load_profile("unhurried")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell switches it off for what it starts in the background
 
-CLOCKED = ("tests/live/", "tests/serve/")
+CLOCKED = ("tests/run/live/", "tests/serve/")
 
 
 @pytest.hookimpl(optionalhook=True)

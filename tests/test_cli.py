@@ -15,7 +15,7 @@ import pytest
 from command_line import ENVIRONMENT, SAMPLES, first_frames, loop_video, start
 
 from vidtrack.cli import COMMANDS, main
-from vidtrack.run import Run
+from vidtrack.run.run import Run
 
 CROSSING = SAMPLES / "crossing.avi"
 
@@ -233,14 +233,15 @@ def test_an_unknown_command_is_2(vidtrack):
     ("number", "expected", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )
 def test_a_stopped_run_ends_in_complete_results(vidtrack, tmp_path, monkeypatch, number, expected, word):
-    class Told(Run):
-        def __iter__(self):
-            for step in super().__iter__():
-                if step.index == 40:
-                    signal.raise_signal(number)
-                yield step
+    steps = Run.__iter__
 
-    monkeypatch.setattr("vidtrack.run.Run", Told)
+    def told(self):
+        for step in steps(self):
+            if step.index == 40:
+                signal.raise_signal(number)
+            yield step
+
+    monkeypatch.setattr(Run, "__iter__", told)
     code, out, err = vidtrack("track", CROSSING, "-o", "out")
     assert (code, out) == (expected, "")
     assert err.splitlines()[-1] == f"vidtrack: {word}"

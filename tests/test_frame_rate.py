@@ -7,7 +7,7 @@ from command_line import SAMPLES
 from vidtrack import formats, score
 from vidtrack.config import Settings
 from vidtrack.papers.p004.clips import by_default
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
 from vidtrack.scan import TENTATIVE
 from vidtrack.simulate import simulate
 
@@ -30,7 +30,7 @@ def test_ten_and_thirty_frames_a_second_tell_the_same(scenario, seed):
 
 def test_the_sample_errs_as_much_as_its_covariances_say(tmp_path):
     """NEES of two coordinates: 2 where P is right, 4.2 when lasting errors are taken for new ones; less is cautious."""
-    with Run(str(SAMPLES / "junction.avi"), Settings(), tmp_path / "out") as run:
+    with run_file(str(SAMPLES / "junction.avi"), Settings(), tmp_path / "out") as run:
         for _ in run:
             pass
     found = formats.read(tmp_path / "out")

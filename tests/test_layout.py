@@ -7,20 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from vidtrack.cli import COMMANDS
+
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "vidtrack"
 FLOORS = (
     "__main__",
     "cli",
     "papers",
-    "run",
-    "live",
     "doctor",
-    "radar_run",
-    "pipeline",
-    "radar_pipeline",
-    "box_pipeline",
-    "steps",
+    "run",
     "serve",
     "simulate",
     "output",
@@ -108,7 +104,7 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 def test_rerun_is_imported_where_recordings_are_made():
-    assert users_of("rerun") == {"output.recorder", "output.rerun", "output.rerun_radar"}
+    assert users_of("rerun") == {"output.rerun_recording", "output.rerun", "output.rerun_radar"}
 
 
 def test_opencv_is_used_where_there_are_pictures():
@@ -158,7 +154,7 @@ def heavy(code):
     return set(result.stdout.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["track", "--help"], ["radar", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
 def test_help_imports_nothing_heavy(arguments):
     assert not heavy(f"from vidtrack.cli import cli\ncli.main({arguments}, standalone_mode=False)")
 

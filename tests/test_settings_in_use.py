@@ -8,8 +8,9 @@ from settings_tree import places
 from vidtrack.config import Input, Settings, load, value_of
 from vidtrack.errors import ConfigError
 from vidtrack.explain import as_toml
-from vidtrack.radar_run import RadarRun
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
+from vidtrack.run.radar import run_plots
+from vidtrack.run.run import Extras
 from vidtrack.settings.group import Group
 from vidtrack.settings.inputs import needs, reads
 from vidtrack.simulate.radar_scenarios import simulate_radar
@@ -39,20 +40,20 @@ def refused(kind, *assignments, file=None):
 
 def track_video(folder):
     source, lines = ("source.end_s", 1.0), ("output.lines", ["a:10,10,100,100"])
-    pictures = {"rerun": str(folder / "run.rrd"), "video": folder / "run.mp4"}
-    return Run(str(SAMPLES / "crossing.avi"), load(assignments=[source, lines]), folder / "run", **pictures)
+    pictures = Extras(rerun=str(folder / "run.rrd"), video=folder / "run.mp4")
+    return run_file(str(SAMPLES / "crossing.avi"), load(assignments=[source, lines]), folder / "run", pictures)
 
 
 def track_detections(folder):
     rows = [f"{k},-1,{10 + 3 * k},{20 + y},20,10,{0.5 + 0.01 * k},-1,-1,-1" for k in range(1, 40) for y in (0, 60)]
     (folder / "det.txt").write_text("\n".join(rows))
     chosen = load(assignments=[("source.fps", 25), ("output.lines", ["a:10,10,100,100"])])
-    return Run(str(folder / "det.txt"), chosen, folder / "run", rerun=str(folder / "run.rrd"))
+    return run_file(str(folder / "det.txt"), chosen, folder / "run", Extras(rerun=str(folder / "run.rrd")))
 
 
 def track_plots(folder):
     write_radar(simulate_radar("radar-tws", 0), folder)
-    return RadarRun(str(folder / "plots.csv"), load(), folder / "run", rerun=str(folder / "run.rrd"))
+    return run_plots(str(folder / "plots.csv"), load(), folder / "run", Extras(rerun=str(folder / "run.rrd")))
 
 
 OF_THE_FILE = {"radar.skip_bad_rows", "radar.position", *(f"radar.sigma_{name}" for name in (

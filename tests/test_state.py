@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from command_line import SAMPLES
 
-from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings, load
 from vidtrack.errors import ConfigError, FormatError
-from vidtrack.pipeline import build_detector, video_steps
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
 from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.video.source import open_source
 

@@ -40,7 +40,7 @@ from scipy.optimize import linear_sum_assignment
 from vidtrack import formats, score
 from vidtrack.config import load
 from vidtrack.formats import Table
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
 from vidtrack.score.matching import box_iou
 
 PEERS = ("sort", "bytetrack", "ocsort", "norfair")
@@ -161,7 +161,9 @@ def track_ours(sequence: Sequence, settings: str, folder: Path) -> Table:
     place.mkdir(parents=True, exist_ok=True)
     formats.write_mot(place / "det.txt", sequence.detections)
     (place / "seqinfo.ini").write_text(sequence.info)
-    with Run(str(place / "det.txt"), load(None, filter(None, settings.split(","))), place / "out", force=True) as run:
+    with run_file(
+        str(place / "det.txt"), load(None, filter(None, settings.split(","))), place / "out", force=True
+    ) as run:
         for _ in run:
             pass
     return formats.read(place / "out")

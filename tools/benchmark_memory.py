@@ -19,7 +19,7 @@ import av
 import numpy as np
 
 from vidtrack.config import Settings
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
 
 SAMPLE = Path(__file__).parent.parent / "samples" / "junction.avi"
 WARM_UP = 4  # rounds in which caches fill
@@ -54,7 +54,7 @@ def resident_mb() -> float:
 
 def held(path: Path, frames: int, folder: Path) -> Iterator[float]:
     """Resident MB each time another `frames` frames are through."""
-    with Run(str(path), Settings(), folder) as run:
+    with run_file(str(path), Settings(), folder) as run:
         for count, _ in enumerate(run, 1):
             if count % frames == 0:
                 yield resident_mb()

@@ -33,7 +33,7 @@ from peers.environment import python_of
 from vidtrack import formats, score
 from vidtrack.config import Settings
 from vidtrack.formats import Table
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
 from vidtrack.simulate import Clip, simulate
 
 FPS = 25
@@ -116,7 +116,7 @@ def decode(path: Path) -> float:
 def run_ours(path: Path, folder: Path) -> tuple[float, dict[str, float], Table]:
     """Seconds of a run into `folder`, and of its stages, and its tracks."""
     begin = perf_counter()
-    with Run(str(path), Settings(), folder) as run:
+    with run_file(str(path), Settings(), folder) as run:
         opened = perf_counter()
         for _ in run:
             pass

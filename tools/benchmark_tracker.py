@@ -29,8 +29,8 @@ import numpy as np
 from peers.environment import python_of
 
 from vidtrack import formats, score
-from vidtrack.box_pipeline import build_box_tracker
 from vidtrack.config import Settings, SourceSettings
+from vidtrack.run.trackers import build_box_tracker
 from vidtrack.scan import Floats, Ints, Status
 from vidtrack.video.detections import open_detections
 

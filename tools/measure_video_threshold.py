@@ -15,11 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.detection.amplitude import RAYLEIGH
 from vidtrack.detection.threshold import ThresholdController
-from vidtrack.pipeline import build_detector, video_steps
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
 from vidtrack.video.source import open_source
 
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from vidtrack.config import load
 from vidtrack.errors import SourceError
-from vidtrack.live.outputs import Extras
-from vidtrack.live.run import LiveRun
+from vidtrack.run.live.outputs import LiveExtras
+from vidtrack.run.live.run import LiveRun
 from vidtrack.video.live import source
 from vidtrack.video.live.clock import CaptureClock
 
@@ -115,7 +115,7 @@ def main() -> None:
     source.CaptureClock = StampClock  # type: ignore[misc]
     seen = []
     with tempfile.TemporaryDirectory() as folder:
-        extras = Extras(state=Path(folder) / "state")
+        extras = LiveExtras(state=Path(folder) / "state")
         camera = lambda: Camera(pictures, options.lost)  # noqa: E731
         began = time.monotonic()
         with LiveRun("http://soak/", settings, Path(folder) / "out", extras, connect=camera) as run:

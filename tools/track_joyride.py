@@ -27,7 +27,7 @@ from read_joyride import SIGMA_M, Joyride, read_joyride, write_joyride
 from vidtrack.config import Settings, load
 from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import clutter_density, measurements
-from vidtrack.radar_pipeline import track_plots
+from vidtrack.run.radar import track_plots
 from vidtrack.scan import Status
 
 NEAR_M = 50.0

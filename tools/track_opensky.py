@@ -19,7 +19,7 @@ import pyarrow.csv
 
 from vidtrack import formats, score
 from vidtrack.config import Settings, load
-from vidtrack.radar_pipeline import track_plots
+from vidtrack.run.radar import track_plots
 from vidtrack.scan import Status
 
 SIGMA_M, P_D, FALSE_PLOTS = 100.0, 0.9, 20

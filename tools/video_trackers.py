@@ -18,7 +18,8 @@ from video_clips import Clip
 from vidtrack import formats
 from vidtrack.config import load
 from vidtrack.formats import Table
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
+from vidtrack.run.run import Extras
 from vidtrack.video.frame import Image
 
 SCRIPTS = {"MOG2 + SORT": ("MOG2", "SORT"), "KNN + ByteTrack": ("KNN", "ByteTrack")}
@@ -59,7 +60,7 @@ class Ours:
             settings = load(None, [*self._assignments, *rate, *lines])
             with tempfile.TemporaryDirectory() as place:
                 masks = Path(place) / "masks" if clip.masked else None
-                with Run(str(clip.video), settings, Path(place) / "run", masks=masks) as run:
+                with run_file(str(clip.video), settings, Path(place) / "run", Extras(masks=masks)) as run:
                     for _ in run:
                         pass
                 yield _read(run.folder / "counts.csv", formats.read(run.folder), masks)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from vidtrack.associate.pda import PDA as PDA
     from vidtrack.associate.strongest import PSN as PSN
     from vidtrack.associate.strongest import StrongestNeighbour as StrongestNeighbour
-    from vidtrack.box_pipeline import box_tracker as box_tracker
     from vidtrack.config import Settings as Settings
     from vidtrack.config import load as load_settings  # noqa: F401
     from vidtrack.detection.threshold import ThresholdController as ThresholdController
@@ -39,11 +38,12 @@ if TYPE_CHECKING:
     from vidtrack.estimate.particle import ParticleBank as ParticleBank
     from vidtrack.estimate.turn import CoordinatedTurn as CoordinatedTurn
     from vidtrack.estimate.unscented import UnscentedBank as UnscentedBank
-    from vidtrack.pipeline import track as track
     from vidtrack.radar.sensors import PositionRangeRate as PositionRangeRate
     from vidtrack.radar.sensors import RangeAzimuth as RangeAzimuth
     from vidtrack.radar.sensors import RangeAzimuthElevation as RangeAzimuthElevation
-    from vidtrack.radar_pipeline import track_plots as track_plots
+    from vidtrack.run.radar import track_plots as track_plots
+    from vidtrack.run.trackers import box_tracker as box_tracker
+    from vidtrack.run.video import track as track
     from vidtrack.scan import Scan as Scan
     from vidtrack.scan import Status as Status
     from vidtrack.scan import Tracks as Tracks
@@ -106,10 +106,10 @@ _HOME = {
     "Tracks": "scan",
     "UnscentedBank": "estimate.unscented",
     "box_scan": "tracking.boxes",
-    "box_tracker": "box_pipeline",
+    "box_tracker": "run.trackers",
     "load_settings": "config",
-    "track": "pipeline",
-    "track_plots": "radar_pipeline",
+    "track": "run.video",
+    "track_plots": "run.radar",
 }
 __all__ = sorted(_HOME)
 

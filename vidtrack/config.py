@@ -10,7 +10,7 @@ import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
@@ -19,6 +19,7 @@ from vidtrack.settings.group import Group
 from vidtrack.settings.inputs import Input as Input
 from vidtrack.settings.inputs import is_own, needs, reads
 from vidtrack.settings.live import LiveSettings as LiveSettings
+from vidtrack.settings.names import Distance, Life, Method
 from vidtrack.settings.radar import RadarSettings as RadarSettings
 from vidtrack.settings.video import BlobSettings as BlobSettings
 from vidtrack.settings.video import DetectorSettings as DetectorSettings
@@ -70,11 +71,11 @@ class DetectionSettings(Group):
 class TrackerSettings(Group):
     """Object size is the longer side of a vehicle's box."""
 
-    method: Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"] = "gnn"
+    method: Method = "gnn"
     """association: one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), deferred (split, mht)"""
     n_scan: int = Field(3, ge=1, le=20)
     """scans after which split and mht decide"""
-    distance: Literal["mahalanobis", "decoupled", "euclidean"] = "mahalanobis"
+    distance: Distance = "mahalanobis"
     """confidence region with the full covariance, with the variances per axis only (eq. 8), or plain distance"""
     gate_probability: float = Field(0.999, ge=0, le=1)
     """share of a vehicle's own measurements that fall inside its gate"""
@@ -88,7 +89,7 @@ class TrackerSettings(Group):
     """s; correlation time of the acceleration"""
     speed: float = Field(4.0, gt=0)
     """object sizes/s; standard deviation of a new vehicle's unknown velocity"""
-    life: Literal["m-of-n", "llr"] = "m-of-n"
+    life: Life = "m-of-n"
     """what confirms a track: M hits within N scans, or its log-likelihood ratio (llr), which also ends it"""
     confirm_hits: int = Field(3, ge=1, le=63)
     """M: hits within the window that confirm a track, the first one counted"""

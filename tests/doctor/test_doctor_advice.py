@@ -12,7 +12,7 @@ from vidtrack.config import load
 from vidtrack.doctor.examine import examine
 from vidtrack.doctor.judge import judge
 from vidtrack.formats import read
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
 from vidtrack.score import evaluate
 from vidtrack.simulate import simulate
 from vidtrack.simulate.video_write import write_truth
@@ -207,7 +207,7 @@ def test_following_the_advice_helps(clip, whole, tmp_path, spoil, assignments):
 
 
 def idf1(source, folder, assignments):
-    with Run(source, load(assignments=assignments), folder / "out", force=True) as run:
+    with run_file(source, load(assignments=assignments), folder / "out", force=True) as run:
         for _ in run:
             pass
     return evaluate(read(folder / "out"), read(folder / "gt.txt"), iou=0.3)["idf1"]

@@ -237,7 +237,7 @@ def test_ahead_changes_nothing_and_says_what_predict_does(model):
 @pytest.mark.parametrize("kind", [ParticleBank, ErrorSignalBank])
 def test_the_seed_decides_and_threads_do_not(kind, monkeypatch):
     def run(seed, part):
-        monkeypatch.setattr("vidtrack.estimate.particle.PART", part)
+        monkeypatch.setattr("vidtrack.estimate.particle.BLOCK", part)
         bank = bank_of(kind, 10, number=300, seed=seed)
         for k in range(5):
             bank.predict(0.5)

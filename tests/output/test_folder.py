@@ -22,7 +22,6 @@ from vidtrack.output.folder import open_folder, open_run, replacing
 from vidtrack.output.linefile import LineFile
 from vidtrack.output.mot import MotFile
 from vidtrack.output.repair import repair
-from vidtrack.output.results import Results
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.traffic.lines import LineCounter, parse_line
@@ -154,23 +153,6 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
 def test_a_stopped_run_says_so(tmp_path):
     summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING)
     summary.close()
-    assert json.loads((tmp_path / "summary.json").read_text())["interrupted"] is True
-
-
-class Full:
-    """A sink whose last block does not fit on the disk."""
-
-    def step(self, step):
-        pass
-
-    def close(self):
-        raise StoppedEarly("cannot write tracks.csv: No space left on device")
-
-
-def test_a_run_whose_tables_cannot_be_ended_is_not_called_finished(tmp_path):
-    summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING)
-    with pytest.raises(StoppedEarly, match="No space"), Results(summary) as results:
-        results.add(Full())
     assert json.loads((tmp_path / "summary.json").read_text())["interrupted"] is True
 
 

@@ -7,10 +7,10 @@ from synthetic_steps import Kept
 import vidtrack as vt
 from vidtrack.config import load
 from vidtrack.errors import ConfigError
-from vidtrack.live.run import LiveRun
 from vidtrack.output.linked import Linked, _within
 from vidtrack.output.sink import Step
-from vidtrack.radar_run import RadarRun
+from vidtrack.run.live.run import LiveRun
+from vidtrack.run.radar import run_plots
 
 MODEL = vt.ConstantVelocity(accel=1.0, speed=4.0, hold_s=0.5, per_size=True)
 FPS = 10.0
@@ -138,7 +138,7 @@ def test_where_it_has_no_effect_it_is_refused(tmp_path):
         LiveRun("0", settings, tmp_path / "out")
     (tmp_path / "plots.csv").write_text("scan,time_s,x_m,y_m\n0,0,1,2\n1,1,2,3\n")
     with pytest.raises(ConfigError, match=r"output\.link .* radar"):
-        RadarRun(str(tmp_path / "plots.csv"), settings, tmp_path / "out")
+        run_plots(str(tmp_path / "plots.csv"), settings, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -133,6 +133,6 @@ def test_a_viewer_without_a_display_is_refused_at_once(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr("vidtrack.output.recorder._ADDRESS", ("127.0.0.1", 1))  # nobody listens there
+    monkeypatch.setattr("vidtrack.output.rerun_recording._ADDRESS", ("127.0.0.1", 1))  # nobody listens there
     with pytest.raises(OutputError, match=r"display.*FILE\.rrd"):
         RerunSink("spawn", SHAPE, Settings())

@@ -11,7 +11,8 @@ from click.testing import CliRunner
 
 from vidtrack.config import load
 from vidtrack.output import replay
-from vidtrack.radar_run import RadarRun
+from vidtrack.run.radar import run_plots
+from vidtrack.run.run import Extras
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 
@@ -32,7 +33,8 @@ def entities(path):
 def test_a_recording_holds_plots_tracks_and_decisions_in_metres(tmp_path, name, estimator):
     write_radar(simulate_radar(name, 1), tmp_path)
     settings = load(assignments=[f"radar.estimator={estimator}"])
-    with RadarRun(str(tmp_path / "plots.csv"), settings, tmp_path / "out", rerun=str(tmp_path / "a.rrd")) as run:
+    extras = Extras(rerun=str(tmp_path / "a.rrd"))
+    with run_plots(str(tmp_path / "plots.csv"), settings, tmp_path / "out", extras) as run:
         steps = list(run)
     wanted = {"/world/plots", "/world/tracks", "/world/gates", "/world/trails", "/world/radar"}
     assert wanted | {"/plots/count", "/log", "/settings"} <= entities(tmp_path / "a.rrd")
@@ -50,7 +52,7 @@ def test_view_shows_a_finished_radar_run(tmp_path):
     from vidtrack.cli.view import command
 
     write_radar(simulate_radar("radar-crossing", 2), tmp_path)
-    with RadarRun(str(tmp_path / "plots.csv"), load(), tmp_path / "out") as run:
+    with run_plots(str(tmp_path / "plots.csv"), load(), tmp_path / "out") as run:
         list(run)
     result = CliRunner().invoke(command, [str(tmp_path / "out"), "--save", str(tmp_path / "view.rrd")])
     assert result.exit_code == 0, result.output

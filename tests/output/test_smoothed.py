@@ -10,7 +10,7 @@ from vidtrack.config import Settings
 from vidtrack.output.mot import MotFile
 from vidtrack.output.sink import Step
 from vidtrack.output.smoothed import Smoothed, smoothed_by
-from vidtrack.radar_run import RadarRun
+from vidtrack.run.radar import run_plots
 
 
 def steps(count, there=lambda k: True, box=True):
@@ -98,7 +98,7 @@ def test_a_radar_run_is_smoothed(tmp_path):
     error = {}
     for smooth in (False, True):
         settings = Settings.model_validate({"output": {"smooth": smooth}})
-        with RadarRun(str(tmp_path / "plots.csv"), settings, tmp_path / f"run{smooth:d}") as run:
+        with run_plots(str(tmp_path / "plots.csv"), settings, tmp_path / f"run{smooth:d}") as run:
             for _ in run:
                 pass
         table = pyarrow.parquet.read_table(run.folder / "tracks.parquet")
@@ -112,4 +112,4 @@ def test_a_filter_whose_covariances_are_not_its_own_is_not_smoothed(tmp_path):
     (tmp_path / "plots.csv").write_text("scan,time_s,x_m,y_m\n0,0,1,2\n1,1,2,3\n")
     settings = Settings.model_validate({"output": {"smooth": True}, "radar": {"estimator": "alpha-beta"}})
     with pytest.raises(vt.ConfigError, match="alpha-beta"):
-        RadarRun(str(tmp_path / "plots.csv"), settings, tmp_path / "run")
+        run_plots(str(tmp_path / "plots.csv"), settings, tmp_path / "run")

@@ -5,7 +5,7 @@ import pytest
 
 from vidtrack.config import RadarSettings, load
 from vidtrack.radar.filters import motion
-from vidtrack.radar_pipeline import track_plots
+from vidtrack.run.radar import track_plots
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 

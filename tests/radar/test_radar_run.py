@@ -19,8 +19,8 @@ from vidtrack.cli.radar import command
 from vidtrack.config import Settings, TrackerSettings, load
 from vidtrack.errors import ConfigError, PlotFormatError
 from vidtrack.output.repair import repair
-from vidtrack.radar_pipeline import track_plots
-from vidtrack.radar_run import RadarRun
+from vidtrack.run.radar import run_plots, track_plots
+from vidtrack.run.run import Extras, Run
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 
@@ -41,8 +41,8 @@ def scenario(tmp_path_factory):
     return folder
 
 
-def run(folder, out, *assignments, **options):
-    with RadarRun(str(folder / "plots.csv"), load(assignments=assignments), out, **options) as result:
+def run(folder, out, *assignments, extras=None):
+    with run_plots(str(folder / "plots.csv"), load(assignments=assignments), out, extras) as result:
         for _ in result:
             pass
     return result.folder
@@ -58,7 +58,7 @@ def scores(out, folder, max_distance):
 
 
 def test_a_run_writes_what_it_promises(tmp_path, scenario):
-    out = run(scenario("radar-tws"), tmp_path / "out", decisions=True)
+    out = run(scenario("radar-tws"), tmp_path / "out", extras=Extras(decisions=True))
     names = {"tracks.csv", "tracks.parquet", "summary.json", "tracks.png", "decisions.csv"}
     assert {path.name for path in out.iterdir()} == names
     assert (out / "tracks.csv").read_text().splitlines()[0] == HEADER
@@ -177,14 +177,15 @@ def test_a_setting_that_does_not_exist_is_named(tmp_path):
 
 
 def test_interrupted_results_are_complete_and_valid(tmp_path, monkeypatch):
-    class Told(RadarRun):
-        def __iter__(self):
-            for scan, step in enumerate(super().__iter__()):
-                if scan == 50:
-                    signal.raise_signal(signal.SIGINT)
-                yield step
+    steps = Run.__iter__
 
-    monkeypatch.setattr("vidtrack.radar_run.RadarRun", Told)
+    def told(self):
+        for scan, step in enumerate(steps(self)):
+            if scan == 50:
+                signal.raise_signal(signal.SIGINT)
+            yield step
+
+    monkeypatch.setattr(Run, "__iter__", told)
     rows = [f"{k},{k},{1000 + k},{a},5,0.1" for k in range(200) for a in range(0, 360, 15)]
     path, out = write(tmp_path / "plots.csv", *rows), tmp_path / "out"
     with pytest.raises(click.Abort):  # the exit code is 130 then
@@ -200,7 +201,7 @@ def test_methods_by_strength_need_amplitudes_and_leave_no_folder(tmp_path, metho
     plots = tmp_path / "plots.csv"
     plots.write_text("scan,time_s,x_m,y_m,sigma_x_m,sigma_y_m\n0,0.0,1.0,2.0,5,5\n1,1.0,3.0,2.0,5,5\n")
     with pytest.raises(ConfigError, match=f"no amplitudes.* {method} chooses"):
-        RadarRun(str(plots), Settings(tracker=TrackerSettings(method=method)), tmp_path / "out")
+        run_plots(str(plots), Settings(tracker=TrackerSettings(method=method)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

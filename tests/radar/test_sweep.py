@@ -8,7 +8,7 @@ from vidtrack.config import load
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.sensors import RangeAzimuthElevation
 from vidtrack.radar.sweep import Sweep
-from vidtrack.radar_pipeline import track_plots
+from vidtrack.run.radar import track_plots
 
 PERIOD_S = 4.0
 

@@ -100,8 +100,8 @@ def test_limits(detection, clutter, method):
 
 @pytest.mark.parametrize("life", ["m-of-n", "llr"])
 def test_settings_name_the_rule(life):
-    from vidtrack.box_pipeline import build_blob_tracker
     from vidtrack.config import Settings
+    from vidtrack.run.trackers import build_blob_tracker
 
     settings = Settings.model_validate({"tracker": {"life": life, "false_track": 1e-5, "confirm_hits": 2}})
     found = build_blob_tracker(settings.tracker, (320, 240)).life

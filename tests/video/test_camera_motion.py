@@ -10,10 +10,10 @@ import pytest
 from drawn_tracks import drive
 
 from vidtrack import plane
-from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import BlobSettings, DetectorSettings, load
 from vidtrack.output.sink import Step
-from vidtrack.pipeline import build_detector, video_steps
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
 from vidtrack.traffic.lines import Line, LineCounter
 from vidtrack.video.background import create
 from vidtrack.video.background.camera import Camera

@@ -11,7 +11,7 @@ import pytest
 from vidtrack.config import Settings, SourceSettings, TrackerSettings, load
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.formats import read
-from vidtrack.run import Run
+from vidtrack.run.files import run_file
 from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.source import open_source
 
@@ -160,7 +160,7 @@ def traffic(path, score=lambda s: s):
 
 def result(path, output, *assignments):
     """(N, 6) frame, id and box of the tracks of a det.txt, by the table that a run writes."""
-    with Run(str(path), load(assignments=assignments), output) as run:
+    with run_file(str(path), load(assignments=assignments), output) as run:
         for _ in run:
             pass
     table = read(output)

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import dataclass
 
 import click
 
-from vidtrack.cli.options import common, settings_options, start_log
+from vidtrack.cli.options import WithSettings, common, receives, settings_options, start_log
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfigOptions(WithSettings):
+    """What `vidtrack config` is told."""
+
+    explain: bool
 
 
 @click.command(
@@ -20,25 +27,18 @@ Examples:
 @click.option("--explain", is_flag=True, help="Say what each setting does, in which unit and range.")
 @common("Folder for settings.toml.  [default: printed]")
 @settings_options
-def command(
-    explain: bool,
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    config_file: Path | None,
-    assignments: tuple[str, ...],
-) -> None:
+@receives(ConfigOptions)
+def command(options: ConfigOptions) -> None:
     """Print the effective settings as TOML, ready for --config. Settings that are None are commented out."""
-    from vidtrack.config import load
     from vidtrack.explain import as_toml
-    from vidtrack.output.folder import open_folder, writing
+    from vidtrack.output.folder import writing
 
-    start_log(verbose, quiet)
-    text = as_toml(load(config_file, assignments), explain=explain)
-    if output is None:
+    start_log(options.verbose, options.quiet)
+    text = as_toml(options.settings(), explain=options.explain)
+    folder = options.folder("config")
+    if folder is None:
         click.echo(text, nl=False)
         return
-    path = open_folder(output, "config", force) / "settings.toml"
+    path = folder / "settings.toml"
     with writing(path):
         path.write_text(text, encoding="utf-8")

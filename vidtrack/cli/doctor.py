@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
-from vidtrack.cli.options import announce_compiling, common, settings_options, start_log
+from vidtrack.cli.options import WithSettings, announce_compiling, common, receives, settings_options, start_log
 
 if TYPE_CHECKING:
     from vidtrack.doctor.advice import Advice
     from vidtrack.doctor.findings import Findings
 
 _FAILED = 1
-_SETTING = {"scale": "source.scale", "mask": "source.mask", "fps": "source.fps", "start": "source.start_s"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoctorOptions(WithSettings):
+    """What `vidtrack doctor` is told."""
+
+    source: str
+    seconds: float
+    scale: float | None
+    mask: Path | None
+    fps: float | None
+    start: float | None
+    json_to: str | None
 
 
 @click.command(
@@ -37,40 +50,27 @@ Examples:
 @click.option("--start", type=float, metavar="S", help="Begin at this time [s].")
 @json_option
 @common("Folder for doctor.json.  [default: only printed]")
-def command(
-    source: str,
-    seconds: float,
-    config_file: Path | None,
-    assignments: tuple[str, ...],
-    json_to: str | None,
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    **chosen: Any,
-) -> int:
+@receives(DoctorOptions)
+def command(options: DoctorOptions) -> int:
     """Look at SOURCE for some seconds: a video, an image folder or glob, a MOT det.txt, a camera or a stream.
 
     Measures rate, light, noise, flicker, shake, what moves, and whether this machine keeps up; says what will hurt a
     run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it gives no pictures.
     """
     from vidtrack.cli.hide import hide_arguments
-    from vidtrack.config import load
     from vidtrack.doctor.examine import examine
     from vidtrack.doctor.judge import judge
     from vidtrack.doctor.opening import kind_of
-    from vidtrack.output.folder import open_folder
     from vidtrack.video.live.address import secrets
 
-    hide_arguments(secrets(source))
-    start_log(verbose, quiet=not verbose)  # what is worth a warning is among the advice
-    given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
-    settings = load(config_file, [*assignments, *given], kind=kind_of(source))
-    announce_compiling(quiet)
-    folder = None if output is None else open_folder(output, "doctor", force)
-    findings = examine(source, settings, seconds)
+    hide_arguments(secrets(options.source))
+    start_log(options.verbose, quiet=not options.verbose)  # what is worth a warning is among the advice
+    settings = options.settings(kind_of(options.source))
+    announce_compiling(options.quiet)
+    folder = options.folder("doctor")
+    findings = examine(options.source, settings, options.seconds)
     advice = judge(findings, settings)
-    if deliver(_content(findings, advice), json_to, folder and folder / "doctor.json", quiet):
+    if deliver(_content(findings, advice), options.json_to, folder and folder / "doctor.json", options.quiet):
         _print_report(findings, advice)
     return _FAILED if any(one.problem for one in advice) else 0
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
-from vidtrack.cli.options import common, start_log
+from vidtrack.cli.options import Options, common, receives, start_log
 
 SECTIONS = {
     "counts": {
@@ -65,6 +66,20 @@ SECTIONS = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class EvalOptions(Options):
+    """What `vidtrack eval` is told."""
+
+    result: Path
+    truth: Path
+    json_to: str | None
+    iou: float
+    points: bool
+    max_distance: float | None
+    cutoff: float | None
+    order: float
+
+
 @click.command(
     name="eval",
     short_help="Score tracks against truth.",
@@ -83,20 +98,8 @@ Examples:
 @click.option("--max-distance", type=float, help="Positions match up to this distance.  [default: 20 px or 100 m]")
 @click.option("--cutoff", type=float, help="OSPA, GOSPA cutoff.  [default: 1 for boxes (1 - IoU), else --max-distance]")
 @click.option("--order", default=2.0, show_default=True, help="OSPA, GOSPA order p.")
-def command(
-    result: Path,
-    truth: Path,
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    json_to: str | None,
-    iou: float,
-    points: bool,
-    max_distance: float | None,
-    cutoff: float | None,
-    order: float,
-) -> None:
+@receives(EvalOptions)
+def command(options: EvalOptions) -> None:
     """Score RESULT (MOT text, CSV, Parquet or a run folder) against TRUTH (MOT gt.txt or CSV).
 
     Scores are fractions, not percent. Truth rows with conf 0 are ignored. Boxes are matched by
@@ -104,23 +107,23 @@ def command(
     the tracks table gives the consistency of the covariances (NIS, NEES).
     """
     from vidtrack import formats, score
-    from vidtrack.output.folder import open_folder
 
-    start_log(verbose, quiet)
-    folder = None if output is None else open_folder(output, "eval", force)
+    start_log(options.verbose, options.quiet)
+    result, truth = options.result, options.truth
+    folder = options.folder("eval")
     found = formats.read(result)
     states = formats.read_states(result) if result.is_dir() else None
     scores = score.evaluate(
         found,
         formats.read(truth),
-        iou=iou,
-        points=points,
-        max_distance=max_distance,
-        cutoff=cutoff,
-        order=order,
+        iou=options.iou,
+        points=options.points,
+        max_distance=options.max_distance,
+        cutoff=options.cutoff,
+        order=options.order,
         states=states,
     )
-    if deliver(scores, json_to, folder and folder / "scores.json", quiet):
+    if deliver(scores, options.json_to, folder and folder / "scores.json", options.quiet):
         _print_table(scores, f"{result.name} against {truth.name}")
 
 

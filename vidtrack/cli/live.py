@@ -6,24 +6,62 @@ import re
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from vidtrack.cli.options import announce_compiling, common, settings_options, start_log
-from vidtrack.cli.tracking import chosen_settings, tracking_options
+from vidtrack.cli.options import announce_compiling, common, receives, settings_options, start_log
+from vidtrack.cli.tracking import PictureOptions, picture_options
 
 if TYPE_CHECKING:
     from vidtrack.config import Settings
-    from vidtrack.live.outputs import Extras
     from vidtrack.output.status import LiveStatus
+    from vidtrack.run.live.outputs import LiveExtras
     from vidtrack.serve.page import Page
 
 _TELL_S = 60.0
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveOptions(PictureOptions):
+    """What `vidtrack live` is told."""
+
+    sources: tuple[str, ...]
+    every_frame: bool | None
+    roll: str | None
+    keeps: tuple[str, ...]
+    state: Path | None
+    record: Path | None
+    http: str | None
+    http_token: str | None
+
+    def given(self) -> list[str | tuple[str, Any]]:
+        """As ever, and --roll and --keep, whose units say what they are. Raises click.BadParameter."""
+        given = super().given()
+        if self.roll is not None:
+            given.append(amount("--roll", self.roll, {"live.roll_s": _SECONDS}))
+        units = {"live.keep_s": _SECONDS, "live.keep_bytes": _BYTES}
+        return [*given, *(amount("--keep", text, units) for text in self.keeps)]
+
+    def extras(self) -> LiveExtras:
+        """What is written beside the tables."""
+        from vidtrack.run.live.outputs import LiveExtras
+
+        return LiveExtras(self.rerun, self.video, self.save_masks, self.decisions, self.state, self.record)
+
+
+def amount(option: str, text: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, float]:
+    """The setting that the unit belongs to, and the amount in seconds or bytes. Raises click.BadParameter."""
+    match = re.fullmatch(r"(\d+\.?\d*) ?([a-zA-Z]+)", text)
+    for setting, factors in units.items():
+        if match and match[2] in factors:
+            return setting, float(match[1]) * factors[match[2]]
+    known = ", ".join(unit for factors in units.values() for unit in factors)
+    raise click.BadParameter(f"{text!r}: write a number and a unit, one of {known}", param_hint=option)
 
 
 @click.command(
@@ -37,8 +75,10 @@ Examples:
 @click.argument("sources", metavar="SOURCE...", nargs=-1, required=True)
 @common("Folder for the results.  [default: runs/NAME]")
 @settings_options
-@tracking_options
-@click.option("--every-frame", is_flag=True, help="Track every frame, and fall behind rather than drop one.")
+@picture_options
+@click.option(
+    "--every-frame", is_flag=True, default=None, help="Track every frame, and fall behind rather than drop one."
+)
 @click.option("--roll", metavar="TIME", help="Results go on in a new sub-folder after 10m, 1h, 1d, ...")
 @click.option("--keep", "keeps", multiple=True, metavar="TIME|SIZE", help="Delete the oldest: 7d or 10GB, or both.")
 @click.option("--state", type=click.Path(path_type=Path), metavar="FILE", help="Go on from this file, and save to it.")
@@ -51,24 +91,8 @@ Examples:
     show_envvar=True,
     help="The page's password; a must where other machines can see it.",
 )
-def command(
-    sources: tuple[str, ...],
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    config_file: Path | None,
-    assignments: tuple[str, ...],
-    rerun: str | None,
-    video: Path | None,
-    save_masks: Path | None,
-    decisions: bool,
-    state: Path | None,
-    record: Path | None,
-    http: str | None,
-    http_token: str | None,
-    **chosen: Any,
-) -> int:
+@receives(LiveOptions)
+def command(options: LiveOptions) -> int:
     """Track the vehicles that SOURCE sees: a camera's index, a V4L2 device, or an rtsp:// or http:// stream.
 
     Several SOURCEs, or a file cameras.toml that lists them, get a process and a sub-folder each.
@@ -84,53 +108,43 @@ def command(
     try:
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_many import are_many, track_many
-        from vidtrack.config import Input, load
-        from vidtrack.live.outputs import Extras
+        from vidtrack.config import Input
         from vidtrack.video.live.address import secrets
 
-        hidden = [text for source in sources for text in secrets(source)]
-        hide_arguments([*hidden, *([http_token] if http_token else [])])
-        start_log(verbose, quiet)
-        given: list[str | tuple[str, Any]] = [*assignments, *chosen_settings(chosen), *_live_settings(**chosen)]
-        settings = load(config_file, given, kind=Input.CAMERA)
-        announce_compiling(quiet)
-        extras = Extras(rerun, video, save_masks, decisions, state, record)
-        with _page(http, http_token) as page:
-            if page is not None and not quiet:
+        hidden = [text for source in options.sources for text in secrets(source)]
+        hide_arguments([*hidden, *([options.http_token] if options.http_token else [])])
+        start_log(options.verbose, options.quiet)
+        settings = options.settings(Input.CAMERA)
+        announce_compiling(options.quiet)
+        with _page(options.http, options.http_token) as page:
+            if page is not None and not options.quiet:
                 click.echo(f"vidtrack: the page is at {page.url}", err=True)
-            if are_many(sources):
-                log = partial(start_log, verbose, quiet)
-                return track_many(sources, output, extras, config_file, given, page, log, force=force, quiet=quiet)
-            _track_one(sources[0], settings, output, extras, page, force=force, quiet=quiet)
+            if are_many(options.sources):
+                return track_many(options, page)
+            _track_one(options, settings, page)
     except (KeyboardInterrupt, Terminated):
-        if not quiet:
+        if not options.quiet:
             click.echo("vidtrack: stopped before the end of the first picture, or at once", err=True)
     return 0
 
 
-def _track_one(
-    source: str,
-    settings: Settings,
-    output: Path | None,
-    extras: Extras,
-    page: Page | None,
-    *,
-    force: bool,
-    quiet: bool,
-) -> None:
+def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> None:
     from vidtrack.cli.signals import stopping
-    from vidtrack.live.run import LiveRun
+    from vidtrack.run.live.run import LiveRun
     from vidtrack.serve.camera import Camera
 
-    with LiveRun(source, settings, output, extras, force=force) as run, stopping(run.stop):
+    with (
+        LiveRun(options.sources[0], settings, options.output, options.extras(), force=options.force) as run,
+        stopping(run.stop),
+    ):
         if page is not None:
             page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
         told_s = time.monotonic()
         for _ in run:
-            if not quiet and time.monotonic() - told_s > _TELL_S:
+            if not options.quiet and time.monotonic() - told_s > _TELL_S:
                 told_s = time.monotonic()
                 click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
-        if not quiet:
+        if not options.quiet:
             click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
     click.echo(run.folder)
 
@@ -142,26 +156,6 @@ def _page(http: str | None, token: str | None) -> AbstractContextManager[Page | 
     from vidtrack.serve.page import Page
 
     return Page(http, token)
-
-
-def _live_settings(
-    every_frame: bool, roll: str | None, keeps: tuple[str, ...], **others: Any
-) -> list[tuple[str, float | bool]]:
-    """The options of this command that stand for a setting, as (name, value)."""
-    given: list[tuple[str, float | bool]] = [("live.every_frame", True)] if every_frame else []
-    if roll is not None:
-        given.append(("live.roll_s", _amount("--roll", roll, {"live.roll_s": _SECONDS})[1]))
-    return given + [_amount("--keep", text, {"live.keep_s": _SECONDS, "live.keep_bytes": _BYTES}) for text in keeps]
-
-
-def _amount(option: str, text: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, float]:
-    """The setting that the unit belongs to, and the amount in seconds or bytes. Raises click.BadParameter."""
-    match = re.fullmatch(r"(\d+\.?\d*) ?([a-zA-Z]+)", text)
-    for setting, factors in units.items():
-        if match and match[2] in factors:
-            return setting, float(match[1]) * factors[match[2]]
-    known = ", ".join(unit for factors in units.values() for unit in factors)
-    raise click.BadParameter(f"{text!r}: write a number and a unit, one of {known}", param_hint=option)
 
 
 def _line(status: LiveStatus) -> str:

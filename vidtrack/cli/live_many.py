@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from vidtrack.cli.options import start_log
+
 if TYPE_CHECKING:
-    from vidtrack.live.many import Many, Worker
-    from vidtrack.live.outputs import Extras
+    from vidtrack.cli.live import LiveOptions
+    from vidtrack.run.live.many import Many, Supervisor
     from vidtrack.serve.page import Page
 
 _TELL_S = 60.0
@@ -23,50 +26,40 @@ def are_many(sources: Sequence[str]) -> bool:
     return len(sources) > 1 or sources[0].lower().endswith(".toml")
 
 
-def track_many(
-    sources: Sequence[str],
-    output: Path | None,
-    extras: Extras,
-    config_file: Path | None,
-    assignments: Iterable[str | tuple[str, Any]],
-    page: Page | None,
-    start_log: Callable[[str], None],
-    *,
-    force: bool,
-    quiet: bool,
-) -> int:
+def track_many(options: LiveOptions, page: Page | None) -> int:
     """Track all until a signal; the exit code is 0 unless every camera failed by itself."""
     from vidtrack.cli.signals import stopping
-    from vidtrack.live.cameras import extras_of, listed, named, settings_of
-    from vidtrack.live.many import Many
-    from vidtrack.live.worker import Job
     from vidtrack.output.folder import open_run, usable
+    from vidtrack.run.live.cameras import extras_of, listed, named, settings_of
+    from vidtrack.run.live.many import Many
+    from vidtrack.run.live.worker import Job
 
     for_all: Mapping[str, Any] = {}
-    if len(sources) == 1:
-        cameras, for_all = listed(Path(sources[0]))
+    if len(options.sources) == 1:
+        cameras, for_all = listed(Path(options.sources[0]))
     else:
-        cameras = named(sources)
-    wanted = [(camera, settings_of(camera, for_all, config_file, assignments)) for camera in cameras]
-    own = [extras_of(camera, extras) for camera in cameras]
-    folder = open_run(None, "live", force) if output is None else usable(output)
+        cameras = named(options.sources)
+    wanted = [settings_of(camera, for_all, options.config_file, options.given()) for camera in cameras]
+    own = [extras_of(camera, options.extras()) for camera in cameras]
+    folder = open_run(None, "live", options.force) if options.output is None else usable(options.output)
+    log = partial(start_log, options.verbose, options.quiet)
     jobs = [
-        Job(camera.name, camera.address, settings, folder / camera.name, extra, force, start_log)
-        for (camera, settings), extra in zip(wanted, own, strict=True)
+        Job(camera.name, camera.address, settings, folder / camera.name, extras, options.force, log)
+        for camera, settings, extras in zip(cameras, wanted, own, strict=True)
     ]
     with Many(jobs, folder) as many, stopping(many.stop):
         if page is not None:
             _show(page, many)
         told_s = time.monotonic()
         while many.running(_LOOK_S):
-            if not quiet and time.monotonic() - told_s > _TELL_S:
+            if not options.quiet and time.monotonic() - told_s > _TELL_S:
                 told_s = time.monotonic()
-                for name, worker in many.workers.items():
-                    click.echo(f"{name}: {_line(worker)}", err=True)
-    if not quiet:
+                for name, supervisor in many.supervisors.items():
+                    click.echo(f"{name}: {_line(supervisor)}", err=True)
+    if not options.quiet:
         _print_table(many)
     click.echo(folder)
-    codes = [worker.exit_code or 0 for worker in many.workers.values() if worker.error]
+    codes = [supervisor.exit_code or 0 for supervisor in many.supervisors.values() if supervisor.error]
     return max(1, *codes) if len(codes) == len(jobs) else 0
 
 
@@ -75,17 +68,17 @@ def _show(page: Page, many: Many) -> None:
 
     page.show(
         {
-            name: Camera(worker.status, worker.picture, stale_s=2 * worker.job.settings.live.timeout_s)
-            for name, worker in many.workers.items()
+            name: Camera(supervisor.status, supervisor.picture, stale_s=2 * supervisor.job.settings.live.timeout_s)
+            for name, supervisor in many.supervisors.items()
         }
     )
 
 
-def _line(worker: Worker) -> str:
+def _line(supervisor: Supervisor) -> str:
     """A camera in one line."""
-    if worker.error is not None:
-        return f"ended: {worker.error}"
-    status = worker.status()
+    if supervisor.error is not None:
+        return f"ended: {supervisor.error}"
+    status = supervisor.status()
     if "frame" not in status:
         return str(status["state"])
     reading = status["reading"]

@@ -1,16 +1,91 @@
-"""Options that commands share."""
+"""Options that commands share, and the objects in which commands receive them."""
 
 from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+if TYPE_CHECKING:
+    from vidtrack.config import Input, Settings
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+Received = TypeVar("Received")
+
+SETTING = {
+    "method": "tracker.method",
+    "distance": "tracker.distance",
+    "detector": "detector.kind",
+    "estimator": "radar.estimator",
+    "model": "radar.model",
+    "start": "source.start_s",
+    "end": "source.end_s",
+    "scale": "source.scale",
+    "mask": "source.mask",
+    "fps": "source.fps",
+    "skip_bad_rows": "radar.skip_bad_rows",
+    "smooth": "output.smooth",
+    "link": "output.link",
+    "lines": "output.lines",
+    "every_frame": "live.every_frame",
+}
+"""Options that stand for a setting, in all commands."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What every command is told: see `common`."""
+
+    output: Path | None
+    force: bool
+    quiet: bool
+    verbose: int
+
+    def folder(self, name: str) -> Path | None:
+        """The folder that -o asks for, ready to write into; None without -o. Raises OutputError."""
+        from vidtrack.output.folder import open_folder
+
+        return None if self.output is None else open_folder(self.output, name, self.force)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithSettings(Options):
+    """A command that takes settings: --config, --set, and options that stand for one."""
+
+    config_file: Path | None
+    assignments: tuple[str, ...]
+
+    def given(self) -> list[str | tuple[str, Any]]:
+        """The settings on the command line: those of --set, then those that have an option of their own."""
+        own = {field.name for field in fields(self)} & SETTING.keys()
+        chosen = [(setting, getattr(self, name)) for name, setting in SETTING.items() if name in own]
+        listed = [(setting, list(value) if isinstance(value, tuple) else value) for setting, value in chosen]
+        return [*self.assignments, *((setting, value) for setting, value in listed if value not in (None, []))]
+
+    def settings(self, kind: Input | None = None, base: Mapping[str, Any] | None = None) -> Settings:
+        """All settings: see `config.load`. Raises ConfigError."""
+        from vidtrack.config import load
+
+        return load(self.config_file, self.given(), base, kind)
+
+
+def receives(kind: type[Received]) -> Callable[[Callable[[Received], Any]], Callable[..., Any]]:
+    """Hand a command all its parameters as one object, of a dataclass with their names."""
+
+    def decorate(function: Callable[[Received], Any]) -> Callable[..., Any]:
+        @wraps(function)
+        def command(**parameters: Any) -> Any:
+            return function(kind(**parameters))
+
+        return command
+
+    return decorate
 
 
 def common(output_help: str) -> Callable[[Function], Function]:
@@ -27,6 +102,16 @@ def common(output_help: str) -> Callable[[Function], Function]:
         return function
 
     return decorate
+
+
+def settings_options(function: Function) -> Function:
+    """--config and --set."""
+    function = click.option(
+        "--set", "assignments", multiple=True, metavar="A.B=VALUE", help="One setting; repeat for more."
+    )(function)
+    return click.option(
+        "--config", "config_file", type=click.Path(path_type=Path), metavar="FILE.toml", help="Settings from a file."
+    )(function)
 
 
 def seed_option(function: Function) -> Function:
@@ -62,52 +147,3 @@ def announce_compiling(quiet: bool) -> None:
 
     if not quiet and first_run():
         click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
-
-
-def _recording(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
-    """Check the value of --rerun: a misspelt "spawn" must not become the name of a file."""
-    if value is None or value in ("spawn", "serve") or value.endswith(".rrd"):
-        return value
-    raise click.BadParameter(f"{value!r} is not FILE.rrd, spawn or serve.")
-
-
-def association_options(function: Function) -> Function:
-    """--method, --distance, --rerun, --decisions: what tracking pictures and tracking plots have in common."""
-    for option in (
-        click.option("--decisions", is_flag=True, help="Write why each track got what it got."),
-        click.option(
-            "--rerun",
-            metavar="FILE.rrd|spawn|serve",
-            callback=_recording,
-            help="Record or show everything in rerun.",
-        ),
-        click.option(
-            "--distance",
-            type=click.Choice(["mahalanobis", "decoupled", "euclidean"]),
-            help="What decides which measurement is whose.  [default: mahalanobis]",
-        ),
-        click.option(
-            "--method",
-            type=click.Choice(["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"]),
-            help="Association.  [default: gnn]",
-        ),
-    ):
-        function = option(function)
-    return function
-
-
-def smooth_option(function: Function) -> Function:
-    """--smooth, for sources that end."""
-    return click.option(
-        "--smooth", is_flag=True, default=None, help="Let each row know what came after it; rows appear later."
-    )(function)
-
-
-def settings_options(function: Function) -> Function:
-    """--config and --set."""
-    function = click.option(
-        "--set", "assignments", multiple=True, metavar="A.B=VALUE", help="One setting; repeat for more."
-    )(function)
-    return click.option(
-        "--config", "config_file", type=click.Path(path_type=Path), metavar="FILE.toml", help="Settings from a file."
-    )(function)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
-from vidtrack.cli.options import common, seed_option, start_log
-from vidtrack.cli.radar_problem import problem_options
+from vidtrack.cli.options import common, receives, seed_option, start_log
+from vidtrack.cli.radar_problem import ProblemOptions, problem_options
 
 if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
     from vidtrack.radar.forecast import Forecast, Trial
 
 NAMES = {
@@ -23,6 +23,18 @@ NAMES = {
     "actual_all": "simulated, all runs",
     "actual_kept": "simulated, runs that never strayed",
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictOptions(ProblemOptions):
+    """What `vidtrack predict` is told."""
+
+    kind: Literal["psn", "pda"]
+    pfa: float
+    scans: int
+    runs: int | None
+    seed: int
+    json_to: str | None
 
 
 @click.command(
@@ -44,23 +56,8 @@ Examples:
 @common("Folder for prediction.png.  [default: no picture]")
 @seed_option
 @json_option
-def command(
-    kind: Literal["psn", "pda"],
-    snr_db: float,
-    q: float,
-    gate: float,
-    cell: float,
-    weibull: Weibull | None,
-    pfa: float,
-    scans: int,
-    runs: int | None,
-    output: Path | None,
-    seed: int,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    json_to: str | None,
-) -> None:
+@receives(PredictOptions)
+def command(options: PredictOptions) -> None:
     """Expected position error after each scan, sqrt(P11 + P33), in units of sqrt(r).
 
     A Swerling I target with nearly constant velocity in the plane, T = 1, begun by two points. psn: probabilistic
@@ -70,19 +67,19 @@ def command(
     With --runs a track counts as lost if its last error is above 20 (pda: 10), or the target was outside the gate
     in each of the last five scans.
     """
-    from vidtrack.cli.radar_problem import db_to_linear
     from vidtrack.detection.amplitude import RAYLEIGH
-    from vidtrack.output.folder import open_folder
     from vidtrack.radar.forecast import forecast, trial
 
-    start_log(verbose, quiet)
-    folder = None if output is None else open_folder(output, "predict", force)
-    outlook = forecast(kind, db_to_linear(snr_db), pfa, weibull or RAYLEIGH, q, gate, cell, scans)
-    tried = None if runs is None else trial(outlook, runs, seed)
+    start_log(options.verbose, options.quiet)
+    folder = options.folder("predict")
+    kind, pfa, clutter = options.kind, options.pfa, options.weibull or RAYLEIGH
+    outlook = forecast(kind, options.snr(), pfa, clutter, options.q, options.gate, options.cell, options.scans)
+    tried = None if options.runs is None else trial(outlook, options.runs, options.seed)
     if folder is not None:
         _plot(outlook, tried, folder / "prediction.png")
-    if deliver(_content(outlook, tried), json_to, None, quiet):
-        _print_table(outlook, tried, f"{kind} filter at {snr_db:g} dB, P_FA {pfa:g}, P_D {outlook.law.p_d:.4f}")
+    if deliver(_content(outlook, tried), options.json_to, None, options.quiet):
+        title = f"{kind} filter at {options.snr_db:g} dB, P_FA {pfa:g}, P_D {outlook.law.p_d:.4f}"
+        _print_table(outlook, tried, title)
 
 
 def _content(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:

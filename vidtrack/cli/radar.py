@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
 
 import click
 
-from vidtrack.cli.options import (
-    announce_compiling,
-    association_options,
-    common,
-    seed_option,
-    settings_options,
-    smooth_option,
-    start_log,
-)
+from vidtrack.cli.options import announce_compiling, common, receives, seed_option, settings_options, start_log
+from vidtrack.cli.tracking import TrackingOptions, association_options, choice, finish, smooth_option
+from vidtrack.settings import names
 
-_SETTING = {
-    "method": "tracker.method",
-    "distance": "tracker.distance",
-    "estimator": "radar.estimator",
-    "model": "radar.model",
-    "skip_bad_rows": "radar.skip_bad_rows",
-    "smooth": "output.smooth",
-}
+
+@dataclass(frozen=True, kw_only=True)
+class RadarOptions(TrackingOptions):
+    """What `vidtrack radar` is told."""
+
+    plots: str
+    seed: int
+    smooth: bool | None
+    estimator: str | None
+    model: str | None
+    skip_bad_rows: bool | None
 
 
 @click.command(
@@ -44,26 +40,15 @@ Examples:
 @smooth_option
 @click.option(
     "--estimator",
-    type=click.Choice(["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"]),
+    type=choice(names.Estimator),
     help="Filter of each track.  [default: kalman]",
 )
-@click.option("--model", type=click.Choice(["cv", "ca", "singer", "ct"]), help="How targets move.  [default: cv]")
+@click.option("--model", type=choice(names.Model), help="How targets move.  [default: cv]")
 @click.option(
     "--skip-bad-rows", is_flag=True, default=None, help="Leave out rows that cannot be right, and count them."
 )
-def command(
-    plots: str,
-    output: Path | None,
-    seed: int,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    config_file: Path | None,
-    assignments: tuple[str, ...],
-    rerun: str | None,
-    decisions: bool,
-    **chosen: Any,
-) -> None:
+@receives(RadarOptions)
+def command(options: RadarOptions) -> None:
     """Track the targets in PLOTS, a CSV or Parquet table with one row per plot.
 
     Columns: scan, time_s, and range_m, azimuth_deg[, elevation_deg] or x_m, y_m[, z_m]; optional: doppler_m_s,
@@ -71,21 +56,13 @@ def command(
     y north, z up. The results' folder is printed; it holds tracks.csv, tracks.parquet, summary.json and tracks.png.
     Ctrl-C ends with complete results up to then.
     """
-    from vidtrack.cli.progress import progress, tell_outcome
-    from vidtrack.cli.signals import Terminated, stoppable
-    from vidtrack.config import Input, load
-    from vidtrack.radar_run import RadarRun
+    from vidtrack.config import Input
+    from vidtrack.run.radar import run_plots
+    from vidtrack.run.run import Extras
 
-    start_log(verbose, quiet)
-    given = [(_SETTING[name], value) for name, value in chosen.items() if value is not None]
-    settings = load(config_file, [*assignments, *given], kind=Input.RADAR)
-    announce_compiling(quiet)
-    with RadarRun(plots, settings, output, force=force, rerun=rerun, decisions=decisions, seed=seed) as run:
-        try:
-            for _ in stoppable(progress(run, run.scans, run.name, quiet, unit="scan")):
-                pass  # the sinks have seen it
-        except (KeyboardInterrupt, Terminated):
-            click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
-            raise
-    tell_outcome(run.folder, quiet)
-    click.echo(run.folder)
+    start_log(options.verbose, options.quiet)
+    settings = options.settings(Input.RADAR)
+    announce_compiling(options.quiet)
+    extras = Extras(rerun=options.rerun, decisions=options.decisions)
+    run = run_plots(options.plots, settings, options.output, extras, force=options.force, seed=options.seed)
+    finish(run, options.quiet, unit="scan")

@@ -1,16 +1,63 @@
-"""Options with which `predict` and `threshold` state their problem."""
+"""Options that state a radar problem: the target, its surroundings, and how clutter is distributed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from vidtrack.cli.clutter import weibull_option
+from vidtrack.cli.options import Options
 from vidtrack.errors import ConfigError
 
+if TYPE_CHECKING:
+    from vidtrack.detection.amplitude import Weibull
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class _Clutter(click.ParamType):
+    """B,C as a Weibull distribution."""
+
+    name = "B,C"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Weibull:
+        from vidtrack.detection.amplitude import Weibull
+
+        try:
+            shape, rate = map(float, str(value).split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not two numbers B,C such as 1.5,0.693", param, ctx)
+        return Weibull(shape, rate)
+
+
+weibull_option = click.option(
+    "--weibull",
+    type=_Clutter(),
+    help="Radar: clutter amplitudes with P(a > t) = exp(-C t^B); 2,0.5 is receiver noise.",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProblemOptions(Options):
+    """See `problem_options`."""
+
+    snr_db: float
+    q: float
+    gate: float
+    cell: float
+    weibull: Weibull | None
+
+    def snr(self) -> float:
+        """The linear SNR. Raises ConfigError for one that is no number, or too high to mean anything."""
+        from math import isfinite
+
+        from vidtrack.detection.amplitude import linear
+
+        if not (isfinite(self.snr_db) and self.snr_db <= 100):
+            raise ConfigError(f"--snr-db is {self.snr_db:g}; it must be a number of at most 100")
+        return linear(self.snr_db)
 
 
 def problem_options(function: Function) -> Function:
@@ -24,14 +71,3 @@ def problem_options(function: Function) -> Function:
     ):
         function = option(function)
     return function
-
-
-def db_to_linear(db: float) -> float:
-    """A linear SNR. Raises ConfigError for one that is no number, or too high to mean anything."""
-    from math import isfinite
-
-    from vidtrack.detection.amplitude import linear
-
-    if not (isfinite(db) and db <= 100):
-        raise ConfigError(f"--snr-db is {db:g}; it must be a number of at most 100")
-    return linear(db)

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from vidtrack.cli.options import common, start_log
+from vidtrack.cli.options import Options, common, receives, start_log
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepairOptions(Options):
+    """What `vidtrack repair` is told."""
+
+    source: Path
 
 
 @click.command(
@@ -18,15 +26,10 @@ Examples:
   vidtrack repair /data/monday && vidtrack eval /data/monday gt.txt
   for run in runs/*; do vidtrack repair "$run"; done""",
 )
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("source", metavar="DIR", type=click.Path(path_type=Path))
 @common("Repair a copy in this folder and leave DIR as it is.  [default: DIR itself]")
-def command(
-    folder: Path,
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-) -> None:
+@receives(RepairOptions)
+def command(options: RepairOptions) -> None:
     """Rebuild tracks.parquet in DIR from tracks.csv, cut half-written lines, sort mot.txt and counts.csv.
 
     A killed run stays marked as interrupted in summary.json. A finished run is left as it is. Of a live run in
@@ -35,14 +38,15 @@ def command(
     from shutil import Error, copytree
 
     from vidtrack.errors import StoppedEarly
-    from vidtrack.live.keep import parts_of
     from vidtrack.output.folder import open_run, spare
     from vidtrack.output.repair import repair
+    from vidtrack.run.live.retention import parts_of
 
-    start_log(verbose, quiet)
-    if output is not None and folder.is_dir():
-        spare(folder, output)
-        copy = open_run(output, "repair", force)
+    start_log(options.verbose, options.quiet)
+    folder = options.source
+    if options.output is not None and folder.is_dir():
+        spare(folder, options.output)
+        copy = open_run(options.output, "repair", options.force)
         try:
             copytree(folder, copy, dirs_exist_ok=True)
         except Error as error:  # of all files that were not copied
@@ -50,5 +54,5 @@ def command(
         folder = copy
     for part in parts_of(folder) or [folder]:
         rows = repair(part)
-        if not quiet:
+        if not options.quiet:
             click.echo(f"{part}: {rows} rows in tracks.csv and tracks.parquet", err=True)

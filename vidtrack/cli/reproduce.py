@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from vidtrack.cli.options import common, seed_option, start_log
+from vidtrack.cli.options import Options, common, receives, seed_option, start_log
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReproduceOptions(Options):
+    """What `vidtrack reproduce` is told."""
+
+    names: tuple[str, ...]
+    seed: int
+    listed: bool
+    runs: int | None
 
 
 @click.command(
@@ -22,16 +33,8 @@ Examples:
 @seed_option
 @click.option("--list", "listed", is_flag=True, help="Show the names and what each one is, and do nothing.")
 @click.option("--runs", type=click.IntRange(min=1), metavar="N", help="Monte Carlo runs, or simulated videos.")
-def command(
-    names: tuple[str, ...],
-    output: Path | None,
-    seed: int,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    listed: bool,
-    runs: int | None,
-) -> None:
+@receives(ReproduceOptions)
+def command(options: ReproduceOptions) -> None:
     """Reproduce the papers' figures and tables, ours beside theirs; without a NAME all of them.
 
     Each writes NAME.png and NAME.csv and prints in one sentence what came out.
@@ -39,17 +42,18 @@ def command(
     from vidtrack.output.folder import open_folder
     from vidtrack.papers.registry import choose
 
-    start_log(verbose, quiet)
-    chosen = choose(names)
-    if listed:
+    start_log(options.verbose, options.quiet)
+    chosen = choose(options.names)
+    if options.listed:
         width = max(map(len, chosen))
         for name, experiment in chosen.items():
             click.echo(f"{name:{width}}  {experiment.title}")
         return
-    folder = open_folder(output or Path("reproduced"), "reproduced", force or output is None)
+    wanted, force = options.output or Path("reproduced"), options.force or options.output is None
+    folder = open_folder(wanted, "reproduced", force)
     for name, experiment in chosen.items():
-        if not quiet:
+        if not options.quiet:
             click.echo(f"{name} ...", err=True)
-        result = experiment.reproduce(runs, seed)
+        result = experiment.reproduce(options.runs, options.seed)
         result.write(folder, name)
         click.echo(f"{name}: {result.verdict}")

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from vidtrack.cli.clutter import weibull_option
-from vidtrack.cli.options import common, seed_option, start_log
+from vidtrack.cli.options import Options, common, receives, seed_option, start_log
+from vidtrack.cli.radar_problem import weibull_option
 
 if TYPE_CHECKING:
     from vidtrack.detection.amplitude import Weibull
@@ -34,6 +34,28 @@ class _Size(click.ParamType):
         if not (width.isdecimal() and height.isdecimal()):
             self.fail(f"{value!r} is not a size such as 1280x720", param, ctx)
         return int(width), int(height)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateOptions(Options):
+    """What `vidtrack simulate` is told."""
+
+    scenario: str
+    seed: int
+    fps: float | None
+    size: tuple[int, int] | None
+    noise: float
+    shake: float
+    light_steps: int
+    weather: str
+    light: str
+    wet: bool
+    leaves: float
+    clock: bool
+    snr_db: float | None
+    pfa: float | None
+    weibull: Weibull | None
+    glint: float | None
 
 
 @click.command(
@@ -72,9 +94,8 @@ Examples:
 )
 @weibull_option
 @click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
-def command(
-    scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, verbose: int, **chosen: Any
-) -> None:
+@receives(SimulateOptions)
+def command(options: SimulateOptions) -> None:
     """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a radar scenario
     as plots.csv and truth.csv.
 
@@ -92,44 +113,40 @@ def command(
     radar-crossing    two aircraft cross at a small angle in clutter
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     """
-    start_log(verbose, quiet)
-    _refuse_options_of(RADAR_ONLY if scenario in VIDEO else VIDEO_ONLY, scenario)
-    kind = {name: chosen[name] for name in (VIDEO_ONLY if scenario in VIDEO else RADAR_ONLY)}
-    if scenario in VIDEO:
-        _draw_video(scenario, output, seed, force, quiet, kind)
+    start_log(options.verbose, options.quiet)
+    is_video = options.scenario in VIDEO
+    _refuse_options_of(RADAR_ONLY if is_video else VIDEO_ONLY, options.scenario)
+    if is_video:
+        _draw_video(options)
     else:
-        _draw_plots(scenario, output, seed, force, **kind)
+        _draw_plots(options)
 
 
-def _draw_video(
-    scenario: str, output: Path | None, seed: int, force: bool, quiet: bool, options: dict[str, Any]
-) -> None:
+def _draw_video(options: SimulateOptions) -> None:
     from vidtrack.output.folder import open_folder
     from vidtrack.simulate import simulate, write
 
-    clip = simulate(scenario, seed=seed, **options)
-    folder = open_folder(output, scenario, force)
-    with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=quiet) as frames:
+    kind: dict[str, Any] = {name: getattr(options, name) for name in VIDEO_ONLY}
+    clip = simulate(options.scenario, seed=options.seed, **kind)
+    folder = open_folder(options.output, options.scenario, options.force)
+    with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=options.quiet) as frames:
         write(clip, folder, frames)
 
 
-def _draw_plots(
-    scenario: str,
-    output: Path | None,
-    seed: int,
-    force: bool,
-    *,
-    snr_db: float | None,
-    pfa: float | None,
-    weibull: Weibull | None,
-    glint: float | None,
-) -> None:
+def _draw_plots(options: SimulateOptions) -> None:
     from vidtrack.output.folder import open_folder
     from vidtrack.simulate.radar_scenarios import simulate_radar
     from vidtrack.simulate.radar_write import write_radar
 
-    seen = simulate_radar(scenario, seed, snr_db=snr_db, p_fa=pfa, clutter=weibull, glint=glint)
-    write_radar(seen, open_folder(output, scenario, force))
+    seen = simulate_radar(
+        options.scenario,
+        options.seed,
+        snr_db=options.snr_db,
+        p_fa=options.pfa,
+        clutter=options.weibull,
+        glint=options.glint,
+    )
+    write_radar(seen, open_folder(options.output, options.scenario, options.force))
 
 
 def _refuse_options_of(other_kind: tuple[str, ...], scenario: str) -> None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import click
 
 from vidtrack.cli.json_file import deliver, json_option
-from vidtrack.cli.options import common, start_log
-from vidtrack.cli.radar_problem import problem_options
-
-if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
+from vidtrack.cli.options import common, receives, start_log
+from vidtrack.cli.radar_problem import ProblemOptions, problem_options
 
 Numbers = dict[str, float | bool | None]
 
@@ -27,6 +23,16 @@ MEANING = {
     "error": "predicted steady-state position error, units of sqrt(r); none: it grows without bound",
     "clamped": "whether p_fa is the largest allowed",
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThresholdOptions(ProblemOptions):
+    """What `vidtrack threshold` is told."""
+
+    kind: str
+    cells: float | None
+    pfa_max: float
+    json_to: str | None
 
 
 @click.command(
@@ -44,21 +50,8 @@ Examples:
 @click.option("--cells", type=float, metavar="N", help="Resolution cells in the gate (pda).")
 @click.option("--pfa-max", default=1.0, show_default=True, help="Largest P_FA allowed.")
 @json_option
-def command(
-    kind: str,
-    snr_db: float,
-    q: float,
-    gate: float,
-    cell: float,
-    weibull: Weibull | None,
-    cells: float | None,
-    pfa_max: float,
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    json_to: str | None,
-) -> None:
+@receives(ThresholdOptions)
+def command(options: ThresholdOptions) -> None:
     """The P_FA that lets a filter learn most of a Swerling I target.
 
     pda: P_FA that maximises the information reduction factor q2 for --cells resolution cells in the gate, in closed
@@ -67,51 +60,52 @@ def command(
     --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
     strongest neighbour filter.
     """
-    from vidtrack.cli.radar_problem import db_to_linear
-    from vidtrack.detection.amplitude import RAYLEIGH
     from vidtrack.errors import ConfigError
-    from vidtrack.output.folder import open_folder
+
+    start_log(options.verbose, options.quiet)
+    folder = options.folder("threshold")
+    snr = options.snr()
+    if not 0 < options.pfa_max <= 1:
+        raise ConfigError(f"--pfa-max is {options.pfa_max}; it must lie above 0 and up to 1")
+    numbers = _of_pda(options, snr) if options.kind == "pda" else _of_psn(options, snr)
+    if deliver(numbers, options.json_to, folder and folder / "threshold.json", options.quiet):
+        _print_table(numbers, f"{options.kind} filter at {options.snr_db:g} dB")
+
+
+def _of_psn(options: ThresholdOptions, snr: float) -> Numbers:
+    from vidtrack.detection.amplitude import RAYLEIGH
     from vidtrack.radar.prediction import normalised
     from vidtrack.radar.psn_threshold import best_psn_threshold
 
-    start_log(verbose, quiet)
-    folder = None if output is None else open_folder(output, "threshold", force)
-    snr = db_to_linear(snr_db)
-    if not 0 < pfa_max <= 1:
-        raise ConfigError(f"--pfa-max is {pfa_max}; it must lie above 0 and up to 1")
-    numbers: Numbers
-    if kind == "pda":
-        numbers = _of_pda(snr, cells, pfa_max, gate, weibull)
-    else:
-        best = best_psn_threshold(normalised(q, gate, cell), snr, weibull or RAYLEIGH, pfa_max)
-        numbers = {
-            "p_fa": best.p_fa,
-            "p_fa_one_percent": best.p_fa_one_percent,
-            "p_d": best.p_d,
-            "error": best.error,
-            "clamped": True,
-        }
-    if deliver(numbers, json_to, folder and folder / "threshold.json", quiet):
-        _print_table(numbers, f"{kind} filter at {snr_db:g} dB")
+    problem = normalised(options.q, options.gate, options.cell)
+    best = best_psn_threshold(problem, snr, options.weibull or RAYLEIGH, options.pfa_max)
+    return {
+        "p_fa": best.p_fa,
+        "p_fa_one_percent": best.p_fa_one_percent,
+        "p_d": best.p_d,
+        "error": best.error,
+        "clamped": True,
+    }
 
 
-def _of_pda(snr: float, cells: float | None, pfa_max: float, gate: float, weibull: Weibull | None) -> Numbers:
+def _of_pda(options: ThresholdOptions, snr: float) -> Numbers:
     from vidtrack.detection.amplitude import detection_probability
     from vidtrack.detection.reduction import KE_GATE, q2
     from vidtrack.detection.threshold import closed_form, optimum
     from vidtrack.errors import ConfigError
 
+    cells = options.cells
     if cells is None or not LEAST_CELLS <= cells <= MOST_CELLS:
         raise ConfigError(
             f"--cells is {cells}; give the number of resolution cells in the gate, {LEAST_CELLS:g}..{MOST_CELLS:g}"
         )
-    if gate != KE_GATE or weibull is not None:
+    if options.gate != KE_GATE or options.weibull is not None:
         raise ConfigError("the threshold of pda holds for a gate of 4 and Rayleigh clutter; leave --gate and --weibull")
-    p_fa, clamped = closed_form(snr, cells, pfa_max)
+    p_fa, clamped = closed_form(snr, cells, options.pfa_max)
     p_d = detection_probability(p_fa, snr)
     return {
         "p_fa": float(p_fa),
-        "p_fa_exact": float(optimum(snr, cells, pfa_max)),
+        "p_fa_exact": float(optimum(snr, cells, options.pfa_max)),
         "p_d": float(p_d),
         "q2": float(q2(p_d, cells * p_fa)),
         "clamped": bool(clamped),

@@ -1,16 +1,52 @@
-"""Options of all commands that turn pictures into tracks."""
+"""Options of all commands that track."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import click
 
-from vidtrack.cli.options import association_options
+from vidtrack.cli.options import WithSettings
+from vidtrack.settings import names
+
+if TYPE_CHECKING:
+    from vidtrack.run.run import Run
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackingOptions(WithSettings):
+    """See `association_options`."""
+
+    method: str | None
+    distance: str | None
+    rerun: str | None
+    decisions: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureOptions(TrackingOptions):
+    """See `picture_options`."""
+
+    detector: str | None
+    video: Path | None
+    save_masks: Path | None
+    lines: tuple[str, ...]
+    start: float | None
+    end: float | None
+    scale: float | None
+    mask: Path | None
+
+
+def _recording(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
+    """Check the value of --rerun: a misspelt "spawn" must not become the name of a file."""
+    if value is None or value in ("spawn", "serve") or value.endswith(".rrd"):
+        return value
+    raise click.BadParameter(f"{value!r} is not FILE.rrd, spawn or serve.")
 
 
 def _mp4(_context: click.Context, _option: click.Parameter, value: Path | None) -> Path | None:
@@ -20,10 +56,36 @@ def _mp4(_context: click.Context, _option: click.Parameter, value: Path | None) 
     raise click.BadParameter(f"the annotated video is an MP4; name it {value.stem or 'FILE'}.mp4, not {value}.")
 
 
+def choice(kind: Any) -> click.Choice:
+    """One of the names in a Literal."""
+    return click.Choice(get_args(kind))
+
+
+def association_options(function: Function) -> Function:
+    """--method, --distance, --rerun, --decisions: what tracking pictures and tracking plots have in common."""
+    for option in (
+        click.option("--decisions", is_flag=True, help="Write why each track got what it got."),
+        click.option(
+            "--rerun",
+            metavar="FILE.rrd|spawn|serve",
+            callback=_recording,
+            help="Record or show everything in rerun.",
+        ),
+        click.option(
+            "--distance",
+            type=choice(names.Distance),
+            help="What decides which measurement is whose.  [default: mahalanobis]",
+        ),
+        click.option("--method", type=choice(names.Method), help="Association.  [default: gnn]"),
+    ):
+        function = option(function)
+    return function
+
+
 _OPTIONS = (
     click.option(
         "--detector",
-        type=click.Choice(["disturbance", "paper", "mog2", "knn"]),
+        type=choice(names.Detector),
         help="How vehicles are told from the scene.  [default: disturbance]",
     ),
     click.option(
@@ -50,28 +112,31 @@ _OPTIONS = (
 )
 
 
-def tracking_options(function: Function) -> Function:
+def picture_options(function: Function) -> Function:
     """--method, --distance, --detector, --rerun, --video, --save-masks, --line, --decisions, --start, --end, ..."""
     for option in reversed(_OPTIONS):
         function = option(function)
     return association_options(function)
 
 
-_SETTING = {
-    "method": "tracker.method",
-    "distance": "tracker.distance",
-    "detector": "detector.kind",
-    "start": "source.start_s",
-    "end": "source.end_s",
-    "scale": "source.scale",
-    "mask": "source.mask",
-    "fps": "source.fps",
-    "smooth": "output.smooth",
-    "link": "output.link",
-}
+def smooth_option(function: Function) -> Function:
+    """--smooth, for sources that end."""
+    return click.option(
+        "--smooth", is_flag=True, default=None, help="Let each row know what came after it; rows appear later."
+    )(function)
 
 
-def chosen_settings(chosen: dict[str, Any]) -> list[tuple[str, Any]]:
-    """The options that stand for a setting, as (name, value)."""
-    given = [(_SETTING[name], chosen[name]) for name in _SETTING if chosen.get(name) is not None]
-    return given + ([("output.lines", list(chosen["lines"]))] if chosen["lines"] else [])
+def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") -> None:
+    """Let a run over a file go to its end, and tell what it found; `none` is said where there are no tracks."""
+    from vidtrack.cli.progress import progress, tell_outcome
+    from vidtrack.cli.signals import Terminated, stoppable
+
+    with run:
+        try:
+            for _ in stoppable(progress(run, run.count, run.name, quiet, unit)):
+                pass  # the sinks have seen it
+        except (KeyboardInterrupt, Terminated):
+            click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
+            raise
+    tell_outcome(run.folder, quiet, none)
+    click.echo(run.folder)

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
-from vidtrack.cli.options import common, start_log
+from vidtrack.cli.options import Options, common, receives, start_log
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewOptions(Options):
+    """What `vidtrack view` is told."""
+
+    run: Path
+    save: str | None
+    video: bool
 
 
 @click.command(
@@ -22,35 +32,28 @@ Examples:
 @common("Folder for a recording view.rrd, instead of starting the viewer.")
 @click.option("--save", metavar="FILE.rrd", help="Write a recording instead of starting the viewer.")
 @click.option("--video/--no-video", default=True, help="Show the pictures of the source, if it is still there.")
-def command(
-    run: Path,
-    output: Path | None,
-    force: bool,
-    quiet: bool,
-    verbose: int,
-    save: str | None,
-    video: bool,
-) -> None:
+@receives(ViewOptions)
+def command(options: ViewOptions) -> None:
     """Show the tracks of the folder RUN over its video, over the background in tracks.png without one, or, of a radar's
     run, in metres.
 
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
     while tracking, with --rerun.
     """
-    start_log(verbose, quiet)  # before rerun, which starts its own log
+    start_log(options.verbose, options.quiet)  # before rerun, which starts its own log
     from contextlib import ExitStack, closing
 
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
-    from vidtrack.output.folder import open_folder
     from vidtrack.output.rerun import RerunSink
     from vidtrack.output.rerun_radar import RadarRerun
     from vidtrack.traffic.lines import parse_lines
     from vidtrack.video.source import open_source
 
-    finished = replay.read_run(run)
-    if output is not None and save is None:
-        save = str(open_folder(output, "view", force) / "view.rrd")
+    finished = replay.read_run(options.run)
+    save = options.save
+    if save is None and (folder := options.folder("view")) is not None:
+        save = str(folder / "view.rrd")
     if finished.shape is None:
         with closing(RadarRerun(save or "spawn", finished.settings)) as radar:
             for step in replay.steps(finished):
@@ -61,12 +64,12 @@ def command(
     with ExitStack() as stack:
         sink = stack.enter_context(closing(RerunSink(save or "spawn", finished.shape, finished.settings, lines)))
         frames = None
-        if video:
+        if options.video:
             try:
                 frames = stack.enter_context(open_source(finished.source, finished.settings.source))
             except SourceError as error:
                 click.echo(f"vidtrack: {error}; the background of tracks.png is shown instead", err=True)
         if frames is None:
-            sink.background(replay.background(run, finished.shape))
+            sink.background(replay.background(options.run, finished.shape))
         for step in replay.steps(finished, frames):
             sink.step(step)

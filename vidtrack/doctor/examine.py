@@ -8,13 +8,13 @@ from time import perf_counter
 
 import numpy as np
 
-from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import Settings
 from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.objects import ObjectMeter, finer
 from vidtrack.doctor.opening import is_live, looked_at, open_pictures
 from vidtrack.errors import SourceError
-from vidtrack.pipeline import build_detector, video_steps
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.frame import Frame

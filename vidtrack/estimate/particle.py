@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from vidtrack.errors import ConfigError
+from vidtrack.estimate.blocks import in_blocks
 from vidtrack.estimate.model import Motion
 from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
-from vidtrack.estimate.parts import in_parts
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
 from vidtrack.rows import starts
 from vidtrack.scan import Decision, Floats, Ints, Scan
 
-PART = 50_000
-"""Particles in a part: enough that a thread of its own pays."""
+BLOCK = 50_000
+"""Particles in a block: enough that a thread of its own pays."""
 
 
 class Glint(NamedTuple):
@@ -117,15 +117,15 @@ class ParticleBank:
         weight, log_weight = np.empty((rows, self.number)), np.empty((rows, self.number))
         x, P = _empty(rows, self.model.states)
 
-        def work(part: slice) -> None:
+        def work(block: slice) -> None:
             weigh(seen.shape[2], sensor.angles)(
                 self.log_weight, seen, scan.z, scan.R,
-                parent[part], start[part.start : part.stop + 1], decision.measurement, decision.beta,
-                decision.beta0[part], decision.spread, *self.glint, weight[part], log_weight[part],
+                parent[block], start[block.start : block.stop + 1], decision.measurement, decision.beta,
+                decision.beta0[block], decision.spread, *self.glint, weight[block], log_weight[block],
             )  # fmt: skip
-            moments(self.model.states)(weight[part], self.particles, parent[part], x[part], P[part])
+            moments(self.model.states)(weight[block], self.particles, parent[block], x[block], P[block])
 
-        in_parts(rows, self._part, work)
+        in_blocks(rows, self._block, work)
         self.particles = self._chosen(decision, start, scan, sensor, seen, weight, log_weight)
         self.log_weight = log_weight
         self._moments = x, P
@@ -169,18 +169,18 @@ class ParticleBank:
         chosen = np.empty((len(weight), *self.particles.shape[1:]))
         stream = self._streams(len(weight))
 
-        def work(part: slice) -> None:
+        def work(block: slice) -> None:
             resample(
-                int(self.resampling), self.threshold, weight[part], self.particles, decision.parent[part],
-                stream[part], log_weight[part], chosen[part],
+                int(self.resampling), self.threshold, weight[block], self.particles, decision.parent[block],
+                stream[block], log_weight[block], chosen[block],
             )  # fmt: skip
 
-        in_parts(len(weight), self._part, work)
+        in_blocks(len(weight), self._block, work)
         return chosen
 
     @property
-    def _part(self) -> int:
-        return max(1, PART // self.number)
+    def _block(self) -> int:
+        return max(1, BLOCK // self.number)
 
     def _streams(self, rows: int) -> np.ndarray:
         return self.rng.integers(2**64, size=rows, dtype=np.uint64)
@@ -197,7 +197,7 @@ class ParticleBank:
         rows, n = len(particles), self.model.states
         each = np.broadcast_to(F.reshape(-1, 1 if len(F) == 1 else self.number, n, n), (rows, self.number, n, n))
         stream = self._streams(rows)
-        in_parts(rows, self._part, lambda part: move(n)(particles[part], each[part], Q[part], stream[part]))
+        in_blocks(rows, self._block, lambda block: move(n)(particles[block], each[block], Q[block], stream[block]))
 
     def _seen(self, sensor: Sensor) -> Floats:
         """(T, N, m) what the sensor would see of each particle."""
@@ -216,10 +216,10 @@ class ParticleBank:
         mean, cov = _empty(rows, c)
         everyone = np.arange(rows)
 
-        def work(part: slice) -> None:
-            moments(c)(np.exp(self.log_weight[part]), particles, everyone[part], mean[part], cov[part])
+        def work(block: slice) -> None:
+            moments(c)(np.exp(self.log_weight[block]), particles, everyone[block], mean[block], cov[block])
 
-        in_parts(rows, self._part, work)
+        in_blocks(rows, self._block, work)
         return mean, cov
 
 

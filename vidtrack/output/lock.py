@@ -15,7 +15,7 @@ if sys.platform != "win32":
 
 
 @contextmanager
-def alone(path: Path) -> Iterator[None]:
+def exclusive(path: Path) -> Iterator[None]:
     """Keep other runs out of a folder that exists, or off a file; the system opens it again even after a kill.
 
     A file's lock is on FILE.lock beside it, for the file itself is replaced when it is written. Where locks are

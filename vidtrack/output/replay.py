@@ -22,7 +22,7 @@ _NO_BLOBS = (np.empty((0, 2)), np.eye(2))
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class FinishedRun:
     """A run folder's contents.
 
     source    name of the input
@@ -37,14 +37,14 @@ class Run:
     table: pa.Table
 
 
-def read_run(folder: Path) -> Run:
+def read_run(folder: Path) -> FinishedRun:
     """Read a run folder. Raises FormatError when it has no tracks.csv or summary.json, or a damaged one."""
     table = read_tracks(folder / "tracks.csv")
     path = folder / "summary.json"
     try:
         summary = json.loads(path.read_text())
         shape = None if "scan" in table.column_names else (int(summary["height"]), int(summary["width"]))
-        return Run(folder, summary["source"], shape, parse(summary["settings"]), table)
+        return FinishedRun(folder, summary["source"], shape, parse(summary["settings"]), table)
     except FileNotFoundError:
         raise FormatError(f"{folder} is not a run: it has no summary.json") from None
     except (json.JSONDecodeError, KeyError, TypeError) as error:
@@ -60,7 +60,7 @@ def background(folder: Path, shape: tuple[int, int]) -> Image:
     return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def steps(run: Run, frames: Iterable[Frame] | None = None) -> Iterator[Step]:
+def steps(run: FinishedRun, frames: Iterable[Frame] | None = None) -> Iterator[Step]:
     """The run step by step: the source's frames, or without them all of the table from its first to its last."""
     columns = {name: run.table[name].to_numpy() for name in run.table.column_names}
     statuses = {status.name.lower(): status for status in Status}

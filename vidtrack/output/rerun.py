@@ -10,14 +10,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from vidtrack.config import Settings
-from vidtrack.output.recorder import Recorder, colours, gates
+from vidtrack.output.rerun_recording import RerunRecording, colours, gates
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Scan, Status, Tracks
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
 
-class RerunSink(Recorder):
+class RerunSink(RerunRecording):
     """Sink that records pictures, masks, blobs, tracks, gates, trails, lives, times and decisions.
 
     target  FILE.rrd, "spawn" or "serve"

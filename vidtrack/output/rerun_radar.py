@@ -10,12 +10,12 @@ import rerun.blueprint as rrb
 
 from vidtrack.config import Settings
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.output.recorder import Recorder, colours, gates
+from vidtrack.output.rerun_recording import RerunRecording, colours, gates
 from vidtrack.output.sink import Step
 from vidtrack.scan import Floats, Status, Tracks
 
 
-class RadarRerun(Recorder):
+class RadarRerun(RerunRecording):
     """Sink that records plots, tracks, gates, trails, lives, times and decisions, with the radar in its place.
 
     target  FILE.rrd, "spawn" or "serve"; the last two reach the own machine only

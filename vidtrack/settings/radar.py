@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from vidtrack.settings.group import Group
+from vidtrack.settings.names import Estimator, Life, Model, Resampling
 
 
 class RadarSettings(Group):
@@ -26,9 +25,9 @@ class RadarSettings(Group):
     """m/s; the same of a range rate"""
     skip_bad_rows: bool = False
     """rows that cannot be right are left out and counted; false: they end the run"""
-    estimator: Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"] = "kalman"
+    estimator: Estimator = "kalman"
     """kalman, converted: plots become unbiased positions; ekf, ukf, particle: range and angles stay; imm: two models"""
-    model: Literal["cv", "ca", "singer", "ct"] = "cv"
+    model: Model = "cv"
     """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
     detection_probability: float | None = Field(0.9, gt=0, lt=1)
     """probability that a scan shows a target; None: from the tracks so far"""
@@ -48,13 +47,13 @@ class RadarSettings(Group):
     """s; mean time that imm's other mode lasts"""
     particles: int = Field(2000, ge=2)
     """samples of each track in the particle filter"""
-    resampling: Literal["none", "multinomial", "residual", "stratified", "systematic", "error-signal"] = "systematic"
+    resampling: Resampling = "systematic"
     """how particles are resampled; none: never; error-signal: near the plot (paper 003)"""
     glint: float = Field(0.0, ge=0, lt=1)
     """share of a plot's errors that are five times as large, for the particle filter"""
     euclidean_radius_m: float = Field(2000.0, gt=0)
     """m; gate of the euclidean distance"""
-    life: Literal["m-of-n", "llr"] = "llr"
+    life: Life = "llr"
     """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
     coast_scans: int = Field(5, ge=1, le=62)
     """a track is given up after this many scans without a plot"""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field, field_validator
 
 from vidtrack.settings.group import Group
+from vidtrack.settings.names import Detector
 
 
 class DisturbanceSettings(Group):
@@ -79,7 +78,7 @@ class PaperSettings(Group):
 
 
 class DetectorSettings(Group):
-    kind: Literal["disturbance", "paper", "mog2", "knn"] = "disturbance"
+    kind: Detector = "disturbance"
     """how the foreground is found"""
     disturbance: DisturbanceSettings = DisturbanceSettings()
     paper: PaperSettings = PaperSettings()

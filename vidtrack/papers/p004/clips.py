@@ -10,10 +10,10 @@ import av
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from vidtrack.box_pipeline import build_blob_tracker
 from vidtrack.config import DetectorSettings, Settings, TrackerSettings
 from vidtrack.papers import style
-from vidtrack.pipeline import build_detector, video_steps
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
 from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
 from vidtrack.simulate import Clip
 from vidtrack.video.blobs import find_blobs

@@ -37,7 +37,18 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 class Disturbance:
     """The scene learnt from what is not traffic, and the map of what differs from it."""
 
-    STATE = ("_view", "_change", "_camera", "_scene", "_time_s", "_start_s", "_frames", "_contrast", "_veil", "_sunlight")
+    STATE = (
+        "_view",
+        "_change",
+        "_camera",
+        "_scene",
+        "_time_s",
+        "_start_s",
+        "_frames",
+        "_contrast",
+        "_veil",
+        "_sunlight",
+    )
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings

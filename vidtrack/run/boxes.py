@@ -1,0 +1,41 @@
+"""Stored detections become tracks: each box of the file is one whole object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+
+from vidtrack.config import Settings
+from vidtrack.output.confirmed import HOLD_S
+from vidtrack.output.folder import spare
+from vidtrack.run.run import Extras, Pipeline
+from vidtrack.run.sinks import file_sinks, file_subject
+from vidtrack.run.steps import scan_steps
+from vidtrack.run.trackers import build_box_tracker
+from vidtrack.video.detections import open_detections
+
+
+@contextmanager
+def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipeline]:
+    """A MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
+    boxes = open_detections(path, settings)
+    spare(boxes.place, extras.masks, extras.video)
+    tracker = build_box_tracker(
+        settings.tracker,
+        boxes.settings,
+        (boxes.width, boxes.height),
+        pace=boxes.pace,
+        explain=extras.explain,
+        smooth=settings.output.smooth,
+    )
+    subject = file_subject(path, boxes, tracker, settings, scene=None)
+    link_s = None if settings.output.link is False else settings.output.link_s * boxes.pace
+    yield Pipeline(
+        name=boxes.name,
+        place=boxes.place,
+        count=boxes.frames,
+        steps=scan_steps(((index, scan) for index, _, scan in boxes), tracker, settings.tracker.redundant),
+        summary=subject.summary,
+        sinks=partial(file_sinks, subject, extras, motion=tracker.model, link_s=link_s, hold_s=HOLD_S),
+    )

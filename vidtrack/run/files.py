@@ -1,0 +1,19 @@
+"""A run over a file with pictures or boxes, whichever it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vidtrack.config import Settings
+from vidtrack.run.boxes import box_pipeline
+from vidtrack.run.run import Extras, Run
+from vidtrack.run.video import video_pipeline
+from vidtrack.video.detections import is_detections
+
+
+def run_file(
+    source: str, settings: Settings, output: Path | None = None, extras: Extras | None = None, *, force: bool = False
+) -> Run:
+    """A run over a video file, image folder or glob, MOT det.txt, or a recording of a live run. Raises as Run."""
+    pipeline = box_pipeline if is_detections(source) else video_pipeline
+    return Run(pipeline(source, settings, extras or Extras()), output, force=force)

@@ -1,0 +1,109 @@
+"""Several cameras: given one by one, or listed in a TOML file with settings of their own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from vidtrack.config import Input, Settings, load, merged
+from vidtrack.errors import ConfigError
+from vidtrack.run.live.outputs import LiveExtras
+from vidtrack.toml_file import read_toml
+from vidtrack.video.live.address import redact
+
+_CAMERAS, _ADDRESS = "camera", "address"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One of several.
+
+    name      of its folder, and on the page
+    address   what a live run opens; it may hold a password
+    settings  its own ones, nested, above those of all
+    """
+
+    name: str
+    address: str
+    settings: Mapping[str, Any]
+
+
+def listed(path: Path) -> tuple[list[Entry], dict[str, Any]]:
+    """The cameras of a file, and the settings in it that hold for all.
+
+    Each table [camera.NAME] has an `address` and any settings; the rest of the file are settings for all cameras.
+    Raises ConfigError for a file that cannot be read, or lists none.
+    """
+    tree = read_toml(path, "the list of cameras")
+    tables = tree.pop(_CAMERAS, {})
+    if not isinstance(tables, dict) or not tables:
+        raise ConfigError(f"{path} lists no camera; give each a table [{_CAMERAS}.NAME] with its {_ADDRESS}")
+    return [_camera(path, name, table) for name, table in tables.items()], tree
+
+
+def named(addresses: Iterable[str]) -> list[Entry]:
+    """Cameras under names made of their addresses, all different."""
+    cameras: list[Entry] = []
+    for address in addresses:
+        wanted = _as_folder(_name(address))
+        names = (wanted if number == 1 else f"{wanted}-{number}" for number in count(1))
+        taken = {camera.name for camera in cameras}
+        cameras.append(Entry(next(name for name in names if name not in taken), address, {}))
+    return cameras
+
+
+def settings_of(
+    camera: Entry, base: Mapping[str, Any], path: Path | None, assignments: Iterable[str | tuple[str, Any]]
+) -> Settings:
+    """Of all cameras, above them its own, above them --config and --set. Raises ConfigError, naming the camera."""
+    try:
+        return load(path, assignments, merged(base, camera.settings), Input.CAMERA)
+    except ConfigError as error:
+        raise ConfigError(f"camera {camera.name}: {error}") from None
+
+
+def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:
+    """Places for one camera: into folders goes one with its name, files get it before their ending."""
+    if extras.rerun in ("spawn", "serve"):
+        raise ConfigError(
+            f"--rerun {extras.rerun} shows one camera; give FILE.rrd for a recording of each, or use --http"
+        )
+    return replace(
+        extras,
+        rerun=extras.rerun and str(_file(Path(extras.rerun), camera)),
+        video=extras.video and _file(extras.video, camera),
+        state=extras.state and _file(extras.state, camera),
+        masks=extras.masks and extras.masks / camera.name,
+        record=extras.record and extras.record / camera.name,
+    )
+
+
+def _camera(path: Path, name: str, table: Any) -> Entry:
+    address = table.pop(_ADDRESS, None) if isinstance(table, dict) else None
+    if isinstance(address, int):  # a camera's index
+        address = str(address)
+    if not isinstance(address, str):
+        raise ConfigError(f'{path}: [{_CAMERAS}.{name}] needs {_ADDRESS} = "rtsp://...", a device or an index')
+    if _as_folder(name) != name:
+        raise ConfigError(f"{path}: camera {name!r}: use letters, digits, - and _ for a name, it becomes a folder")
+    return Entry(name, address, table)
+
+
+def _name(address: str) -> str:
+    """The host of an address, the name of a device."""
+    if "://" in address:
+        return urlsplit(redact(address)).netloc.rpartition("@")[2]
+    return f"video{address}" if address.isdecimal() else Path(address).name
+
+
+def _as_folder(name: str) -> str:
+    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "camera"
+
+
+def _file(path: Path, camera: Entry) -> Path:
+    return path.with_name(f"{path.stem}-{camera.name}{path.suffix}")

@@ -1,0 +1,111 @@
+"""Several cameras at once: a process and a sub-folder each, so that none can harm another."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
+from multiprocessing.connection import wait
+from pathlib import Path
+from threading import Event
+from time import monotonic
+from types import TracebackType
+from typing import Any
+
+from vidtrack.errors import StoppedEarly
+from vidtrack.output.linefile import replace_text
+from vidtrack.output.lock import exclusive
+from vidtrack.run.live.supervisor import Supervisor
+from vidtrack.run.live.worker import Job
+
+log = logging.getLogger(__name__)
+
+_END_S = 1.8  # until what does not end is killed; its files are valid all the same
+_COUNTED = ("frames", "frames_dropped", "decode_errors", "reconnects", "stalls", "tracks")
+
+
+class Many:
+    """Cameras that are tracked at the same time; use it with `with`. Leaving it ends all within two seconds.
+
+    supervisors  by name
+
+    Raises OutputError if another run has the folder.
+    """
+
+    def __init__(self, jobs: Iterable[Job], folder: Path) -> None:
+        self.folder = folder
+        self._stopping = Event()
+        self._lock = ExitStack()
+        self._lock.enter_context(exclusive(folder))
+        self.supervisors = {job.name: Supervisor(job) for job in jobs}
+
+    def running(self, timeout_s: float) -> bool:
+        """Wait about so long while processes that crashed are started again; whether any is left and nobody said stop.
+
+        Returns early when one ends.
+        """
+        if not self._stopping.is_set():
+            wait([supervisor.sentinel for supervisor in _alive(self.supervisors.values())], timeout_s)
+            for supervisor in self.supervisors.values():
+                supervisor.tend()
+        return not self._stopping.is_set() and not all(supervisor.ended for supervisor in self.supervisors.values())
+
+    def stop(self) -> None:
+        """Tell all to end, and let `running` say no; from any thread, or a signal handler."""
+        self._stopping.set()
+        for supervisor in self.supervisors.values():
+            supervisor.stop()
+
+    def statuses(self) -> list[dict[str, Any]]:
+        """All cameras: name and status."""
+        return [{"name": name, **supervisor.status()} for name, supervisor in self.supervisors.items()]
+
+    def summary(self) -> dict[str, Any]:
+        """All cameras' summaries in one, with the sums of their counts; `error` where one ended by itself."""
+        cameras = {name: _summary(supervisor) for name, supervisor in self.supervisors.items()}
+        totals = {key: sum(camera.get(key, 0) for camera in cameras.values()) for key in (*_COUNTED, "restarts")}
+        return {**totals, "cameras": cameras}
+
+    def __enter__(self) -> Many:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+        until_s = monotonic() + _END_S
+        while (alive := _alive(self.supervisors.values())) and monotonic() < until_s:
+            wait([supervisor.sentinel for supervisor in alive], until_s - monotonic())
+        for supervisor in alive:
+            supervisor.kill()
+        try:
+            replace_text(self.folder / "summary.json", json.dumps(self.summary(), indent=2) + "\n")
+        except StoppedEarly as failure:
+            log.warning("%s", failure)
+        self._lock.close()
+
+
+def _alive(supervisors: Iterable[Supervisor]) -> list[Supervisor]:
+    return [supervisor for supervisor in supervisors if supervisor.exit_code is None]
+
+
+def _summary(supervisor: Supervisor) -> dict[str, Any]:
+    """What the camera's own runs wrote, their counts added up, and how its last process ended."""
+    now = supervisor.summary()
+    runs = [*supervisor.summaries, now]
+    content = now | {key: sum(run.get(key, 0) for run in runs) for key in _COUNTED if any(key in run for run in runs)}
+    if "counts" in now:
+        content["counts"] = _added(run.get("counts", {}) for run in runs)
+    content["restarts"] = supervisor.restarts
+    return content if supervisor.error is None else content | {"error": supervisor.error}
+
+
+def _added(counts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
+    """Counts by line and direction."""
+    total: dict[str, Counter[str]] = {}
+    for lines in counts:
+        for line, ways in lines.items():
+            total.setdefault(line, Counter()).update(ways)
+    return {line: dict(ways) for line, ways in total.items()}

@@ -1,0 +1,191 @@
+"""A live run: a camera tracked into a folder of results until it is told to stop. Read this file first in `live`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any
+
+from vidtrack.config import Settings
+from vidtrack.output.linked import refuse_link
+from vidtrack.output.sink import Step
+from vidtrack.output.status import Account, StatusBoard
+from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
+from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
+from vidtrack.run.live.recorder import NoRecorder, Recorder
+from vidtrack.run.live.retention import Retention
+from vidtrack.run.run import recorded
+from vidtrack.run.sinks import Subject, line_counter
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.address import parse_address
+from vidtrack.video.live.connection import Connection
+from vidtrack.video.live.source import LiveSource
+from vidtrack.video.resources import frame_by_frame
+from vidtrack.video.span import Span
+
+_HOUR_S = 3600.0
+_END_S = 1.6  # from `stop` until everything has to be finished
+_LEAST_S = 0.5  # left for finishing, however long the last frame took
+
+
+class LiveRun:
+    """Iterates over the steps of a camera while the results are written; use it with `with`.
+
+    name    of the source, without credentials
+    folder  where the results are
+    board   what the run looks like now, for other threads
+
+    `stop` ends the iteration, and after the first picture nothing else does: a lost camera is opened again for
+    ever, and results that cannot be written are counted.
+    Raises SourceError, ConfigError, FormatError, OutputError at the start.
+    """
+
+    def __init__(
+        self,
+        address: str,
+        settings: Settings,
+        output: Path | None = None,
+        extras: LiveExtras | None = None,
+        *,
+        force: bool = False,
+        connect: Callable[[], Connection] | None = None,
+    ) -> None:
+        extras, live = extras or LiveExtras(), settings.live
+        refuse_link(settings.output, "live runs")
+        self._settings = settings
+        self._address = parse_address(address, live.timeout_s)
+        self.name = self._address.name
+        roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
+        retention = Retention(live.keep_s, live.keep_bytes)
+        self._outputs: Outputs | None = None
+        self._until_s: float | None = None  # when everything has to be finished; None: not told to stop
+        self._in_work = False  # while a frame is processed the checkpoint is half updated and must not be saved
+        with ExitStack() as locks, ExitStack() as stack:  # if a later step fails, what is already open is closed
+            lock_extras(extras, output, locks)
+            self._checkpoint_file = NoCheckpointFile() if extras.state is None else CheckpointFile(extras.state)
+            self._recorder = (
+                NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, retention)
+            )
+            stack.callback(self._recorder.close)
+            self._source = source = stack.enter_context(self._open_source(connect))
+            stack.enter_context(frame_by_frame(settings.detector.kind))
+            self._checkpoint = self._restored(explain=extras.explain)
+            if extras.state or extras.record:
+                self._checkpoint.gather()  # what cannot be saved is refused now
+            counter = line_counter(settings, source.width, source.height)
+            shown, scene = self._address.shown, self._checkpoint.detector.scene
+            self.folder = lock_folder(output, self.name, extras, locks, force=force, in_parts=roll_s is not None)
+            retention.roots.append(self.folder)
+            self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
+            subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter)
+            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention)
+            self._open, self._locks = stack.pop_all(), locks.pop_all()
+
+    def __iter__(self) -> Iterator[Step]:
+        assert self._outputs is not None
+        return recorded(self._steps(), (*self._outputs.sinks, self.board))
+
+    def _steps(self) -> Iterator[Step]:
+        """Each frame with its tracks, after which the checkpoint is whole again."""
+        checkpoint = self._checkpoint
+        for step in video_steps(self._frames(), checkpoint.detector, checkpoint.tracker, self._settings):
+            checkpoint.note(step)
+            self._in_work = False
+            yield step
+
+    def stop(self) -> None:
+        """Let the iteration end after the frame in work; from any thread, or a signal handler."""
+        self._until_s = monotonic() + _END_S
+        self._source.stop()
+
+    def __enter__(self) -> LiveRun:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._outputs is not None
+        now_s = monotonic()
+        until_s = max(self._until_s or now_s + _END_S, now_s + _LEAST_S)
+        with self._locks:
+            self._open.close()
+            self.board.close()
+            self._outputs.close(until_s)
+            self._checkpoint_file.close(None if self._in_work else self._checkpoint, until_s)
+
+    def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
+        """The camera; numbers and times go on from a saved state."""
+        live, found = self._settings.live, self._checkpoint_file.found
+        if found is None:
+            return LiveSource(self._address, live, self._recorder, connect=connect)
+        since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
+        return LiveSource(
+            self._address,
+            live,
+            self._recorder,
+            first=found["frame"] + 1,
+            origin_s=monotonic() - since_s,
+            like=Frame.blank((found["height"], found["width"]), found["coloured"]),
+            connect=connect,
+        )
+
+    def _restored(self, explain: bool) -> Checkpoint:
+        """Detector and tracker, as an earlier run left them if there was one."""
+        source, settings = self._source, self._settings
+        tracker = build_blob_tracker(settings.tracker, (source.width, source.height), explain=explain)
+        checkpoint = Checkpoint(build_detector(settings), tracker, source.like)
+        if self._checkpoint_file.found is not None:
+            checkpoint.restore(self._checkpoint_file.found)
+        return checkpoint
+
+    def _frames(self) -> Iterator[Frame]:
+        """The frames to track; before each one the checkpoint is offered to the recording and the state file."""
+        checkpoint, recorder, span = self._checkpoint, self._recorder, Span.of(self._settings.source)
+        for frame in self._source:
+            if frame is None or not span.begun(frame.time_s):
+                continue
+            if span.over(frame.time_s):
+                break
+            place = self._source.place
+            recorder.log_frame(frame, place, checkpoint.gather() if recorder.begins(place) else None)
+            self._checkpoint_file.offer(checkpoint)
+            self._in_work = True
+            yield frame
+
+    def _reading(self) -> Mapping[str, Any]:
+        """The run's own account, for the summary and the page."""
+        source, stats = self._source, self._source.stats
+        began = datetime.fromtimestamp(time.time() - source.latency_s(0.0), UTC)
+        return {
+            "fps": round(source.fps, 6),
+            "fps_in": round(stats.rate(monotonic()), 2),
+            "width": source.width,
+            "height": source.height,
+            "began": began.isoformat(timespec="milliseconds"),
+            "frames_received": stats.received,
+            "frames_read": stats.frames_read,
+            "frames_dropped": stats.frames_dropped,
+            "decode_errors": stats.decode_errors,
+            "reconnects": stats.reconnects,
+            "stalls": stats.stalls,
+            "truncated": False,
+            **self._checkpoint.tracker.rates.as_dict(),
+            "latency_ms": self.board.latency_ms(),
+            "lost": self._lost(),
+        }
+
+    def _lost(self) -> dict[str, int]:
+        """Frames, packets and states that could not be written."""
+        outputs = {} if self._outputs is None else self._outputs.lost
+        return outputs | {"recording": self._recorder.lost, "state": self._checkpoint_file.lost}
+
+    def _account(self) -> Account:
+        stats = self._source.stats
+        return Account(stats.state, self._reading(), list(stats.problems))

@@ -1,0 +1,201 @@
+"""A camera's process as the parent sees it: asked how it is, told to end, started again when it crashes."""
+
+from __future__ import annotations
+
+import json
+import logging
+import multiprocessing
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from random import Random
+from threading import Lock
+from time import monotonic
+from typing import Any
+
+from vidtrack.run.live.retention import parts_of
+from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, unknown, work
+from vidtrack.video.live.address import redact
+from vidtrack.video.live.backoff import Backoff
+
+log = logging.getLogger(__name__)
+
+_ANSWER_S = 1.0
+_SPAWN = multiprocessing.get_context("spawn")  # a fork would copy locks that threads hold
+
+
+class Supervisor:
+    """A camera's process. It is started again, after growing pauses, when it ends without a last word.
+
+    All methods but `tend` may be called from any thread.
+
+    job        of the process that runs, or ran last
+    restarts   so many took the place of one before
+    summaries  what the ones before wrote
+    """
+
+    def __init__(self, job: Job) -> None:
+        live = job.settings.live
+        self.restarts = 0
+        self.summaries: list[dict[str, Any]] = []
+        self._first = job
+        self._shown = redact(job.address)
+        self._backoff = Backoff(live.backoff_s, live.backoff_longest_s, Random())
+        self._asking = Lock()
+        self._number = 0
+        self._told = False
+        self._crashes: list[tuple[float, str]] = []
+        self._again_s: float | None = None  # monotonic time of the next start
+        self._start(job)
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while it runs; negative if a signal ended it."""
+        return self._process.exitcode
+
+    @property
+    def sentinel(self) -> int:
+        """Becomes ready when the process ends."""
+        return self._process.sentinel
+
+    @property
+    def ended(self) -> bool:
+        """Whether it does not run, and will not be started again."""
+        return self.exit_code is not None and self._again_s is None
+
+    def tend(self) -> None:
+        """Start it again if it crashed, and the pause is over."""
+        code = self.exit_code
+        if code is None or self._told:
+            return
+        if self._again_s is not None:
+            if monotonic() >= self._again_s:
+                self._start_again()
+        elif code != 0 and (self.restarts or not self._last_word()):
+            pause_s = self._pause_s()
+            self._again_s = monotonic() + pause_s
+            self._crashes = [*self._crashes, (time.time(), f"{self._why()}; it is started again")][-5:]
+            log.warning("%s: %s; it is started again in %.1f s", self._first.name, self._why(), pause_s)
+
+    def status(self) -> Mapping[str, Any]:
+        """As `LiveStatus` has it, plain, with `restarts`; what is not known yet is left out. Later the last one."""
+        answer = self._ask(STATUS)
+        if answer is not None:
+            self._last = json.loads(answer)
+        state = self._last["state"] if self.exit_code is None else "ended" if self.ended else "waiting"
+        problems = sorted([*self._crashes, *map(tuple, self._last["problems"])])
+        return {**self._last, "state": state, "problems": problems, "restarts": self.restarts}
+
+    def picture(self) -> bytes | None:
+        """The newest annotated picture as JPEG; None without one."""
+        return self._ask(PICTURE) or None
+
+    @property
+    def error(self) -> str | None:
+        """Why it ended, if it was not told to and did not reach its end."""
+        code = self.exit_code
+        if not self.ended or not code or (self._told and code < 0):
+            return None
+        return self._why()
+
+    def stop(self) -> None:
+        """Tell it to end; without waiting."""
+        self._again_s = None
+        if self.exit_code is None:
+            self._told = True
+            self._process.terminate()
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._process.kill()
+
+    def summary(self) -> dict[str, Any]:
+        """What the run of the process that runs, or ran last, wrote."""
+        content: dict[str, Any] = {"source": self._shown}
+        self._ask(STATUS)
+        if self._begun:  # otherwise what lies there is of another run
+            with suppress(OSError, ValueError):
+                content = json.loads((self.job.folder / "summary.json").read_text(encoding="utf-8"))
+        return content
+
+    def _start(self, job: Job) -> None:
+        self.job = job
+        self._last = unknown(self._shown)
+        self._begun = self._said_goodbye = False
+        self._started_s = monotonic()
+        self._channel, theirs = _SPAWN.Pipe()
+        self._process = _SPAWN.Process(target=work, args=(job, theirs), name=job.name, daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def _start_again(self) -> None:
+        self._again_s = None
+        self.summaries.append(self.summary())
+        self.restarts += 1
+        with self._asking:
+            self._channel.close()
+            self._start(_continued(self._first, self.restarts + 1))
+
+    def _pause_s(self) -> float:
+        if monotonic() - self._started_s > self._first.settings.live.backoff_longest_s:
+            self._backoff.reset()
+        return self._backoff.next_s()
+
+    def _last_word(self) -> bool:
+        """Whether it said why it ended."""
+        self._ask(STATUS)
+        return self._said_goodbye
+
+    def _why(self) -> str:
+        if self._last_word() and self._last["problems"]:
+            return str(self._last["problems"][-1][1])
+        return f"its process ended with code {self.exit_code}"
+
+    def _ask(self, what: bytes) -> bytes | None:
+        """The answer; None if there is none in time, or never will be."""
+        with self._asking:
+            self._number += 1
+            number = b"%d" % self._number
+            with suppress(OSError):  # it may have ended just now, and what it said before is still to be read
+                self._channel.send_bytes(number + b" " + what)
+            try:
+                until_s = monotonic() + _ANSWER_S
+                while self._channel.poll(max(0.0, until_s - monotonic())):
+                    tag, _, content = self._channel.recv_bytes().partition(b" ")
+                    self._begun |= tag == BEGUN
+                    if tag == END:
+                        self._last = json.loads(content)
+                        self._said_goodbye = True
+                    elif tag == number:  # others came too late for those who asked
+                        return content
+            except (EOFError, OSError):
+                self._channel.close()
+            return None
+
+
+def _continued(job: Job, start: int) -> Job:
+    """The same job for process number `start`: parts and recordings go on, nothing else is written over."""
+    extras = job.extras
+    return replace(
+        job,
+        force=False,
+        folder=job.folder if parts_of(job.folder) else _free(job.folder),
+        extras=replace(
+            extras,
+            video=extras.video and _numbered(extras.video, start),
+            rerun=extras.rerun and str(_numbered(Path(extras.rerun), start)),
+            masks=extras.masks and _numbered(extras.masks, start),
+        ),
+    )
+
+
+def _free(folder: Path) -> Path:
+    names = (folder if number == 1 else _numbered(folder, number) for number in count(1))
+    return next(name for name in names if not name.exists() or not any(name.iterdir()))
+
+
+def _numbered(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}-{number}{path.suffix}")

@@ -1,0 +1,125 @@
+"""One of several cameras in a process of its own: the live run, and what it answers to the parent."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from multiprocessing.connection import Connection
+from pathlib import Path
+from threading import Lock, Thread
+from types import FrameType
+from typing import Any
+
+from vidtrack.config import Settings
+from vidtrack.errors import Error
+from vidtrack.output.status import StatusBoard
+from vidtrack.run.live.outputs import LiveExtras
+from vidtrack.run.live.run import LiveRun
+from vidtrack.video.live.address import redact
+
+log = logging.getLogger(__name__)
+
+STATUS, PICTURE, BEGUN, END = b"status", b"picture", b"begun", b"end"
+_SEND_S = 0.5  # for the last word, while another answer may be stuck
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What a process has to do. `prepare` is called there first, with the camera's name."""
+
+    name: str
+    address: str
+    settings: Settings
+    folder: Path
+    extras: LiveExtras
+    force: bool
+    prepare: Callable[[str], None]
+
+
+class _Told(BaseException):
+    """SIGTERM, before there is a run to stop."""
+
+
+def work(job: Job, channel: Connection) -> None:
+    """Track a camera until SIGTERM, or until the parent is gone; the exit code is that of a single live run."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes, and the parent passes it on
+    signal.signal(signal.SIGTERM, _tell)
+    job.prepare(job.name)
+    answers = _Answers(job, channel)
+    try:
+        with LiveRun(job.address, job.settings, job.folder, job.extras, force=job.force) as run:
+            signal.signal(signal.SIGTERM, lambda *_: run.stop())
+            answers.begin(run.board)
+            for _ in run:
+                pass
+    except _Told:
+        answers.end()
+    except Error as error:
+        log.error("%s", error)
+        answers.end(str(error))
+        sys.exit(error.exit_code)
+    else:
+        answers.end()
+
+
+def _tell(number: int, frame: FrameType | None) -> None:
+    raise _Told
+
+
+class _Answers:
+    """Answers in a thread what the parent asks: `NUMBER status` or `NUMBER picture`, by `NUMBER content`."""
+
+    def __init__(self, job: Job, channel: Connection) -> None:
+        self._board: StatusBoard | None = None
+        self._shown = redact(job.address)
+        self._channel = channel
+        self._sending = Lock()
+        Thread(target=self._run, name="answers", daemon=True).start()
+
+    def begin(self, board: StatusBoard) -> None:
+        """There is a run, and its results are in its folder."""
+        self._board = board
+        self._send(BEGUN, b"")
+
+    def end(self, error: str | None = None) -> None:
+        """The last word: how it was at the end, and why it ended if it was not told to."""
+        status = self._status() | {"state": "ended"}
+        if error is not None:
+            status["problems"] = [*status["problems"], (time.time(), error)]
+        self._send(END, json.dumps(status).encode())
+
+    def _run(self) -> None:
+        try:
+            while True:
+                number, _, what = self._channel.recv_bytes().partition(b" ")
+                self._send(number, self._picture() if what == PICTURE else json.dumps(self._status()).encode())
+        except (EOFError, OSError):  # the parent is gone
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    def _send(self, tag: bytes, content: bytes) -> None:
+        if self._sending.acquire(timeout=_SEND_S):
+            try:
+                self._channel.send_bytes(tag + b" " + content)
+            finally:
+                self._sending.release()
+
+    def _picture(self) -> bytes:
+        return (self._board and self._board.picture()) or b""
+
+    def _status(self) -> dict[str, Any]:
+        if self._board is None:
+            return unknown(self._shown)
+        now = self._board.now()
+        return {field.name: getattr(now, field.name) for field in fields(now)}
+
+
+def unknown(shown: str) -> dict[str, Any]:
+    """The status of a camera that has not delivered yet."""
+    reading: Mapping[str, Any] = {}
+    return {"source": shown, "state": "connecting", "reading": reading, "problems": []}

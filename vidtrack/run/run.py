@@ -1,0 +1,121 @@
+"""A run: a source becomes steps, the steps go to sinks, the sinks write a folder.
+
+`video.py`, `boxes.py` and `radar.py` each make the pipeline of one kind of input: its source, its steps, and its plain
+list of sinks. `live/` runs a source that never ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from vidtrack.errors import SourceError
+from vidtrack.output.folder import begun, spare, withdraw
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.summary import Summary
+
+
+@dataclass(frozen=True, slots=True)
+class Extras:
+    """What a run writes beside its tables.
+
+    rerun      FILE.rrd, "spawn" or "serve"
+    video      annotated video
+    masks      folder of masks
+    decisions  why each track got what it got
+    """
+
+    rerun: str | None = None
+    video: Path | None = None
+    masks: Path | None = None
+    decisions: bool = False
+
+    @property
+    def explain(self) -> bool:
+        """Whether the tracker has to keep each scan's choices."""
+        return self.decisions or self.rerun is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """An open source, and what happens to it.
+
+    name     of the source, after which the folder is named
+    place    what is read: nothing is written over it
+    count    of the steps; None: not known beforehand
+    steps    each frame or scan with its tracks, made when it is asked for
+    summary  opens summary.json in a folder
+    sinks    opens everything else in a folder, one after the other
+    """
+
+    name: str
+    place: Path
+    count: int | None
+    steps: Iterable[Step]
+    summary: Callable[[Path], Summary]
+    sinks: Callable[[Path], Iterable[Sink]]
+
+
+class Run:
+    """Iterates over the steps of a pipeline while its sinks write them; use it with `with`.
+
+    output  folder of the results; None: runs/NAME
+    force   replace the results of an earlier run in `output`
+
+    folder        where the results are
+    name, count   of the pipeline
+
+    However the `with` block is left, all results are complete and valid up to the last whole step;
+    `summary.json` says whether the run was interrupted.
+    Raises SourceError, FormatError, ConfigError or OutputError at the start, StoppedEarly when results can no longer
+    be written.
+    """
+
+    def __init__(
+        self, pipeline: AbstractContextManager[Pipeline], output: Path | None = None, *, force: bool = False
+    ) -> None:
+        self._begun = False
+        with ExitStack() as stack:  # if a later step fails, what is already open is closed
+            opened = stack.enter_context(pipeline)
+            spare(opened.place, output)
+            self.name, self.count, self._steps = opened.name, opened.count, opened.steps
+            with begun(output, opened.name, force) as self.folder, ExitStack() as written:
+                self._summary = opened.summary(self.folder)
+                written.push(self._end)  # the last of all: it reports what the others did
+                self._sinks: list[Sink] = []
+                for sink in opened.sinks(self.folder):
+                    self._sinks.append(sink)
+                    written.callback(sink.close)
+                stack.push(written.pop_all())
+            self._open = stack.pop_all()
+
+    def __iter__(self) -> Iterator[Step]:
+        for step in recorded(self._steps, (*self._sinks, self._summary)):
+            self._begun = True
+            yield step
+
+    def __enter__(self) -> Run:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open.__exit__(kind, error, trace)
+        if isinstance(error, SourceError) and not self._begun:
+            withdraw(self.folder)  # the corrected command may use it
+
+    def _end(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Close the summary. The error is that of the run, or of a sink that could not be closed."""
+        self._summary.interrupted = kind is not None
+        self._summary.close()
+
+
+def recorded(steps: Iterable[Step], sinks: Sequence[Sink]) -> Iterator[Step]:
+    """The steps, each once all sinks have it."""
+    for step in steps:
+        for sink in sinks:
+            sink.step(step)
+        yield step

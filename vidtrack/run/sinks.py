@@ -1,0 +1,133 @@
+"""The sinks of runs in pixels, in plain lists: tables, and what shows pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vidtrack.config import Settings
+from vidtrack.estimate.model import Motion
+from vidtrack.output.confirmed import Confirmed
+from vidtrack.output.counts import CountsFile
+from vidtrack.output.decisions import DecisionLog
+from vidtrack.output.linked import Linked
+from vidtrack.output.masks import MaskFolder
+from vidtrack.output.mot import MotFile
+from vidtrack.output.plot import TrajectoryPlot
+from vidtrack.output.sink import Sink
+from vidtrack.output.smoothed import smoothed_first
+from vidtrack.output.summary import Summary
+from vidtrack.output.tables import TrackTable
+from vidtrack.output.threaded import Threaded
+from vidtrack.run.run import Extras
+from vidtrack.tracking.tracker import Tracker
+from vidtrack.traffic.lines import Line, LineCounter, parse_lines
+from vidtrack.video.detections import Detections
+from vidtrack.video.frame import Image
+from vidtrack.video.recording import Recording
+from vidtrack.video.source import Source
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What the results are about.
+
+    source    as summary.json names it, without any password
+    settings  of the run
+    shape     (H, W) of its pictures
+    fps       its nominal rate
+    scene     gives the (H, W, 3) background; None: there are no pictures
+    reading   gives the source's own account, see Summary
+    counter   counts over lines; None without any
+    """
+
+    source: str
+    settings: Settings
+    shape: tuple[int, int]
+    fps: float
+    scene: Callable[[], Image] | None
+    reading: Callable[[], Mapping[str, object]]
+    counter: LineCounter | None
+
+    @property
+    def lines(self) -> Sequence[Line]:
+        """The counted lines."""
+        return self.counter.lines if self.counter else ()
+
+    def summary(self, folder: Path) -> Summary:
+        """summary.json in a folder."""
+        return Summary(folder / "summary.json", self.source, self.settings, self.reading, self.counter)
+
+
+def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
+    """A counter for the lines of the settings, in a picture of that size; None without any."""
+    lines = parse_lines(settings.output.lines, width, height)
+    return LineCounter(lines) if lines else None
+
+
+def file_subject(
+    path: str,
+    source: Source | Recording | Detections,
+    tracker: Tracker,
+    settings: Settings,
+    scene: Callable[[], Image] | None,
+) -> Subject:
+    """A source that ends, `path` as the user wrote it. Raises ConfigError for lines that cannot be counted over."""
+    stats = source.stats
+
+    def reading() -> dict[str, object]:
+        return {
+            "fps": round(source.fps, 6),
+            "width": source.width,
+            "height": source.height,
+            "frames_read": stats.frames_read,
+            "frames_dropped": stats.frames_dropped,
+            "decode_errors": stats.decode_errors,
+            "reconnects": 0,
+            "stalls": 0,
+            "truncated": stats.truncated,
+            **tracker.rates.as_dict(),
+        }
+
+    counter = line_counter(settings, source.width, source.height)
+    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter)
+
+
+def file_sinks(
+    subject: Subject, extras: Extras, folder: Path, *, motion: Motion, link_s: float | None, hold_s: float
+) -> Iterator[Sink]:
+    """All sinks of a source that ends.
+
+    motion  the tracker's model, for links
+    link_s  longest gap over which broken tracks are joined; None: they are not
+    hold_s  how long rows wait for their track to be confirmed
+    """
+    counter, output = subject.counter, subject.settings.output
+    if counter is not None:
+        yield CountsFile(folder / "counts.csv", counter)
+    totals = counter.totals if counter else None
+    plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines, totals)
+    tables: tuple[Sink, ...] = (TrackTable(folder), MotFile(folder / "mot.txt"), plot)
+    if link_s is not None:
+        tables = (Linked(*tables, motion=motion, longest_s=link_s),)
+    yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)
+    if extras.decisions:
+        yield DecisionLog(folder / "decisions.csv")
+    for _, sink in picture_sinks(subject, extras):
+        yield Threaded(sink)
+
+
+def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]]:
+    """Masks, the annotated video and rerun, each with its name: what takes long enough for a thread of its own."""
+    settings = subject.settings
+    if extras.masks is not None:
+        yield "masks", MaskFolder(extras.masks)
+    if extras.video is not None:
+        from vidtrack.output.video import AnnotatedVideo
+
+        yield "video", AnnotatedVideo(extras.video, subject.fps, settings.output, subject.lines)
+    if extras.rerun is not None:
+        from vidtrack.output.rerun import RerunSink
+
+        yield "rerun", RerunSink(extras.rerun, subject.shape, settings, subject.lines)
