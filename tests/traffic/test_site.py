@@ -104,7 +104,6 @@ BAD = {
     "no interval": ("interval_s = 300", "interval_s = 0", "greater than 0"),
     "geographic without a system": ("camera_height_m = 8.0", "geographic = true", "geographic needs epsg"),
     "lens without focal length": ("camera_height_m = 8.0", "distortion = [0.1, 0]", "needs focal_px"),
-    "centre without focal length": ("camera_height_m = 8.0", "center = [640, 360]", "no effect without focal_px"),
     "both kinds": ("camera_height_m = 8.0", "lengths = [[[0, 0], [0, 9], 3.0]]", "and not both"),
     "no section but a value": ("[report]", "[sections]\nmain = 3\n[report]", "not valid TOML"),
 }

@@ -89,7 +89,7 @@ class Calibration(Group):
     sigma_ground_m: float = Field(0.02, ge=0)
     """m; standard deviation of a ground point, per axis, or of a known length"""
     camera_height_m: float | None = Field(None, gt=0)
-    """m above the road; None: not known"""
+    """m above the road, to compare with what the points say; None: not known"""
     geographic: bool = False
     """`ground` holds longitudes and latitudes"""
     epsg: int | None = Field(None, gt=0)
@@ -97,7 +97,7 @@ class Calibration(Group):
     distortion: tuple[float, float] | None = None
     """k1, k2 of the lens (Brown-Conrady, on normalised coordinates); None: straight lines are straight"""
     focal_px: float | None = Field(None, gt=0)
-    """px; focal length"""
+    """px; focal length; None: from the points, with square pixels"""
     center: Point | None = None
     """px; where the optical axis meets the picture; None: its middle"""
     lengths: tuple[tuple[Point, Point, Positive], ...] = ()
@@ -120,8 +120,6 @@ class Calibration(Group):
             raise ValueError("give at least 2 segments across, or none and focal_px")
         if self.distortion is not None and self.focal_px is None:
             raise ValueError("distortion is on normalised coordinates and needs focal_px")
-        if self.center is not None and self.focal_px is None:
-            raise ValueError("center has no effect without focal_px")
         return self
 
     def _check_points(self) -> None:
