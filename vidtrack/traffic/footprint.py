@@ -221,7 +221,7 @@ def velocity(ground: Ground, xy: Floats, middle: Floats, u: Floats) -> tuple[Flo
 
 
 def _nearer(up: Floats, w: Floats, middle: Floats, offset: Floats) -> Floats:
-    """(N,) (w + z up_w) / w, where z is the height of a point that is seen `offset` from the middle of its footprint."""
+    """(N,) (w + z up_w) / w, with z the height of a point that is seen `offset` from the middle of its footprint."""
     lift = up[:2] - up[2] * middle  # the offset is z lift / (w + z up_w)
     along = np.sum(offset * lift, axis=1)
     z = w * along / (np.sum(lift**2, axis=1) - up[2] * along)
