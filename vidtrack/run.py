@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from vidtrack.box_pipeline import build_tracker
 from vidtrack.config import Settings
@@ -28,11 +29,15 @@ from vidtrack.output.threaded import Threaded
 from vidtrack.pipeline import build_detector, video_steps
 from vidtrack.steps import scan_steps
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
+from vidtrack.traffic.road import road_at
 from vidtrack.video.detections import Detections, is_detections, open_detections
 from vidtrack.video.frame import Image
 from vidtrack.video.recording import Recording, is_recording
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import Source, open_source
+
+if TYPE_CHECKING:
+    from vidtrack.traffic.footprint import Footprints
 
 
 class Run:
@@ -91,12 +96,13 @@ class Run:
                     opened.remember = Memory(detector, self._tracker, opened.like).restore
                 self._steps = video_steps(opened, detector, self._tracker, settings)
             lines = parse_lines(settings.output.lines, opened.width, opened.height)
+            road = road_at(settings.output.site, opened.width, opened.height)
             self.name, self.frames = opened.name, opened.frames
             with begun(output, opened.name, force) as self.folder, ExitStack() as written:
                 counter = LineCounter(lines) if lines else None
                 summary = Summary(self.folder / "summary.json", source, settings, self._reading, counter)
                 self._results = written.enter_context(Results(summary))
-                self._add_tables(lines, counter, scene, decisions)
+                self._add_tables(lines, counter, scene, road, decisions)
                 self._add_pictures(lines, masks, video, rerun)
                 stack.push(written.pop_all())
             self._open = stack.pop_all()
@@ -115,7 +121,12 @@ class Run:
             withdraw(self.folder)  # the corrected command may use it
 
     def _add_tables(
-        self, lines: list[Line], counter: LineCounter | None, scene: Callable[[], Image] | None, decisions: bool
+        self,
+        lines: list[Line],
+        counter: LineCounter | None,
+        scene: Callable[[], Image] | None,
+        road: Footprints | None,
+        decisions: bool,
     ) -> None:
         """The tables and tracks.png, with counts.csv and decisions.csv where they are asked for."""
         folder, source, output = self.folder, self._source, self._settings.output
@@ -123,7 +134,7 @@ class Run:
             self._results.add(CountsFile(folder / "counts.csv", counter))
         totals = counter.totals if counter else None
         plot = TrajectoryPlot(folder / "tracks.png", (source.height, source.width), scene, lines, totals)
-        sinks: tuple[Sink, ...] = (TrackTable(folder), MotFile(folder / "mot.txt"), plot)
+        sinks: tuple[Sink, ...] = (TrackTable(folder, road=road), MotFile(folder / "mot.txt"), plot)
         if isinstance(source, Detections) if output.link is None else output.link:
             sinks = (Linked(*sinks, motion=self._tracker.model, longest_s=output.link_s * self._pace),)
         sinks = smoothed_first(output, *sinks)

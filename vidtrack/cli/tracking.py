@@ -43,6 +43,12 @@ _OPTIONS = (
         metavar="NAME:x1,y1,x2,y2",
         help="Count over a line, in pixels; repeat for more.",
     ),
+    click.option(
+        "--site",
+        type=click.Path(path_type=Path),
+        metavar="SITE.toml",
+        help="Add positions in metres and speeds, by this site's calibration.",
+    ),
     click.option("--start", type=float, metavar="S", help="Begin at this time [s]."),
     click.option("--end", type=float, metavar="S", help="Stop at this time [s]."),
     click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 1/2, 1/3, ..."),
@@ -51,7 +57,7 @@ _OPTIONS = (
 
 
 def tracking_options(function: Function) -> Function:
-    """--method, --distance, --detector, --rerun, --video, --save-masks, --line, --decisions, --start, --end, ..."""
+    """--method, --distance, --detector, --rerun, --video, --save-masks, --line, --site, --decisions, --start, ..."""
     for option in reversed(_OPTIONS):
         function = option(function)
     return association_options(function)
@@ -66,6 +72,7 @@ _SETTING = {
     "scale": "source.scale",
     "mask": "source.mask",
     "fps": "source.fps",
+    "site": "output.site",
     "smooth": "output.smooth",
     "link": "output.link",
 }

@@ -17,6 +17,7 @@ from vidtrack.output.masks import MaskFolder
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 from vidtrack.traffic.lines import LineCounter
+from vidtrack.traffic.road import road_at
 from vidtrack.video.frame import Image
 
 _WRITE_S = 0.25  # between two writes: with LIVE_HOLD_S this is what a kill costs
@@ -73,6 +74,7 @@ class Outputs:
         self._subject = subject
         self._settings = settings
         self._decisions = extras.decisions
+        self._road = road_at(settings.output.site, subject.shape[1], subject.shape[0])
         self._besides: list[Beside] = []
         self._sinks: list[Sink] = []
         if extras.masks is not None:
@@ -117,7 +119,7 @@ class Outputs:
 
     def _part(self, folder: Path) -> Part:
         subject = self._subject
-        return Part(folder, subject.shape, subject.scene, self._summary, subject.counter, self._decisions)
+        return Part(folder, subject.shape, subject.scene, self._summary, subject.counter, self._road, self._decisions)
 
     def _summary(self, path: Path) -> Summary:
         subject = self._subject

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vidtrack.errors import StoppedEarly
 from vidtrack.output.counts import HEADER
@@ -15,9 +16,12 @@ from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.repair import add_parquet
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
-from vidtrack.output.tables import VIDEO, csv_text, track_rows
+from vidtrack.output.tables import ROAD, VIDEO, csv_text, track_rows
 from vidtrack.traffic.lines import LineCounter
 from vidtrack.video.frame import Image
+
+if TYPE_CHECKING:
+    from vidtrack.traffic.footprint import Footprints
 
 
 class Part:
@@ -27,6 +31,7 @@ class Part:
     scene    gives the (H, W, 3) background for tracks.png
     summary  makes the summary at a path
     counter  counts on through all parts; None without lines
+    road     places vehicles on the road, through all parts; None without a calibrated site
     """
 
     def __init__(
@@ -36,13 +41,16 @@ class Part:
         scene: Callable[[], Image],
         summary: Callable[[Path], Summary],
         counter: LineCounter | None,
+        road: Footprints | None,
         decisions: bool,
     ) -> None:
         self.folder = folder
+        self._columns = VIDEO if road is None else (*VIDEO, *ROAD)
+        self._road = road
         self._counter = counter
         with ExitStack() as stack:  # if the disk is full, what is open by then is closed
             self._summary = summary(folder / "summary.json")
-            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in VIDEO) + "\n")
+            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in self._columns) + "\n")
             stack.callback(self._tracks.close)
             self._mot = MotFile(folder / "mot.txt")
             stack.callback(self._mot.close)
@@ -58,9 +66,9 @@ class Part:
 
     def write(self, steps: Sequence[Step], crossings: str) -> None:
         """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
-        shown = [step.in_picture() for step in steps if len(step.tracks)]
-        if shown:
-            _write(self._tracks, csv_text(track_rows(shown)))
+        filled = [step for step in steps if len(step.tracks)]
+        if filled:
+            _write(self._tracks, csv_text(track_rows(filled, self._columns, self._road)))
         if self._counts is not None and crossings:
             _write(self._counts, crossings)
         for step in steps:
