@@ -141,12 +141,35 @@ def calibrated(site: Site) -> Ground:
     Raises ConfigError for points that determine no plane, or that are mirrored.
     """
     pairs = pairs_of(site)
-    fit = pairs.fit()
-    _refuse_impossible(pairs, fit)
+    fit = solved(pairs)
     check = checked(pairs, fit)
     for line in complaints(site, check):
         _log.warning("%s", line)
     return road_plane(site, pairs, fit, check)
+
+
+def solved(pairs: Pairs) -> Fit:
+    """The homography through all pairs. Raises ConfigError where there is none that a camera above the road sees."""
+    fit = pairs.fit()
+    variance = np.linalg.eigvalsh(fit.cov)
+    if not np.isfinite(fit.k).all() or variance[0] <= _LEAST_SHARE**2 * variance[-1]:
+        raise ConfigError(
+            "calibration: the points determine no plane: all but one lie on one line; spread them over the road"
+        )
+    if not (depth(fit.k, pairs.X) > 0).all():
+        raise ConfigError(
+            "calibration: no camera sees all these points as they are paired: some would be behind it; "
+            "check that picture and ground list the same points in the same order"
+        )
+    turned = np.linalg.det(by_point(fit.k, pairs.X))
+    if (turned > 0).all():
+        raise ConfigError(
+            "calibration: the points are mirrored: the road would be seen from below; in the picture x grows to the "
+            "right and y downwards, on the ground x grows to the east and y to the north; check their order and signs"
+        )
+    if not (turned < 0).all():
+        raise ConfigError("calibration: the points fold the plane over itself; check that the pairs are in order")
+    return fit
 
 
 def road_plane(site: Site, pairs: Pairs, fit: Fit, check: Check) -> Ground:
@@ -260,25 +283,3 @@ def _altitude(corners: Floats) -> float:
     sides = corners - np.roll(corners, 1, axis=0)
     longest = np.linalg.norm(sides, axis=1).max()
     return float(abs(sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]) / longest) if longest else 0.0
-
-
-def _refuse_impossible(pairs: Pairs, fit: Fit) -> None:
-    """Raise ConfigError for points that determine no homography, or one that no camera above the road sees."""
-    variance = np.linalg.eigvalsh(fit.cov)
-    if not np.isfinite(fit.k).all() or variance[0] <= _LEAST_SHARE**2 * variance[-1]:
-        raise ConfigError(
-            "calibration: the points determine no plane: all but one lie on one line; spread them over the road"
-        )
-    if not (depth(fit.k, pairs.X) > 0).all():
-        raise ConfigError(
-            "calibration: no camera sees all these points as they are paired: some would be behind it; "
-            "check that picture and ground list the same points in the same order"
-        )
-    turned = np.linalg.det(by_point(fit.k, pairs.X))
-    if (turned > 0).all():
-        raise ConfigError(
-            "calibration: the points are mirrored: the road would be seen from below; in the picture x grows to the "
-            "right and y downwards, on the ground x grows to the east and y to the north; check their order and signs"
-        )
-    if not (turned < 0).all():
-        raise ConfigError("calibration: the points fold the plane over itself; check that the pairs are in order")

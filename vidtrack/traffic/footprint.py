@@ -34,7 +34,7 @@ _WIDEST_M = 2.55
 _EDGE_PX = 1.0
 """px; standard deviation of an edge of a box"""
 _ROUNDS = 3
-_HEADING_SIGMA = 0.3
+_HEADING_SIGMA = 0.5
 """rad; a heading that is less certain is not used: the last good one of the track stays"""
 _ALL_WAYS = 2 / np.pi
 """Mean of |cos|: how far a direction that is not known reaches along an axis."""
@@ -83,9 +83,10 @@ class Stand:
         return np.asarray(np.einsum("ni,nik->nk", self._ahead(), self.v_shared))
 
     def _ahead(self) -> Floats:
-        """(N, 2) unit vectors along the velocity."""
+        """(N, 2) unit vectors along the velocity; of a vehicle that stands, those of its largest error."""
         speed = self.speed[:, None]
-        return np.divide(self.v, speed, out=np.zeros_like(self.v), where=speed > 0)
+        angle = np.arctan2(2 * self.v_own[:, 0, 1], self.v_own[:, 0, 0] - self.v_own[:, 1, 1]) / 2
+        return np.divide(self.v, speed, out=np.column_stack([np.cos(angle), np.sin(angle)]), where=speed > 0)
 
 
 class Footprints:
@@ -193,7 +194,7 @@ def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[F
         across = np.where(unknown, any_way, np.abs(np.einsum("nij,nj->ni", J, n)))
         length = box[:, 2] / (along + slender * across)[:, 0]
         sideways = (slender * length > _WIDEST_M) & (along > across)[:, 0]
-        length = np.where(sideways, (box[:, 2] - _WIDEST_M * across[:, 0]) / along[:, 0], length)
+        length[sideways] = (box[:, 2] - _WIDEST_M * across[:, 0])[sideways] / along[sideways, 0]
         width = np.minimum(slender * length, _WIDEST_M)
         up = (length * along[:, 1] + width * across[:, 1]) / 2
         middle = foot - np.column_stack([np.zeros(len(up)), up])
