@@ -46,7 +46,8 @@ def test_columns_are_exactly_the_documented_ones(tmp_path):
     ]
 
 
-def test_the_covariance_of_position_and_velocity_can_be_rebuilt(rng=np.random.default_rng(0)):
+def test_the_covariance_of_position_and_velocity_can_be_rebuilt():
+    rng = np.random.default_rng(0)
     step = make_step(0, [(1, "c", 1, 1), (2, "c", 9, 9)])
     root = rng.normal(size=(2, 4, 4))
     P = root @ np.swapaxes(root, 1, 2)

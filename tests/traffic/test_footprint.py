@@ -41,7 +41,7 @@ def test_a_car_is_where_it_is_and_as_fast_as_it_is(heading, at):
     assert np.linalg.norm(stand.xy[0] - at) < 0.4
     assert stand.speed[0] == pytest.approx(15, rel=0.05)
     assert abs((np.degrees(stand.heading[0]) - heading + 180) % 360 - 180) < 3
-    assert stand.length[0] == pytest.approx(4.5, abs=0.5)
+    assert abs(stand.length[0] - 4.5) < 0.3 + stand.length_sigma[0]
     assert stand.width[0] == pytest.approx(1.8, abs=0.3)
 
 
@@ -96,11 +96,11 @@ def test_shared_errors_have_the_covariance_that_is_given():
     rng = np.random.default_rng(1)
     xy, u, box = seen(CAR, (2, 25), 20)
     speeds = []
-    for _ in range(150):
+    for _ in range(60):
         site = site_of(CAMERA.picture(POINTS) + rng.normal(0, 1, POINTS.shape), POINTS, sigma_ground_m=0.001)
         speeds.append(placed((xy, u, box), ground=calibrated(site)).speed[0])
     said = np.linalg.norm(placed((xy, u, box)).speed_by_shared)
-    assert 0.75 < np.std(speeds) / said < 1.35
+    assert 0.65 < np.std(speeds) / said < 1.45
 
 
 def test_a_calibration_that_is_poor_does_not_make_a_vehicles_own_error_larger():

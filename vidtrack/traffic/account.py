@@ -12,6 +12,7 @@ from vidtrack.traffic.calibrate import checked, complaints, pairs_of, road_plane
 from vidtrack.traffic.footprint import velocity
 from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.site import Site
+from vidtrack.traffic.straight_road import straight_road
 
 _HEIGHT_SIGMAS, _HEIGHT_SHARE = 3.0, 0.1
 """A stated height of the camera contradicts the points when it is off by both of these."""
@@ -31,6 +32,8 @@ def examined(site: Site) -> Account:
     """The account of a site's calibration. Raises ConfigError as `calibrated` does."""
     calibration = site.calibration
     assert calibration is not None
+    if not calibration.picture:
+        return _without_map(site)
     pairs = pairs_of(site)
     fit = solved(pairs)
     check = checked(pairs, fit)
@@ -54,13 +57,34 @@ def examined(site: Site) -> Account:
         ],
         "chi2": check.chi2,
         "degrees_of_freedom": check.spare,
-        "wrong": list(check.wrong),
+        "wrong": [i + 1 for i in check.wrong],
         "contradiction": check.contradiction,
         "camera": found,
         "places": places(ground, picture),
         "warnings": complaints(site, check) + height_complaint(found, calibration.camera_height_m),
     }
     return Account(ground, report, picture, fitted)
+
+
+def _without_map(site: Site) -> Account:
+    """The account of a calibration by segments of a straight road."""
+    calibration = site.calibration
+    assert calibration is not None
+    fit = straight_road(site)
+    found = camera(fit.ground)
+    picture = np.array([point for _, point in calibration.points()])
+    report = {
+        "site": site.camera.name,
+        "pairs": [],
+        "chi2": fit.chi2,
+        "degrees_of_freedom": fit.spare,
+        "wrong": [],
+        "contradiction": fit.contradiction,
+        "camera": found,
+        "places": places(fit.ground, picture),
+        "warnings": fit.complaints() + height_complaint(found, calibration.camera_height_m),
+    }
+    return Account(fit.ground, report, picture, picture)
 
 
 def places(ground: Ground, picture: Floats) -> list[dict[str, Any]]:

@@ -14,8 +14,9 @@ from vidtrack.scan import Floats
 from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.homography import Fit, Normal, by_k, by_point, depth, fitted, picture_of, plane_of
 from vidtrack.traffic.hull import hull
-from vidtrack.traffic.lens import Lens
-from vidtrack.traffic.site import Calibration, Camera, Site
+from vidtrack.traffic.lens import lens_of
+from vidtrack.traffic.site import Calibration, Site
+from vidtrack.traffic.straight_road import straight_road
 
 _log = logging.getLogger(__name__)
 
@@ -75,18 +76,6 @@ class Check:
     contradiction: bool
 
 
-def lens_of(camera: Camera, calibration: Calibration) -> Lens | None:
-    """The lens of a calibration; None without distortion."""
-    if calibration.distortion is None or calibration.focal_px is None:
-        return None
-    return Lens(*calibration.distortion, calibration.focal_px, center_of(camera, calibration))
-
-
-def center_of(camera: Camera, calibration: Calibration) -> tuple[float, float]:
-    """Where the optical axis meets the picture [px]."""
-    return calibration.center or ((camera.width - 1) / 2, (camera.height - 1) / 2)
-
-
 def metres_of(calibration: Calibration) -> Floats:
     """(N, 2) ground points in metres. Raises ConfigError for a coordinate system that is not known or not metric."""
     ground = np.array(calibration.ground, float)
@@ -114,7 +103,7 @@ def pairs_of(site: Site) -> Pairs:
     """The pairs of a site's calibration. Raises ConfigError where no homography can go through them."""
     calibration = site.calibration
     assert calibration is not None
-    lens = lens_of(site.camera, calibration)
+    lens = lens_of(site)
     ground, picture = metres_of(calibration), np.array(calibration.picture, float)
     bend = np.repeat(np.eye(2)[None], len(picture), axis=0)
     if lens is not None:
@@ -140,6 +129,12 @@ def calibrated(site: Site) -> Ground:
     Where the pairs do not agree within their standard deviations, these are taken to be larger by as much.
     Raises ConfigError for points that determine no plane, or that are mirrored.
     """
+    assert site.calibration is not None
+    if not site.calibration.picture:
+        found = straight_road(site)
+        for line in found.complaints():
+            _log.warning("%s", line)
+        return found.ground
     pairs = pairs_of(site)
     fit = solved(pairs)
     check = checked(pairs, fit)
@@ -178,9 +173,9 @@ def road_plane(site: Site, pairs: Pairs, fit: Fit, check: Check) -> Ground:
     assert calibration is not None
     wider = max(1.0, check.chi2 / check.spare) if check.contradiction else 1.0
     picture = pairs.picture.back(pairs.p)
-    lens = lens_of(site.camera, calibration)
+    lens = lens_of(site)
     sigma = calibration.sigma_picture_px
-    center = np.array(center_of(site.camera, calibration))
+    center = np.array(site.center)
     return Ground(
         pairs.plane, pairs.picture, fit.k, wider * fit.cov, lens, center, calibration.focal_px, hull(picture), sigma
     )

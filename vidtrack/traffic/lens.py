@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.scan import Floats
+from vidtrack.traffic.site import Site
 
 _ROUNDS = 20
 
@@ -50,3 +51,11 @@ class Lens:
 
     def _slope(self, r: Floats) -> Floats:
         return 1 + 3 * self.k1 * r**2 + 5 * self.k2 * r**4
+
+
+def lens_of(site: Site) -> Lens | None:
+    """The lens of a site's camera; None without a calibration or without distortion."""
+    calibration = site.calibration
+    if calibration is None or calibration.distortion is None or calibration.focal_px is None:
+        return None
+    return Lens(*calibration.distortion, calibration.focal_px, site.center)

@@ -210,6 +210,12 @@ class Site(Group):
         """The legs in order of their gates; a gate without one is a leg by itself."""
         return tuple(dict.fromkeys(gate.leg or name for name, gate in self.gates.items()))
 
+    @property
+    def center(self) -> Point:
+        """Where the optical axis meets the picture [px]."""
+        given = None if self.calibration is None else self.calibration.center
+        return given or ((self.camera.width - 1) / 2, (self.camera.height - 1) / 2)
+
     @field_validator("gates", "zones", "calibration")
     @classmethod
     def _inside(cls, parts: Any, given: ValidationInfo) -> Any:
