@@ -74,7 +74,7 @@ def test_a_sideways_lorry_is_no_wider_than_the_law_allows():
 def test_own_errors_have_the_covariance_that_is_given():
     """Noise on the track and on its box: the squared error over its covariance is chi-square on average."""
     rng = np.random.default_rng(0)
-    xy, u, box = seen(CAR, (2, 25), 45)
+    xy, u, box = seen(CAR, (2, 25), 45, speed=4.0)
     P = np.diag([0.8, 0.8, 16.0, 16.0])
     P[0, 2] = P[2, 0] = P[1, 3] = P[3, 1] = 1.5
     count = 3000

@@ -34,6 +34,9 @@ _WIDEST_M = 2.55
 _EDGE_PX = 1.0
 """px; standard deviation of an edge of a box"""
 _ROUNDS = 3
+_SILHOUETTE = 0.02
+"""Standard deviation of speeds, as a share, because a centroid is of a silhouette and not one point of the vehicle:
+measured for cars by tools/road_plane.py"""
 _HEADING_SIGMA = 0.5
 """rad; a heading that is less certain is not used: the last good one of the track stays"""
 _ALL_WAYS = 2 / np.pi
@@ -136,7 +139,9 @@ class Footprints:
             xy_own=K @ (P[:, :2, :2] + edges) @ turned,
             xy_shared=shared[:, :2],
             v=v,
-            v_own=state @ P @ np.swapaxes(state, 1, 2) + by_offset @ edges @ np.swapaxes(by_offset, 1, 2),
+            v_own=state @ P @ np.swapaxes(state, 1, 2)
+            + by_offset @ edges @ np.swapaxes(by_offset, 1, 2)
+            + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :],
             v_shared=shared[:, 2:],
             heading=np.where(np.isnan(middle[:, 0]), np.nan, np.arctan2(e[:, 0], e[:, 1])),
             length=sides[:, 0],
