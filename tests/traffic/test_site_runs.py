@@ -13,7 +13,8 @@ from synthetic_steps import make_step
 
 from vidtrack.live.part import Part
 from vidtrack.output.repair import repair
-from vidtrack.output.tables import ROAD, VIDEO
+from vidtrack.output.tables import ROAD, VIDEO, track_rows
+from vidtrack.plane import shift
 from vidtrack.traffic.road import road_at
 
 CAMERA = Pinhole()
@@ -187,3 +188,15 @@ def test_calibrate_needs_a_file(tmp_path):
     code, _, err = vidtrack("calibrate", "none.toml", cwd=tmp_path)
     assert code == 2
     assert "cannot read site none.toml" in err
+
+
+def test_a_camera_that_sways_does_not_move_the_road(road):
+    """Positions in pixels are those of the picture, positions in metres those of the scene, where the site was drawn."""
+    steps = [make_step(0, [(1, "c", 640.0, 400.0)], motion=motion) for motion in (None, shift(5.0, -3.0))]
+    still, swayed = (
+        track_rows([step], (*VIDEO, *ROAD), road_at(road / "site.toml", WIDTH, HEIGHT)).to_pylist()[0] for step in steps
+    )
+    assert swayed["x_px"] == still["x_px"] + 5
+    assert swayed["y_px"] == still["y_px"] - 3
+    for column in ROAD:
+        assert swayed[column.name] == still[column.name]
