@@ -86,9 +86,8 @@ def test_units_are_in_the_parquet_file_and_rows_are_those_of_the_csv(tmp_path, s
 
 def test_in_space_the_height_follows(tmp_path, scenario):
     out = run(scenario("radar-altitude"), tmp_path / "out")
-    assert (out / "tracks.csv").read_text().splitlines()[
-        0
-    ] == f"{HEADER},z_m,vz_m_s,sigma_z_m,{OF_VELOCITY},sigma_vz_m_s"
+    header = (out / "tracks.csv").read_text().splitlines()[0]
+    assert header == f"{HEADER},z_m,vz_m_s,sigma_z_m,{OF_VELOCITY},sigma_vz_m_s"
     found = scores(out, scenario("radar-altitude"), 500.0)
     assert found["tracks"] == 1
     assert found["idf1"] > 0.99

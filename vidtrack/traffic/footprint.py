@@ -41,6 +41,8 @@ _HEADING_SIGMA = 0.5
 """rad; a heading that is less certain is not used: the last good one of the track stays"""
 _ALL_WAYS = 2 / np.pi
 """Mean of |cos|: how far a direction that is not known reaches along an axis."""
+_ANY_WAY_SIGMA = float(np.sqrt(np.pi**2 / 8 - 1))
+"""Standard deviation of |cos| over its mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,18 +115,23 @@ class Footprints:
         box    (N, 4) left, top, width, height [px]
         """
         box = np.where(self._cut(box)[:, None], np.nan, box)
-        e = self._headings(track, xy, u, P, box)
+        headings = self._headings(track, xy, u, P, box)
         with np.errstate(invalid="ignore"):
-            return self._stand(xy, u, P, box, e)
+            return self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
 
-    def _stand(self, xy: Floats, u: Floats, P: Floats, box: Floats, e: Floats) -> Stand:
+    def _stand(self, xy: Floats, u: Floats, P: Floats, box: Floats, e: Floats, e_sigma: Floats) -> Stand:
         ground = self._ground
         middle, sides = footprint(ground, box, e, _SLENDER)
         middle = ground.inside(middle)
         sides[np.isnan(middle[:, 0])] = np.nan
         wide = [footprint(ground, box, e, _SLENDER + sign * _SLENDER_SIGMA) for sign in (1, -1)]
         by_shape, sides_sigma = (wide[0][0] - wide[1][0]) / 2, np.abs(wide[0][1] - wide[1][1]) / 2
-        edges = _EDGE_PX**2 * np.eye(2) + by_shape[:, :, None] * by_shape[:, None, :]
+        turned = [footprint(ground, box, _turned(e, sign * e_sigma), _SLENDER)[0] for sign in (1, -1)]
+        foot = np.column_stack([middle[:, 0], box[:, 1] + box[:, 3] - 0.5])
+        by_heading = np.where(np.isnan(e), _ANY_WAY_SIGMA * (foot - middle), (turned[0] - turned[1]) / 2)
+        edges = _EDGE_PX**2 * np.eye(2)
+        for error in (by_shape, by_heading):
+            edges = edges + error[:, :, None] * error[:, None, :]
         position = ground.metres(middle)
         v, M = velocity(ground, xy, middle, u)
         by_middle = _difference(lambda point: velocity(ground, xy + point - middle, point, u)[0], middle)
@@ -133,10 +140,9 @@ class Footprints:
         state = np.concatenate([by_middle, M], axis=2)
         pairs = [[_seen_by(one, xy, middle, u) for one in pair] for pair in ground.varied()]
         shared = np.stack([(above - below) / 2 for above, below in pairs], axis=2)
-        turned = np.swapaxes(K, 1, 2)
         return Stand(
             xy=position,
-            xy_own=K @ (P[:, :2, :2] + edges) @ turned,
+            xy_own=K @ (P[:, :2, :2] + edges) @ np.swapaxes(K, 1, 2),
             xy_shared=shared[:, :2],
             v=v,
             v_own=state @ P @ np.swapaxes(state, 1, 2)
@@ -150,7 +156,8 @@ class Footprints:
         )
 
     def _headings(self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats) -> Floats:
-        """(N, 2) unit vectors along the vehicles; NaN for those that have not moved yet."""
+        """(N, 3) unit vectors along the vehicles, and the angle's standard deviation; NaN for those that have not
+        moved yet."""
         with np.errstate(invalid="ignore"):
             middle, _ = footprint(self._ground, box, np.full((len(box), 2), np.nan), _SLENDER)
             v, M = velocity(self._ground, xy, middle, u)
@@ -158,14 +165,15 @@ class Footprints:
             e = v / speed[:, None]
             n = np.column_stack([-e[:, 1], e[:, 0]])
             sigma = np.sqrt(np.einsum("ni,nij,nj->n", n, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2), n)) / speed
-            e[~(sigma < _HEADING_SIGMA)] = np.nan
-        return self._remembered(track, e)
+        found = np.column_stack([e, sigma])
+        found[~(sigma < _HEADING_SIGMA)] = np.nan
+        return self._remembered(track, found)
 
     def _remembered(self, track: Ints, e: Floats) -> Floats:
-        """(N, 2) the headings, or the last one of the same track before."""
-        nobody = np.full(2, np.nan)
+        """(N, 3) the headings, or the last one of the same track before."""
+        nobody = np.full(3, np.nan)
         ids = np.unique(track)
-        known = np.array([self._heading.get(one, nobody) for one in ids.tolist()]).reshape(-1, 2)
+        known = np.array([self._heading.get(one, nobody) for one in ids.tolist()]).reshape(-1, 3)
         track, e = np.concatenate([ids, track]), np.concatenate([known, e])
         order = np.argsort(track, kind="stable")
         good = np.isfinite(e[order, 0]) | (np.diff(track[order], prepend=-1) != 0)
@@ -237,6 +245,12 @@ def _nearer(up: Floats, w: Floats, middle: Floats, offset: Floats) -> Floats:
 def _seen_by(ground: Ground, xy: Floats, middle: Floats, u: Floats) -> Floats:
     """(N, 4) position and velocity with one calibration."""
     return np.column_stack([ground.metres(middle), velocity(ground, xy, middle, u)[0]])
+
+
+def _turned(e: Floats, angle: Floats) -> Floats:
+    """(N, 2) the vectors turned by angles (N,)."""
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return np.asarray(cos * e + sin * np.column_stack([-e[:, 1], e[:, 0]]))
 
 
 def _inverse(A: Floats) -> Floats:
