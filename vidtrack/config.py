@@ -148,6 +148,8 @@ class OutputSettings(Group):
     """s; longest gap between the last measurement of a track and the first of the one that goes on with it"""
     lines: tuple[str, ...] = ()
     """counting lines, each NAME:x1,y1,x2,y2 in source pixels"""
+    site: Path | None = None
+    """site.toml with a calibration: positions in metres and speeds are written; None: pixels only"""
     trail_s: float = Field(2.0, ge=0, le=60)
     """s; how far back the trail behind a vehicle reaches in the annotated video and in rerun"""
     video_crf: int = Field(23, ge=0, le=51)

@@ -1,6 +1,7 @@
 """tracks.csv, tracks.parquet and mot.txt."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -12,11 +13,12 @@ from synthetic_steps import make_step
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.mot import MotFile, settle_gaps
 from vidtrack.output.parquet import ParquetParts
-from vidtrack.output.tables import VIDEO, TrackTable, schema, track_rows
+from vidtrack.output.tables import RADAR_3D, ROAD, VIDEO, TrackTable, layout, schema, track_rows
 
 HEADER = (
     "frame,time_s,track_id,status,x_px,y_px,vx_px_s,vy_px_s,sigma_x_px,sigma_y_px,corr_xy,"
-    "left_px,top_px,width_px,height_px,group_id,nis"
+    "left_px,top_px,width_px,height_px,group_id,nis,"
+    "sigma_vx_px_s,sigma_vy_px_s,corr_vxy,corr_x_vx,corr_x_vy,corr_y_vx,corr_y_vy"
 )
 
 
@@ -40,8 +42,34 @@ def test_columns_are_exactly_the_documented_ones(tmp_path):
     run(TrackTable(tmp_path), [(1, "c", 100.0, 50.0)])
     assert (tmp_path / "tracks.csv").read_text().splitlines() == [
         HEADER,
-        "0,0,1,confirmed,100,50,50,0,2,1,0.1,90,45,20,10,-1,1.5",
+        "0,0,1,confirmed,100,50,50,0,2,1,0.1,90,45,20,10,-1,1.5,3,3,0,0,0,0,0",
     ]
+
+
+def test_the_covariance_of_position_and_velocity_can_be_rebuilt():
+    rng = np.random.default_rng(0)
+    step = make_step(0, [(1, "c", 1, 1), (2, "c", 9, 9)])
+    root = rng.normal(size=(2, 4, 4))
+    P = root @ np.swapaxes(root, 1, 2)
+    row = track_rows([replace(step, tracks=replace(step.tracks, P=P))]).to_pylist()
+    for values, wanted in zip(row, P[:, [0, 2, 1, 3]][:, :, [0, 2, 1, 3]], strict=True):
+        sigma = np.array([values[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
+        corr = np.eye(4)
+        pairs = {"xy": (0, 1), "vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
+        for name, (i, j) in pairs.items():
+            corr[i, j] = corr[j, i] = values[f"corr_{name}"]
+        assert np.allclose(corr * np.outer(sigma, sigma), wanted, atol=0.01)
+
+
+def test_columns_of_tables_that_earlier_versions_wrote():
+    old = HEADER.split(",")[:17]
+    assert [column.name for column in layout(old)] == old
+    assert [column.name for column in layout(HEADER.split(","))] == HEADER.split(",")
+    at_a_site = [column.name for column in (*VIDEO, *ROAD)]
+    assert [column.name for column in layout(at_a_site)] == at_a_site
+    radar = [column.name for column in RADAR_3D]
+    assert [column.name for column in layout(radar)] == radar
+    assert [column.name for column in layout(radar[:15])] == radar[:15]
 
 
 def test_a_run_without_tracks_leaves_tables_with_a_header_only(tmp_path):

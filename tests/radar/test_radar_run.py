@@ -25,6 +25,7 @@ from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 
 HEADER = "scan,time_s,track_id,status,x_m,y_m,vx_m_s,vy_m_s,sigma_x_m,sigma_y_m,corr_xy,nis"
+OF_VELOCITY = "sigma_vx_m_s,sigma_vy_m_s,corr_vxy,corr_x_vx,corr_x_vy,corr_y_vx,corr_y_vy"
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def test_a_run_writes_what_it_promises(tmp_path, scenario):
     out = run(scenario("radar-tws"), tmp_path / "out", extras=Extras(decisions=True))
     names = {"tracks.csv", "tracks.parquet", "summary.json", "tracks.png", "decisions.csv"}
     assert {path.name for path in out.iterdir()} == names
-    assert (out / "tracks.csv").read_text().splitlines()[0] == HEADER
+    assert (out / "tracks.csv").read_text().splitlines()[0] == f"{HEADER},{OF_VELOCITY}"
     assert (out / "decisions.csv").read_text().startswith("scan,time_s,track_id,event,")
     summary = json.loads((out / "summary.json").read_text())
     assert summary["interrupted"] is False
@@ -85,7 +86,8 @@ def test_units_are_in_the_parquet_file_and_rows_are_those_of_the_csv(tmp_path, s
 
 def test_in_space_the_height_follows(tmp_path, scenario):
     out = run(scenario("radar-altitude"), tmp_path / "out")
-    assert (out / "tracks.csv").read_text().splitlines()[0] == HEADER + ",z_m,vz_m_s,sigma_z_m"
+    header = (out / "tracks.csv").read_text().splitlines()[0]
+    assert header == f"{HEADER},z_m,vz_m_s,sigma_z_m,{OF_VELOCITY},sigma_vz_m_s"
     found = scores(out, scenario("radar-altitude"), 500.0)
     assert found["tracks"] == 1
     assert found["idf1"] > 0.99

@@ -33,6 +33,7 @@ SETTING = {
     "smooth": "output.smooth",
     "link": "output.link",
     "lines": "output.lines",
+    "site": "output.site",
     "every_frame": "live.every_frame",
 }
 """Options that stand for a setting, in all commands."""

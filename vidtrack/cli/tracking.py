@@ -36,6 +36,7 @@ class PictureOptions(TrackingOptions):
     video: Path | None
     save_masks: Path | None
     lines: tuple[str, ...]
+    site: Path | None
     start: float | None
     end: float | None
     scale: float | None
@@ -105,6 +106,12 @@ _OPTIONS = (
         metavar="NAME:x1,y1,x2,y2",
         help="Count over a line, in pixels; repeat for more.",
     ),
+    click.option(
+        "--site",
+        type=click.Path(path_type=Path),
+        metavar="SITE.toml",
+        help="Add positions in metres and speeds, by this site's calibration.",
+    ),
     click.option("--start", type=float, metavar="S", help="Begin at this time [s]."),
     click.option("--end", type=float, metavar="S", help="Stop at this time [s]."),
     click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 1/2, 1/3, ..."),
@@ -113,7 +120,7 @@ _OPTIONS = (
 
 
 def picture_options(function: Function) -> Function:
-    """--method, --distance, --detector, --rerun, --video, --save-masks, --line, --decisions, --start, --end, ..."""
+    """--method, --distance, --detector, --rerun, --video, --save-masks, --line, --site, --decisions, --start, ..."""
     for option in reversed(_OPTIONS):
         function = option(function)
     return association_options(function)

@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -14,7 +15,10 @@ import pyarrow.csv
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.parquet import ParquetParts
 from vidtrack.output.sink import Step
-from vidtrack.scan import Status
+from vidtrack.scan import Floats, Status
+
+if TYPE_CHECKING:  # SciPy, only at sites with a calibration
+    from vidtrack.traffic.footprint import Footprints
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,7 @@ def _real(name: str, unit: str, decimals: int = 3) -> Column:
 
 _TRACK = (_real("time_s", "s", 6), Column("track_id", "1", pa.int64()), Column("status", "1", pa.string()))
 
-VIDEO = (
+_VIDEO = (
     Column("frame", "1", pa.int64()),
     *_TRACK,
     _real("x_px", "px"),
@@ -50,9 +54,8 @@ VIDEO = (
     Column("group_id", "1", pa.int64()),
     _real("nis", "1"),
 )
-"""Columns of video tracks. `group_id` is -1 alone; `nis` is empty where there was no update."""
 
-RADAR = (
+_RADAR = (
     Column("scan", "1", pa.int64()),
     *_TRACK,
     _real("x_m", "m"),
@@ -64,10 +67,44 @@ RADAR = (
     _real("corr_xy", "1", 6),
     _real("nis", "1"),
 )
+_RADAR_3D = (*_RADAR, _real("z_m", "m"), _real("vz_m_s", "m/s"), _real("sigma_z_m", "m"))
+
+
+def _of_velocity(unit: str, decimals: int = 3) -> tuple[Column, ...]:
+    """What is left of the covariance of (x, y, vx, vy)."""
+    sigmas = (_real(f"sigma_v{axis}_{unit}_s", f"{unit}/s", decimals) for axis in "xy")
+    return (*sigmas, *(_real(f"corr_{pair}", "1", 6) for pair in _PAIRS))
+
+
+_PAIRS = {"vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
+"""Correlations besides `corr_xy`, with the rows of the covariance."""
+
+VIDEO = (*_VIDEO, *_of_velocity("px"))
+"""Columns of video tracks. `group_id` is -1 alone; `nis` is empty where there was no update."""
+
+RADAR = (*_RADAR, *_of_velocity("m"))
 """Columns of radar tracks in the plane: x east, y north."""
 
-RADAR_3D = (*RADAR, _real("z_m", "m"), _real("vz_m_s", "m/s"), _real("sigma_z_m", "m"))
+RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"))
 """Columns of radar tracks in space: z up."""
+
+ROAD = (
+    _real("x_m", "m"),
+    _real("y_m", "m"),
+    _real("sigma_x_m", "m"),
+    _real("sigma_y_m", "m"),
+    _real("corr_xy_m", "1", 6),
+    _real("shared_sigma_x_m", "m"),
+    _real("shared_sigma_y_m", "m"),
+    _real("speed_kmh", "km/h"),
+    _real("speed_sigma_kmh", "km/h"),
+    _real("speed_shared_sigma_kmh", "km/h"),
+    _real("heading_deg", "deg", 2),
+    _real("length_m", "m"),
+    _real("length_sigma_m", "m"),
+    _real("width_m", "m"),
+)
+"""Columns on the road, of video tracks at a calibrated site; empty where the calibration says nothing."""
 
 _STATUS_WORDS = np.array([status.name.lower() for status in Status])
 
@@ -78,15 +115,25 @@ def schema(columns: Sequence[Column]) -> pa.Schema:
 
 
 def layout(names: Sequence[str]) -> Sequence[Column]:
-    """The columns of a table of tracks with these names; those of video where they fit nothing."""
-    return next((columns for columns in (RADAR_3D, RADAR) if {c.name for c in columns} <= set(names)), VIDEO)
+    """The columns of a table of tracks with these names; those of video where they fit nothing.
+
+    Columns after the first ones may be missing: earlier versions did not write them.
+    """
+    kinds = ((_RADAR_3D, RADAR_3D), (_RADAR, RADAR))
+    first, known = next((kind for kind in kinds if {c.name for c in kind[0]} <= set(names)), (_VIDEO, (*VIDEO, *ROAD)))
+    return [*first, *(c for c in known if c.name in names and c not in first)]
 
 
-def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO) -> pa.Table:
-    """Table with these columns, rows in the order of the steps."""
+def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: Footprints | None = None) -> pa.Table:
+    """Table with these columns, rows in the order of the steps.
+
+    road  places the vehicles for the columns of ROAD; it sees the scene, which stays on the road when the camera moves
+    """
     counts = [len(step.tracks) for step in steps]
-    x, P, box = (stacked(steps, name) for name in ("x", "P", "box"))
     position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
+    on_road = {} if road is None else _road_values(steps, road)
+    steps = [step.in_picture() for step in steps]
+    x, P, box = (stacked(steps, name) for name in ("x", "P", "box"))
     cov = P[:, position][:, :, position]
     sigma = np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
     values = {
@@ -103,8 +150,39 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO) -> pa.T
             values[f"{axis}_{unit}"] = x[:, position[k]]
             values[f"v{axis}_{unit}_s"] = x[:, velocity[k]]
             values[f"sigma_{axis}_{unit}"] = sigma[:, k]
+            values[f"sigma_v{axis}_{unit}_s"] = np.sqrt(P[:, velocity[k], velocity[k]])
+    plane = [*position[:2], *velocity[:2]]
+    for name, (i, j) in _PAIRS.items():
+        i, j = plane[i], plane[j]
+        values[f"corr_{name}"] = P[:, i, j] / np.sqrt(P[:, i, i] * P[:, j, j])
+    values |= on_road
     values |= zip(("left_px", "top_px", "width_px", "height_px"), box.T, strict=True)
     return pa.Table.from_arrays([_array(c, values[c.name]) for c in columns], schema=schema(columns))
+
+
+def _road_values(steps: Sequence[Step], road: Footprints) -> dict[str, Floats]:
+    """The values of ROAD, all (N,)."""
+    plane = [*steps[0].tracks.position[:2], *steps[0].tracks.velocity[:2]]
+    x, P = stacked(steps, "x")[:, plane], stacked(steps, "P")[:, plane][:, :, plane]
+    stand = road.place(stacked(steps, "id"), x[:, :2], x[:, 2:], P, stacked(steps, "box"))
+    sigma = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
+    shared = np.linalg.norm(stand.xy_shared, axis=2)
+    return {
+        "x_m": stand.xy[:, 0],
+        "y_m": stand.xy[:, 1],
+        "sigma_x_m": sigma[:, 0],
+        "sigma_y_m": sigma[:, 1],
+        "corr_xy_m": stand.xy_own[:, 0, 1] / sigma.prod(axis=1),
+        "shared_sigma_x_m": shared[:, 0],
+        "shared_sigma_y_m": shared[:, 1],
+        "speed_kmh": 3.6 * stand.speed,
+        "speed_sigma_kmh": 3.6 * stand.speed_own_sigma,
+        "speed_shared_sigma_kmh": 3.6 * np.linalg.norm(stand.speed_by_shared, axis=1),
+        "heading_deg": np.degrees(stand.heading) % 360,
+        "length_m": stand.length,
+        "length_sigma_m": stand.length_sigma,
+        "width_m": stand.width,
+    }
 
 
 def stacked(steps: Sequence[Step], name: str) -> np.ndarray:
@@ -121,8 +199,9 @@ def _array(column: Column, values: np.ndarray) -> pa.Array:
 class TrackTable:
     """Sink that writes tracks.csv every second and tracks.parquet in parts."""
 
-    def __init__(self, folder: Path, columns: Sequence[Column] = VIDEO) -> None:
-        self._columns = columns
+    def __init__(self, folder: Path, columns: Sequence[Column] = VIDEO, road: Footprints | None = None) -> None:
+        columns = columns if road is None else (*columns, *ROAD)
+        self._columns, self._road = columns, road
         self._csv = LineFile(folder / "tracks.csv", ",".join(c.name for c in columns) + "\n")
         self._parquet = ParquetParts(folder / "tracks.parquet", schema(columns))
         self._waiting: list[Step] = []
@@ -131,7 +210,7 @@ class TrackTable:
     def step(self, step: Step) -> None:
         """Take one frame's confirmed tracks."""
         if len(step.tracks):
-            self._waiting.append(step.in_picture())
+            self._waiting.append(step)
         if self._due():
             self._write()
 
@@ -146,7 +225,7 @@ class TrackTable:
     def _write(self) -> None:
         if not self._waiting:
             return
-        table = track_rows(self._waiting, self._columns)
+        table = track_rows(self._waiting, self._columns, self._road)
         self._waiting.clear()
         self._csv.add(csv_text(table))
         self._csv.flush()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vidtrack.config import Settings
 from vidtrack.estimate.model import Motion
@@ -23,10 +24,14 @@ from vidtrack.output.threaded import Threaded
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
+from vidtrack.traffic.road import road_at
 from vidtrack.video.detections import Detections
 from vidtrack.video.frame import Image
 from vidtrack.video.recording import Recording
 from vidtrack.video.source import Source
+
+if TYPE_CHECKING:
+    from vidtrack.traffic.footprint import Footprints
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +45,7 @@ class Subject:
     scene     gives the (H, W, 3) background; None: there are no pictures
     reading   gives the source's own account, see Summary
     counter   counts over lines; None without any
+    road      places vehicles on the road; None without a calibrated site
     """
 
     source: str
@@ -49,6 +55,7 @@ class Subject:
     scene: Callable[[], Image] | None
     reading: Callable[[], Mapping[str, object]]
     counter: LineCounter | None
+    road: Footprints | None
 
     @property
     def lines(self) -> Sequence[Line]:
@@ -73,7 +80,7 @@ def file_subject(
     settings: Settings,
     scene: Callable[[], Image] | None,
 ) -> Subject:
-    """A source that ends, `path` as the user wrote it. Raises ConfigError for lines that cannot be counted over."""
+    """A source that ends, `path` as the user wrote it. Raises ConfigError for a bad line or site."""
     stats = source.stats
 
     def reading() -> dict[str, object]:
@@ -91,7 +98,8 @@ def file_subject(
         }
 
     counter = line_counter(settings, source.width, source.height)
-    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter)
+    road = road_at(settings.output.site, source.width, source.height)
+    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road)
 
 
 def file_sinks(
@@ -108,7 +116,7 @@ def file_sinks(
         yield CountsFile(folder / "counts.csv", counter)
     totals = counter.totals if counter else None
     plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines, totals)
-    tables: tuple[Sink, ...] = (TrackTable(folder), MotFile(folder / "mot.txt"), plot)
+    tables: tuple[Sink, ...] = (TrackTable(folder, road=subject.road), MotFile(folder / "mot.txt"), plot)
     if link_s is not None:
         tables = (Linked(*tables, motion=motion, longest_s=link_s),)
     yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)

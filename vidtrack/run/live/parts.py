@@ -20,7 +20,7 @@ from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.repair import add_parquet, repair
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
-from vidtrack.output.tables import VIDEO, csv_text, track_rows
+from vidtrack.output.tables import ROAD, VIDEO, csv_text, track_rows
 from vidtrack.run.live.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.sinks import Subject
 
@@ -138,9 +138,11 @@ class Part:
 
     def __init__(self, folder: Path, subject: Subject, decisions: bool) -> None:
         self.folder = folder
+        self._road = subject.road
+        self._columns = VIDEO if subject.road is None else (*VIDEO, *ROAD)
         with ExitStack() as stack:  # if the disk is full, what is open by then is closed
             self._summary = subject.summary(folder)
-            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in VIDEO) + "\n")
+            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in self._columns) + "\n")
             stack.callback(self._tracks.close)
             self._mot = MotFile(folder / "mot.txt")
             stack.callback(self._mot.close)
@@ -156,9 +158,9 @@ class Part:
 
     def write(self, steps: Sequence[Step], crossings: str) -> None:
         """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
-        shown = [step.in_picture() for step in steps if len(step.tracks)]
-        if shown:
-            _write(self._tracks, csv_text(track_rows(shown)))
+        filled = [step for step in steps if len(step.tracks)]
+        if filled:
+            _write(self._tracks, csv_text(track_rows(filled, self._columns, self._road)))
         if self._counts is not None and crossings:
             _write(self._counts, crossings)
         for step in steps:

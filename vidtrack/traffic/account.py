@@ -1,0 +1,153 @@
+"""What a calibration is worth: the account that `vidtrack calibrate` gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vidtrack.scan import Floats
+from vidtrack.traffic.calibrate import checked, complaints, pairs_of, road_plane, solved
+from vidtrack.traffic.footprint import velocity
+from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.site import Site
+from vidtrack.traffic.straight_road import straight_road
+
+_HEIGHT_SIGMAS, _HEIGHT_SHARE = 3.0, 0.1
+"""A stated height of the camera contradicts the points when it is off by both of these."""
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """ground; the report as plain data; (N, 2) the points, and where the fit puts them, in the picture [px]."""
+
+    ground: Ground
+    report: dict[str, Any]
+    picture: Floats
+    fitted: Floats
+
+
+def examined(site: Site) -> Account:
+    """The account of a site's calibration. Raises ConfigError as `calibrated` does."""
+    calibration = site.calibration
+    assert calibration is not None
+    if not calibration.picture:
+        return _without_map(site)
+    pairs = pairs_of(site)
+    fit = solved(pairs)
+    check = checked(pairs, fit)
+    ground = road_plane(site, pairs, fit, check)
+    picture = np.array(calibration.picture)
+    fitted = ground.pixels(pairs.plane.back(pairs.X))
+    found = camera(ground)
+    columns = {
+        "residual_px": check.residual_px,
+        "residual_m": check.residual_m,
+        "without_px": check.without_px,
+        "without_m": check.without_m,
+        "d2": check.d2,
+    }
+    report = {
+        "site": site.camera.name,
+        "pairs": [
+            {"picture": list(calibration.picture[i]), "ground": list(calibration.ground[i])}
+            | {name: float(values[i]) if np.isfinite(values[i]) else None for name, values in columns.items()}
+            for i in range(len(picture))
+        ],
+        "chi2": check.chi2,
+        "degrees_of_freedom": check.spare,
+        "wrong": [i + 1 for i in check.wrong],
+        "contradiction": check.contradiction,
+        "camera": found,
+        "places": places(ground, picture),
+        "warnings": complaints(site, check) + height_complaint(found, calibration.camera_height_m),
+    }
+    return Account(ground, report, picture, fitted)
+
+
+def _without_map(site: Site) -> Account:
+    """The account of a calibration by segments of a straight road."""
+    calibration = site.calibration
+    assert calibration is not None
+    fit = straight_road(site)
+    found = camera(fit.ground)
+    picture = np.array([point for _, point in calibration.points()])
+    report = {
+        "site": site.camera.name,
+        "pairs": [],
+        "chi2": fit.chi2,
+        "degrees_of_freedom": fit.spare,
+        "wrong": [],
+        "contradiction": fit.contradiction,
+        "camera": found,
+        "places": places(fit.ground, picture),
+        "warnings": fit.complaints() + height_complaint(found, calibration.camera_height_m),
+    }
+    return Account(fit.ground, report, picture, picture)
+
+
+def places(ground: Ground, picture: Floats) -> list[dict[str, Any]]:
+    """What a pixel is worth and what the calibration does to speeds, near, in the middle and far.
+
+    picture  (N, 2) points whose nearest and farthest are looked at, and their middle on the road [px]
+    """
+    road = ground.metres(picture)
+    order = np.argsort(ground.depth(road))
+    xy_m = np.vstack([road[order[0]], road.mean(axis=0), road[order[-1]]])
+    xy = ground.pixels(xy_m)
+    own = np.linalg.svd(ground.by_own_error(xy_m), compute_uv=False)
+    shared = np.linalg.norm(ground.by_shared_error(xy_m), axis=(1, 2))
+    speed = _speed_share(ground, xy)
+    return [
+        {
+            "where": where,
+            "picture_px": xy[i].round(1).tolist(),
+            "ground_m": xy_m[i].round(3).tolist(),
+            "m_per_px_away": float(own[i, 0]),
+            "m_per_px_across": float(own[i, 1]),
+            "position_sigma_m": float(shared[i]),
+            "speed_sigma_percent": float(100 * speed[i]),
+        }
+        for i, where in enumerate(("near", "middle", "far"))
+    ]
+
+
+def camera(ground: Ground) -> dict[str, float] | None:
+    """Focal length and height of the camera with the height's standard deviation; None where they cannot be told."""
+    pose = ground.pose()
+    if pose is None:
+        return None
+    poses = [(above.pose(), below.pose()) for above, below in ground.varied()]
+    changes = [(a.height_m - b.height_m) / 2 if a and b else np.inf for a, b in poses]
+    return {
+        "focal_px": pose.focal_px,
+        "height_m": pose.height_m,
+        "height_sigma_m": float(np.linalg.norm(changes)),
+    }
+
+
+def height_complaint(found: dict[str, float] | None, stated_m: float | None) -> list[str]:
+    """A word about a stated height of the camera that the points contradict."""
+    if found is None or stated_m is None:
+        return []
+    off = abs(found["height_m"] - stated_m)
+    if off <= _HEIGHT_SIGMAS * found["height_sigma_m"] or off <= _HEIGHT_SHARE * stated_m:
+        return []
+    return [
+        f"camera_height_m = {stated_m:g}, but the points put the camera {found['height_m']:.1f} m above the road "
+        f"(standard deviation {found['height_sigma_m']:.1f} m); check both, and the unit of ground"
+    ]
+
+
+def _speed_share(ground: Ground, xy: Floats) -> Floats:
+    """(N,) standard deviation that the calibration gives to speeds at picture points, as a share: the worst way."""
+    J = ground.px_per_m(ground.metres(xy))
+    changes = np.zeros((2, len(xy), 2, 8))
+    for i, e in enumerate(np.eye(2)):
+        for k, (above, below) in enumerate(ground.varied()):
+            changes[i, :, :, k] = (velocity(above, xy, xy, J @ e)[0] - velocity(below, xy, xy, J @ e)[0]) / 2
+    angles = np.linspace(0, np.pi, 36, endpoint=False)
+    e = np.column_stack([np.cos(angles), np.sin(angles)])
+    along = np.einsum("ai,aj,injp->anp", e, e, changes)
+    return np.asarray(np.linalg.norm(along, axis=2).max(axis=0))

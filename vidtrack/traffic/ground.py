@@ -1,0 +1,107 @@
+"""The road plane: from the picture to metres and back, with the errors of the calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vidtrack.scan import Floats
+from vidtrack.traffic.homography import Normal, by_k, by_point, depth, matrix, picture_of, plane_of
+from vidtrack.traffic.hull import within
+from vidtrack.traffic.lens import Lens
+from vidtrack.traffic.pose import Pose, pose_of
+
+_EDGE = 3.0
+"""Standard deviations of a calibration point by which the hull is widened: so well are its corners known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """A calibrated picture. Positions are in metres, x east, y north.
+
+    plane, picture   normalised coordinates of the homography, metres and undistorted pixels
+    k, cov           (8,), (8, 8) the homography and its covariance, which all positions share
+    lens             None: straight lines are straight
+    center           (2,) where the optical axis meets the picture [px]
+    focal_px         None: from the homography
+    hull             (M, 3) of the calibration's points, in undistorted pixels
+    sigma_px         standard deviation of those points
+    """
+
+    plane: Normal
+    picture: Normal
+    k: Floats
+    cov: Floats
+    lens: Lens | None
+    center: Floats
+    focal_px: float | None
+    hull: Floats
+    sigma_px: float
+
+    def straight(self, xy: Floats) -> Floats:
+        """(N, 2) picture points without the lens's distortion [px]."""
+        return xy if self.lens is None else self.lens.straight(xy)
+
+    def inside(self, xy: Floats) -> Floats:
+        """(N, 2) picture points; NaN where the calibration says nothing, outside the hull of its points."""
+        return np.where(within(self.hull, self.straight(xy), _EDGE * self.sigma_px)[:, None], xy, np.nan)
+
+    def metres(self, xy: Floats) -> Floats:
+        """(N, 2) positions on the road of picture points (N, 2); NaN above the horizon."""
+        return self.plane.back(plane_of(self.k, self.picture.into(self.straight(xy))))
+
+    def pixels(self, xy_m: Floats) -> Floats:
+        """(N, 2) picture points of positions on the road (N, 2)."""
+        xy = self.picture.back(picture_of(self.k, self.plane.into(xy_m)))
+        return xy if self.lens is None else self.lens.bent(xy)
+
+    def px_per_m(self, xy_m: Floats) -> Floats:
+        """(N, 2, 2) derivative of `pixels`."""
+        J = self.straight_px_per_m(xy_m)
+        if self.lens is None:
+            return J
+        straight = self.picture.back(picture_of(self.k, self.plane.into(xy_m)))
+        return self.lens.jacobian(straight) @ J
+
+    def straight_px_per_m(self, xy_m: Floats) -> Floats:
+        """(N, 2, 2) derivative of the undistorted picture points of positions on the road."""
+        return by_point(self.k, self.plane.into(xy_m)) * (self.picture.scale / self.plane.scale)
+
+    def depth(self, xy_m: Floats) -> Floats:
+        """(N,) w of positions on the road, in proportion to their distance from the camera along its axis."""
+        return depth(self.k, self.plane.into(xy_m))
+
+    @property
+    def receding(self) -> Floats:
+        """(2,) the gradient of w [1/m]."""
+        return np.asarray(self.k[6:] / self.plane.scale)
+
+    def pose(self) -> Pose | None:
+        """The camera; None where its focal length cannot be told from the homography."""
+        view = np.array([[self.picture.scale, 0, 0], [0, self.picture.scale, 0], [0, 0, 1.0]])
+        view[:2, 2] = self.picture.origin
+        return pose_of(view @ matrix(self.k), self.plane.scale, self.center, self.focal_px)
+
+    def by_own_error(self, xy_m: Floats) -> Floats:
+        """(N, 2, 2) derivative of positions with respect to their picture points [m/px]."""
+        return np.asarray(np.linalg.inv(self.px_per_m(xy_m)))
+
+    def by_shared_error(self, xy_m: Floats) -> Floats:
+        """(N, 2, 8) derivative of positions, at fixed picture points, with respect to eight independent errors of
+        unit variance that the calibration makes: with D of two positions, their covariance is D1 D2'.
+        """
+        X = self.plane.into(xy_m)
+        moved = np.linalg.solve(by_point(self.k, X), by_k(self.k, X))  # picture_of(k, X) stays where it is
+        return np.asarray(-self.plane.scale * moved @ self._errors())
+
+    def varied(self) -> Iterator[tuple[Ground, Ground]]:
+        """Pairs of calibrations, each pair one of those eight errors above and below this one."""
+        for error in self._errors().T:
+            yield replace(self, k=self.k + error), replace(self, k=self.k - error)
+
+    def _errors(self) -> Floats:
+        """(8, 8) a square root of the covariance."""
+        variance, direction = np.linalg.eigh(self.cov)
+        return np.asarray(direction * np.sqrt(np.maximum(variance, 0)))

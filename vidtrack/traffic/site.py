@@ -1,0 +1,352 @@
+"""A site: where the gates, the zones and the road are in the picture of one camera; one file, `site.toml`."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, AwareDatetime, BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import model_validator as whole
+
+from vidtrack.errors import ConfigError
+from vidtrack.settings.group import Group
+from vidtrack.toml_file import read_toml
+from vidtrack.traffic.polyline import crosses_itself
+
+_NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
+_ASPECT_PX = 1.0  # what rounding to whole pixels may do to a picture's height
+
+
+def _plain(name: str) -> str:
+    """Names go into tables that spreadsheets and browsers open: nothing in them may be a formula, a cell or a tag."""
+    if not _NAME.fullmatch(name):
+        raise ValueError(
+            "a name begins with a letter or a digit; letters, digits, spaces and . _ - may follow, up to 64 characters"
+        )
+    return name
+
+
+Name = Annotated[str, AfterValidator(_plain)]
+Point = tuple[float, float]
+Positive = Annotated[float, Field(gt=0)]
+Segment = tuple[Point, Point]
+
+
+def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    for first, second in pairwise(points):
+        if first == second:
+            raise ValueError(f"the point {_written(first)} stands twice in a row")
+    return points
+
+
+def _path(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    if len(points) < 2:
+        raise ValueError("a line needs at least 2 points")
+    if crosses_itself(np.array(_distinct(points)), closed=False):
+        raise ValueError("the line crosses itself; its sides would have no meaning")
+    return points
+
+
+def _outline(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    points = points[:-1] if points[:1] == points[-1:] else points
+    if len(points) < 3:
+        raise ValueError("a polygon needs at least 3 corners")
+    if crosses_itself(np.array(_distinct(points)), closed=True):
+        raise ValueError("the polygon crosses itself; list its corners in order around it")
+    return points
+
+
+class Camera(Group):
+    """The picture, and the time of its first one."""
+
+    name: Name
+    """of the site"""
+    width: int = Field(gt=0)
+    """px; of the picture that all coordinates refer to"""
+    height: int = Field(gt=0)
+    """px"""
+    start: AwareDatetime | None = None
+    """time of the video's first picture, with its zone"""
+
+
+class Calibration(Group):
+    """Where points of the road are in the picture.
+
+    Either `picture` with `ground`, or, without a map, `lengths` with `directions` (and `across`).
+    """
+
+    picture: tuple[Point, ...] = ()
+    """px; points of the road in the picture, at least 4"""
+    ground: tuple[Point, ...] = ()
+    """m, x east and y north; the same points on the road; with `geographic`, longitude and latitude in degrees"""
+    sigma_picture_px: float = Field(1.0, gt=0)
+    """px; standard deviation of a picture point, per axis"""
+    sigma_ground_m: float = Field(0.02, ge=0)
+    """m; standard deviation of a ground point, per axis, or of a known length"""
+    camera_height_m: float | None = Field(None, gt=0)
+    """m above the road, to compare with what the points say; None: not known"""
+    geographic: bool = False
+    """`ground` holds longitudes and latitudes"""
+    epsg: int | None = Field(None, gt=0)
+    """metric coordinate system of `ground`, or the one that longitudes and latitudes are brought into"""
+    distortion: tuple[float, float] | None = None
+    """k1, k2 of the lens (Brown-Conrady, on normalised coordinates); None: straight lines are straight"""
+    focal_px: float | None = Field(None, gt=0)
+    """px; focal length; None: from the points, with square pixels"""
+    center: Point | None = None
+    """px; where the optical axis meets the picture; None: its middle"""
+    lengths: tuple[tuple[Point, Point, Positive], ...] = ()
+    """px, px, m; segments on the road with their lengths"""
+    directions: tuple[Segment, ...] = ()
+    """px; segments along a straight road, at least 2"""
+    across: tuple[Segment, ...] = ()
+    """px; segments square to them, at least 2 where the focal length is not given"""
+
+    @whole(mode="after")
+    def _one_kind(self) -> Calibration:
+        plan = bool(self.picture or self.ground)
+        if plan == bool(self.lengths or self.directions or self.across):
+            raise ValueError("give picture and ground, or lengths and directions, and not both")
+        if plan:
+            self._check_points()
+        elif len(self.directions) < 2 or not self.lengths:
+            raise ValueError("without ground points at least 2 directions and 1 length are needed")
+        elif len(self.across) < 2 and (self.across or self.focal_px is None):
+            raise ValueError("give at least 2 segments across, or none and focal_px")
+        if self.distortion is not None and self.focal_px is None:
+            raise ValueError("distortion is on normalised coordinates and needs focal_px")
+        return self
+
+    def _check_points(self) -> None:
+        if len(self.picture) != len(self.ground):
+            raise ValueError(f"{len(self.picture)} points in picture, {len(self.ground)} in ground; they are pairs")
+        if len(self.picture) < 4:
+            raise ValueError(f"{len(self.picture)} pairs of points; a plane needs at least 4")
+        for name, points in (("picture", self.picture), ("ground", self.ground)):
+            if len(set(points)) < len(points):
+                twice = next(point for point in points if points.count(point) > 1)
+                raise ValueError(f"the point {_written(twice)} stands twice in {name}")
+        if self.geographic and self.epsg is None:
+            raise ValueError("geographic needs epsg, the metric system to measure in, for example 25832")
+        if self.geographic and not all(abs(lon) <= 180 and abs(lat) <= 90 for lon, lat in self.ground):
+            raise ValueError("with geographic, ground is longitude (-180 to 180) and latitude (-90 to 90) in degrees")
+
+    def points(self) -> Iterator[tuple[str, Point]]:
+        """Every picture point with the key that it stands under."""
+        yield from (("picture", point) for point in self.picture)
+        yield from (("lengths", point) for first, second, _ in self.lengths for point in (first, second))
+        for name in ("directions", "across"):
+            yield from ((name, point) for segment in getattr(self, name) for point in segment)
+
+
+class Gate(Group):
+    """A line that vehicles are counted over."""
+
+    line: Annotated[tuple[Point, ...], AfterValidator(_path)]
+    """px; the corners of the line"""
+    leg: Name | None = None
+    """arm of the junction that the gate lies on"""
+    role: Literal["entry", "exit", "both", "neutral"] = "neutral"
+    """whether vehicles enter the site there, leave it, both, or neither"""
+
+
+class Zone(Group):
+    """A part of the road."""
+
+    polygon: Annotated[tuple[Point, ...], AfterValidator(_outline)]
+    """px; its corners in order"""
+
+
+class Section(Group):
+    """The way from one gate to another, with its length: speeds without a calibration."""
+
+    from_gate: str = Field(alias="from")
+    """gate where it begins"""
+    to_gate: str = Field(alias="to")
+    """gate where it ends"""
+    length_m: float = Field(gt=0)
+    """m"""
+
+
+class Movements(Group):
+    """Which movements there are."""
+
+    allowed: tuple[tuple[str, str], ...] = ()
+    """legs from which and to which vehicles may go"""
+
+
+class Report(Group):
+    """How figures are summed up."""
+
+    interval_s: float = Field(900.0, gt=0)
+    """s"""
+
+
+def _bounds(bounds: tuple[float, float]) -> tuple[float, float]:
+    if not 0 <= bounds[0] < bounds[1]:
+        raise ValueError("write the shortest length, then the longest, in metres")
+    return bounds
+
+
+class Site(Group):
+    """Everything that is known of a site. Frozen; all picture coordinates refer to `camera.width` x `camera.height`."""
+
+    camera: Camera = Field(alias="site")
+    calibration: Calibration | None = None
+    gates: dict[Name, Gate] = Field({})
+    zones: dict[Name, Zone] = Field({})
+    sections: dict[Name, Section] = Field({})
+    movements: Movements = Movements()
+    classes: dict[Name, Annotated[tuple[float, float], AfterValidator(_bounds)]] = Field({})
+    report: Report = Report()
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """The legs in order of their gates; a gate without one is a leg by itself."""
+        return tuple(dict.fromkeys(gate.leg or name for name, gate in self.gates.items()))
+
+    @property
+    def center(self) -> Point:
+        """Where the optical axis meets the picture [px]."""
+        given = None if self.calibration is None else self.calibration.center
+        return given or ((self.camera.width - 1) / 2, (self.camera.height - 1) / 2)
+
+    @field_validator("gates", "zones", "calibration")
+    @classmethod
+    def _inside(cls, parts: Any, given: ValidationInfo) -> Any:
+        camera = given.data.get("camera")
+        if parts is None or camera is None:
+            return parts
+        for name, (x, y) in _picture_points(parts):
+            if not (-0.5 <= x <= camera.width and -0.5 <= y <= camera.height):
+                size = f"{camera.width} x {camera.height}"
+                raise ValueError(f"the point {_written((x, y))} of {name} lies outside the {size} picture")
+        return parts
+
+    @whole(mode="after")
+    def _known_names(self) -> Site:
+        for name, section in self.sections.items():
+            for key, gate in (("from", section.from_gate), ("to", section.to_gate)):
+                if gate not in self.gates:
+                    raise ValueError(f"sections.{name}.{key} = {gate!r}: no such gate{_near(gate, self.gates)}")
+            if section.from_gate == section.to_gate:
+                raise ValueError(f"sections.{name} begins and ends at the gate {section.to_gate!r}; name two gates")
+        for movement in self.movements.allowed:
+            for leg in movement:
+                if leg not in self.legs:
+                    raise ValueError(f"movements.allowed: no gate is on a leg {leg!r}{_near(leg, self.legs)}")
+        return self
+
+    def scaled(self, width: int, height: int) -> Site:
+        """The site for another size of the same picture. Raises ConfigError where the aspect is another."""
+        was = self.camera
+        if (width, height) == (was.width, was.height):
+            return self
+        if abs(width * was.height / was.width - height) > _ASPECT_PX:
+            raise ConfigError(
+                f"the site {was.name} is drawn on a {was.width} x {was.height} picture, and this one is "
+                f"{width} x {height}: not the same shape, so the place of the site in it is not known"
+            )
+        fx, fy = width / was.width, height / was.height
+        tree = _moved(self, lambda point: (fx * (point[0] + 0.5) - 0.5, fy * (point[1] + 0.5) - 0.5))
+        tree["site"] |= {"width": width, "height": height}
+        if self.calibration is not None:
+            for name in ("sigma_picture_px", "focal_px"):
+                value = getattr(self.calibration, name)
+                tree["calibration"][name] = None if value is None else fx * value
+        return Site.model_validate(tree)
+
+
+_SECTIONS: dict[str, type[BaseModel]] = {
+    "site": Camera,
+    "calibration": Calibration,
+    "movements": Movements,
+    "report": Report,
+}
+_PARTS: dict[str, type[BaseModel]] = {"gates": Gate, "zones": Zone, "sections": Section}
+
+
+def read_site(path: str | Path) -> Site:
+    """The site in a TOML file.
+
+    Raises ConfigError for an unreadable file, an unknown key (naming the nearest), or a value that cannot be meant:
+    points outside the picture, lines and polygons that cross themselves, unknown gates and legs, names that a
+    spreadsheet or a browser could take for more than a name.
+    """
+    path = Path(path)
+    tree = read_toml(path, "site")
+    try:
+        return Site.model_validate(tree)
+    except ValidationError as error:
+        raise ConfigError("\n".join(f"{path}: {_complaint(detail)}" for detail in error.errors())) from None
+
+
+def _picture_points(parts: dict[str, Gate | Zone] | Calibration) -> Iterator[tuple[str, Point]]:
+    """Every picture point of gates, zones or the calibration, and whose it is."""
+    if isinstance(parts, Calibration):
+        yield from parts.points()
+        return
+    for name, part in parts.items():
+        yield from ((name, point) for point in (part.line if isinstance(part, Gate) else part.polygon))
+
+
+def _moved(site: Site, move: Callable[[Point], Point]) -> dict[str, Any]:
+    """The site as a tree, with every picture point moved."""
+    tree = site.model_dump(by_alias=True)
+    for gate in tree["gates"].values():
+        gate["line"] = [move(point) for point in gate["line"]]
+    for zone in tree["zones"].values():
+        zone["polygon"] = [move(point) for point in zone["polygon"]]
+    calibration = tree["calibration"]
+    if calibration is not None:
+        calibration["picture"] = [move(point) for point in calibration["picture"]]
+        calibration["lengths"] = [(move(first), move(second), m) for first, second, m in calibration["lengths"]]
+        for name in ("directions", "across"):
+            calibration[name] = [[move(point) for point in segment] for segment in calibration[name]]
+        if calibration["center"] is not None:
+            calibration["center"] = move(calibration["center"])
+    return tree
+
+
+def _complaint(detail: Any) -> str:
+    """One line for one mistake: the key, what was given, what is allowed."""
+    path = [str(part) for part in detail["loc"] if part != "[key]"]
+    key = ".".join(path)
+    if detail["type"] == "extra_forbidden":
+        return f"unknown key {key}{_near(path[-1], _keys(path[:-1]))}"
+    if detail["type"] == "missing":
+        return f"{key} is missing"
+    message = detail["msg"].removeprefix("Value error, ")
+    if key in ("", "calibration", "gates", "zones"):  # the whole of a section was given: the message names the place
+        return f"[{key}]: {message}" if key else message
+    if key == "site.start":
+        return f"{key} = {detail['input']}: write date, time and zone, for example 2026-06-01T07:00:00+02:00"
+    return f"{key} = {detail['input']!r}: {message[0].lower()}{message[1:]}"
+
+
+def _keys(path: list[str]) -> list[str]:
+    """The keys that may stand at a place of the file."""
+    group: type[BaseModel] = Site
+    if path[1:]:
+        group = _PARTS[path[0]]
+    elif path:
+        group = _SECTIONS[path[0]]
+    return [info.alias or name for name, info in group.model_fields.items()]
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    """The nearest of the known names, and all of them where none is near."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    if near:
+        return f"; did you mean {near[0]}?"
+    return f"; there {'are' if len(names) > 1 else 'is'} {', '.join(names)}" if names else "; there is none"
+
+
+def _written(point: Point) -> str:
+    return f"({point[0]:g}, {point[1]:g})"
