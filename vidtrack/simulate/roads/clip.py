@@ -38,8 +38,9 @@ from vidtrack.simulate.wet import DARKER
 START = datetime.fromisoformat("2026-06-01T07:00:00+02:00")
 SIZE, FPS, SECONDS, HEIGHT_M = (1280, 720), 25.0, 60.0, 8.0
 VIEW = np.radians(60)
+LEAST_POINTS = 4  # on the road that the camera must show, to calibrate it
 AIR_PX = 512.0  # width of a picture in which rain and snow have the size of the flat scenarios
-MIRRORED = 0.3
+MIRRORED, MIRROR_LIGHT = 0.3, 0.7  # share of a wet road's light that is mirrored, and what that loses
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +87,8 @@ class RoadClip:
                 left_top, right_bottom = np.clip(actor.box.reshape(2, 2), 0, self.size)
                 if (right_bottom - left_top < 1).any():
                     continue
-                seen = visible_share(actor, actors[place + 1 :], self.size)
-                boxes.append([*left_top, *(right_bottom - left_top), seen, *(actor.box[:2] + actor.box[2:]) / 2])
+                share = visible_share(actor, actors[place + 1 :], self.size)
+                boxes.append([*left_top, *(right_bottom - left_top), share, *(actor.box[:2] + actor.box[2:]) / 2])
                 row = actor.row
                 state = states.speed[row], states.heading[row], *states.xy[row]
                 rows.append([k, time, states.vehicle[row], *state])
@@ -150,16 +151,11 @@ class RoadClip:
         """Mirror the vehicles in the wet road, blurred as a rough surface does."""
         mirrored = picture.copy()
         for actor in actors:
-            colour = 0.7 * self.fleet_colour(actor)
+            colour = MIRROR_LIGHT * actor.solid.colours[~actor.solid.glows].mean(axis=0)
             for polygon in actor.mirrored(view):
                 cv2.fillConvexPoly(mirrored, np.rint(polygon - 0.5).astype(np.int32), colour.tolist())
         mirrored = np.asarray(cv2.blur(mirrored, (3, 9)))
         cv2.addWeighted(picture, 1 - MIRRORED, mirrored, MIRRORED, 0, dst=picture)
-
-    @staticmethod
-    def fleet_colour(actor: Actor) -> Floats:
-        """(3,) BGR; of a vehicle's largest parts on average."""
-        return np.asarray(actor.solid.colours[~actor.solid.glows].mean(axis=0))
 
     @cached_property
     def _ground(self) -> Image:
@@ -240,6 +236,12 @@ def simulate_road(
     times = np.arange(max(1, round((seconds or SECONDS) * rate))) / rate
     tilt = layout.tilt if tilt_deg is None else np.radians(tilt_deg)
     eye = pinhole(layout.aim, layout.azimuth, tilt, camera_height, shape, VIEW, lens)
+    seen = int(eye.shows(layout.survey, shape).sum())
+    if seen < LEAST_POINTS:
+        raise ConfigError(
+            f"the camera shows {seen} of the points to calibrate it with, and {LEAST_POINTS} are needed; "
+            "choose another camera_height or tilt_deg"
+        )
     history, fleet = drive(layout.network, flow or layout.flow, -layout.warm_s, float(times[-1]), traffic_rng)
     view = camera(shape, shape, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps)
     sun = _sun(conditions, layout.azimuth, sun_rng)

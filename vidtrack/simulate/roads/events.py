@@ -7,28 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.scan import Floats, Ints
 from vidtrack.simulate.roads.clip import RoadClip
+from vidtrack.simulate.roads.conflicts import conflicts
 from vidtrack.simulate.roads.layout import GroundGate
-from vidtrack.simulate.roads.stage import footprints
-from vidtrack.simulate.scene import touching
 from vidtrack.traffic.lines import Line
 
 SAMPLE_S = 0.04
 STANDS_KM_H = 5.0
 QUEUE_PAUSE_S = 2.0  # queues of one leg with less between them are one
-TTC_S, PET_S = 1.5, 5.0  # of a conflict, as SSAM counts them by default
-TTC_RANGE_M = 60.0
-CROSSING_ANGLE = np.radians(30)  # vehicles whose headings differ less follow each other
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A row of `road_events.csv`; None: the column does not apply. Units are in the names, times from the first frame."""
+    """A row of `road_events.csv`; times are from the first frame; None: the column does not apply."""
 
     event: str
     time_s: float
@@ -66,8 +62,7 @@ def motion(clip: RoadClip) -> Motion:
     speed, heading, s = (np.full(shape, np.nan) for _ in range(3))
     for k, t in enumerate(time):
         now = clip.history.at(float(t))
-        place, depth = clip.eye.project(np.column_stack([now.xy, np.zeros(len(now.xy))]))
-        shown = (depth > 0) & (place >= 0).all(axis=1) & (place <= clip.size).all(axis=1)
+        shown = clip.eye.shows(now.xy, clip.size)
         who = now.vehicle[shown]
         xy[k, who], speed[k, who], heading[k, who] = now.xy[shown], now.speed[shown], now.heading[shown]
         s[k, who], route[k, who] = now.s[shown], now.route[shown]
@@ -84,13 +79,7 @@ def events(clip: RoadClip) -> list[Event]:
 
 def shown_gates(clip: RoadClip) -> dict[str, GroundGate]:
     """The gates that lie whole in the picture."""
-    return {name: gate for name, gate in clip.layout.gates.items() if in_picture(clip, gate.line).all()}
-
-
-def in_picture(clip: RoadClip, ground: Floats) -> Mask:
-    """Which ground points (V, 2) m the camera shows."""
-    xy, depth = clip.eye.project(np.column_stack([ground, np.zeros(len(ground))]))
-    return np.asarray((depth > 0) & (xy >= 0).all(axis=1) & (xy <= clip.size).all(axis=1))
+    return {name: gate for name, gate in clip.layout.gates.items() if clip.eye.shows(gate.line, clip.size).all()}
 
 
 def picture_line(clip: RoadClip, name: str, gate: GroundGate) -> Line:
@@ -102,21 +91,20 @@ def picture_line(clip: RoadClip, name: str, gate: GroundGate) -> Line:
 def _crossings(clip: RoadClip, moved: Motion, ids: Ints) -> Iterator[Event]:
     """A footprint's centre passes a gate's line on the ground between two samples."""
     for name, gate in shown_gates(clip).items():
-        start, along = gate.line[0], gate.line[1] - gate.line[0]
-        left = np.array([-along[1], along[0]]) / np.hypot(*along)
-        side = (moved.xy - start) @ left
-        share = side[:-1] / (side[:-1] - side[1:])
-        at = moved.xy[:-1] + share[..., None] * (moved.xy[1:] - moved.xy[:-1])
-        where = (at - start) @ along / (along @ along)
-        passed = ((side[:-1] >= 0) != (side[1:] >= 0)) & (where >= 0) & (where <= 1) & ~np.isnan(side[:-1] + side[1:])
         directions = picture_line(clip, name, gate).directions
-        for k, vehicle in np.argwhere(passed):
-            part = float(share[k, vehicle])
-            speed = (1 - part) * moved.speed[k, vehicle] + part * moved.speed[k + 1, vehicle]
-            # y points down in the picture: the left of a line on the ground is on the other side of its normal there
-            direction = directions[int(side[k + 1, vehicle] < 0)]
-            time = float(moved.time[k] + part * SAMPLE_S)
-            yield Event("crossing", time, int(ids[vehicle]), place=name, direction=direction, speed_kmh=3.6 * float(speed))
+        start, along = gate.line[0], gate.line[1] - gate.line[0]
+        side = (moved.xy - start) @ np.array([-along[1], along[0]])
+        before, after = side[:-1], side[1:]
+        for k, v in np.argwhere(((before >= 0) & (after < 0)) | ((before < 0) & (after >= 0))):
+            share = before[k, v] / (before[k, v] - after[k, v])
+            point = moved.xy[k, v] + share * (moved.xy[k + 1, v] - moved.xy[k, v])
+            if not 0 <= (point - start) @ along <= along @ along:
+                continue
+            # y points down in the picture: the left of a line on the ground is against its normal there
+            direction = directions[int(after[k, v] < 0)]
+            speed = moved.speed[k, v] + share * (moved.speed[k + 1, v] - moved.speed[k, v])
+            time = float(moved.time[k] + share * SAMPLE_S)
+            yield Event("crossing", time, int(ids[v]), place=name, direction=direction, speed_kmh=3.6 * float(speed))
 
 
 def _movements(clip: RoadClip, crossed: list[Event]) -> Iterator[Event]:
@@ -150,24 +138,6 @@ def _queues(clip: RoadClip, moved: Motion) -> Iterator[Event]:
 
 
 def _conflicts(clip: RoadClip, moved: Motion, ids: Ints) -> Iterator[Event]:
-    """Pairs whose time to collision or post-encroachment time falls below its limit."""
-    fleet = clip.fleet
-    there = np.flatnonzero(~np.isnan(moved.speed).all(axis=0))
-    for i, j in combinations(there, 2):
-        alone = [np.flatnonzero(~np.isnan(moved.speed[:, v])) for v in (i, j)]
-        if alone[0][0] * SAMPLE_S > alone[1][-1] * SAMPLE_S + PET_S or alone[1][0] * SAMPLE_S > alone[0][-1] * SAMPLE_S + PET_S:
-            continue
-        base = [
-            footprints(moved.xy[k, v], moved.heading[k, v], np.full(len(k), fleet.length[v]), np.full(len(k), fleet.width[v]))
-            for v, k in zip((i, j), alone, strict=True)
-        ]
-        encroached = _post_encroachment(moved, (i, j), alone, base)
-        collides = _time_to_collision(moved, (i, j), alone, base)
-        if encroached is None and collides is None:
-            continue
-        pet, first, last = encroached or (None, None, None)
-        ttc, when = collides or (None, None)
-        behind = i if last is None or moved_first(last, i) else j
-        other = j if behind == i else i
-        time = float(moved.time[last[1]]) if last is not None else float(when if when is not None else 0.0)
-        yield Event("conflict", time, int(ids[behind]), other_id=int(ids[other]), pet_s=pet, ttc_s=ttc)
+    for found in conflicts(moved.time, moved.xy, moved.speed, moved.heading, clip.fleet.length, clip.fleet.width):
+        target, other = int(ids[found.second]), int(ids[found.first])
+        yield Event("conflict", found.time_s, target, other_id=other, pet_s=found.pet_s, ttc_s=found.ttc_s)

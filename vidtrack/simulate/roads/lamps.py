@@ -65,7 +65,9 @@ def _add_lamps(glow: NDArray[np.float32], actor: Actor, camera: Pinhole, wet: bo
     eye_x = float((actor.turn @ (camera.position - actor.place))[0])
     solid = actor.solid
     facing = eye_x > solid.headlamps[0, 0], eye_x < solid.tail_lamps[0, 0]
-    for lamps, colour, power, faces in zip((solid.headlamps, solid.tail_lamps), (BEAM, RED), (255, 160), facing, strict=True):
+    for lamps, colour, power, faces in zip(
+        (solid.headlamps, solid.tail_lamps), (BEAM, RED), (255, 160), facing, strict=True
+    ):
         points = lamps @ actor.turn + actor.place
         for point in points if faces else ():
             (at, _), large = camera.project(point), float(camera.px_per_m(point))

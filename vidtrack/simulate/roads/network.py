@@ -149,8 +149,12 @@ class Network:
     @cached_property
     def stop(self) -> Floats:
         """(R,) m; stop line of each route, a metre before its first conflict; infinite: none."""
-        first = np.array([min((near[0][0] for (r, _), near in self._near.items() if r == row and len(near[0])),
-                              default=np.inf) for row in range(len(self.routes))])
+        first = np.array(
+            [
+                min((near[0][0] for (r, _), near in self._near.items() if r == row and len(near[0])), default=np.inf)
+                for row in range(len(self.routes))
+            ]
+        )
         lines = np.array([first[self.origin == origin].min() for origin in self.origin]) - BEFORE_CONFLICT_M
         painted = [np.inf if route.stop_m is None else route.stop_m for route in self.routes]
         return np.minimum(lines, painted)

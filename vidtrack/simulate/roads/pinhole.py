@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Mask
 
 NEAR_M = 0.5  # what is nearer to the camera's plane than this is not drawn
 _NEWTON_STEPS = 12
@@ -42,6 +42,11 @@ class Pinhole:
         rays = np.concatenate([ideal, np.ones((*ideal.shape[:-1], 1))], axis=-1) @ self.axes
         falls = np.where(rays[..., 2] < -1e-9, -rays[..., 2], np.nan)
         return np.asarray(self.position[:2] + rays[..., :2] * (self.position[2] / falls)[..., None])
+
+    def shows(self, ground: Floats, size: tuple[int, int]) -> Mask:
+        """Which points (V, 2) m of the road lie in a picture of `size` (width, height)."""
+        xy, depth = self.project(np.column_stack([ground, np.zeros(len(ground))]))
+        return np.asarray((depth > 0) & (xy >= 0).all(axis=1) & (xy <= size).all(axis=1))
 
     def shifted(self, offset: Floats) -> Pinhole:
         """The same view with the picture moved by `offset` (2,) px."""

@@ -34,7 +34,9 @@ def road() -> Layout:
     """A street with one lane each way and a pedestrian crossing with a signal."""
     far, y = 170.0, LANE_M / 2
     lanes = [
-        Route(smooth([(-far, -y), (far, -y)], 2), "west", "east", "west", 13.9, stop_m=far + CROSSING_X[0] - 2, red=_red),
+        Route(
+            smooth([(-far, -y), (far, -y)], 2), "west", "east", "west", 13.9, stop_m=far + CROSSING_X[0] - 2, red=_red
+        ),
         Route(smooth([(far, y), (-far, y)], 2), "east", "west", "east", 13.9, stop_m=far - CROSSING_X[1] - 2, red=_red),
     ]
     gates = {
@@ -72,7 +74,8 @@ def road() -> Layout:
 def junction_3d() -> Layout:
     """A crossroads; who comes from the north or the south gives way."""
     far, y, box = 130.0, LANE_M / 2, 12.0
-    routes, gates = [], {}
+    routes: list[Route] = []
+    gates: dict[str, GroundGate] = {}
     for k, leg in enumerate(ORDER):
         arm, major = ARMS[leg], leg in ("east", "west")
         for turn, rank, share, radius in (("left", 1, 0.15, 8.0), ("straight", 0, 0.65, 0.0), ("right", 0, 0.2, 6.0)):
@@ -117,7 +120,8 @@ def junction_3d() -> Layout:
 def roundabout() -> Layout:
     """A compact roundabout with four legs: who drives in the ring has the right of way."""
     far, ring, aside, join = 130.0, 11.5, 2.6, np.radians(50)
-    routes, gates = [], {}
+    routes: list[Route] = []
+    gates: dict[str, GroundGate] = {}
     for k, leg in enumerate(ORDER):
         angle = k * np.pi / 2
         for turns, share in ((1, 0.25), (2, 0.5), (3, 0.25)):
@@ -127,27 +131,27 @@ def roundabout() -> Layout:
             points += [(float(ring * np.cos(p)), float(ring * np.sin(p))) for p in on]
             points += [ARMS[to](17.0, -aside), ARMS[to](far, -aside)]
             routes.append(Route(smooth(points, 3.0), leg, to, leg, 11.0, share))
-        gates |= _leg_gates(leg, ARMS[leg], 19.0, 0.7, 4.5)
+        gates |= _leg_gates(leg, ARMS[leg], 16.5, 0.7, 4.5)
     ground: list[Part] = [arm.patch(KERB, 8, far, -4.75, 4.75) for arm in ARMS.values()]
-    ground += [disc(14.65, *KERB), disc(14.5, *ASPHALT)]
+    ground += [disc(15.45, *KERB), disc(15.3, *ASPHALT)]
     for arm in ARMS.values():
         ground += [arm.patch(ASPHALT, 10, far, -4.6, 4.6), *_wheel_marks(arm, 19, far, (-aside, aside))]
     ground += [disc(8.6, *KERB), disc(8.4, *PAVING), disc(7.2, *GRASS)]
     for arm in ARMS.values():
-        ground.append(Part(np.array([arm(15.2, -0.6), arm(15.2, 0.6), arm(30, 0.15), arm(30, -0.15)]), *KERB))
+        ground.append(Part(np.array([arm(16.0, -0.6), arm(16.0, 0.6), arm(30, 0.15), arm(30, -0.15)]), *KERB))
         ground.append(arm.patch(PAINT, 30, far, -MARK_M / 2, MARK_M / 2))
-        ground += [arm.patch(PAINT, 15.0, 15.4, b, b + 0.5) for b in np.arange(0.9, 4.3, 0.9)]
-    survey = [arm(a, b) for arm in ARMS.values() for a, b in ((8.6, 0.0), (15.2, 0.0), (17.0, 4.6), (17.0, -4.6))]
+        ground += [arm.patch(PAINT, 15.4, 15.8, b, b + 0.5) for b in np.arange(0.9, 4.3, 0.9)]
+    survey = [arm(a, b) for arm in ARMS.values() for a, b in ((8.6, 0.0), (16.0, 0.0), (17.0, 4.6), (17.0, -4.6))]
     return Layout(
         network=Network(routes, reach=9.0),
         ground=tuple(ground),
         gates=gates,
-        zones={"ring": disc(14.0, (0, 0, 0), 0).polygon},
+        zones={"ring": disc(15.3, *ASPHALT).polygon},
         sections={},
         survey=np.array(survey),
         aim=(0.0, 1.0),
         azimuth=np.radians(50),
-        tilt=np.radians(14),
+        tilt=np.radians(12),
         flow=1000,
     )
 
@@ -170,23 +174,21 @@ def motorway() -> Layout:
         "west_in": GroundGate(at((-5, -edge - 0.5), (-5, -2)), "west", "entry"),
         "west_out": GroundGate(at((0, 2), (0, edge + 0.5)), "west", "exit"),
         "east_in": GroundGate(at((50, 2), (50, edge + 0.5)), "east", "entry"),
-        "east_out": GroundGate(at((35, -edge - 0.5), (35, -2)), "east", "exit"),
+        "east_out": GroundGate(at((25, -edge - 0.5), (25, -2)), "east", "exit"),
     }
     ground: list[Part] = []
     for way, start, end in ((EAST, back - 60, ahead + 200), (WEST, -ahead - 200, -back + 60)):
-        right = -1 if way is EAST else -1
-        low, high = sorted((right * (edge + 3), right * 1.6))
-        ground.append(way.patch(ASPHALT, start, end, low, high))
-        ground += _wheel_marks(way, start, end, tuple(right * (2.5 + (k + 0.5) * width) for k in range(3)))
-        ground += [way.patch(PAINT, start, end, b - 0.1, b + 0.1) for b in (right * 2.5, right * edge)]
-        ground += [dash for k in (1, 2) for dash in way.dashes(start, end, right * (2.5 + k * width), 6, 12, 0.16)]
+        ground.append(way.patch(ASPHALT, start, end, -edge - 3, -1.6))
+        ground += _wheel_marks(way, start, end, tuple(-2.5 - (k + 0.5) * width for k in range(3)))
+        ground += [way.patch(PAINT, start, end, b - 0.1, b + 0.1) for b in (-2.5, -edge)]
+        ground += [dash for k in (1, 2) for dash in way.dashes(start, end, -2.5 - k * width, 6, 12, 0.16)]
     survey = [*product((-8, 4, 16, 28, 40), (-edge, -2.5)), *product((4, 20, 36, 60), (2.5, edge))]
     return Layout(
         network=Network(routes),
         ground=tuple(ground),
         gates=gates,
-        zones={"eastbound": at((-5, -edge), (35, -edge), (35, -2.5), (-5, -2.5))},
-        sections={"eastbound": ("west_in", "east_out", 40.0), "westbound": ("east_in", "west_out", 50.0)},
+        zones={"eastbound": at((-5, -edge), (25, -edge), (25, -2.5), (-5, -2.5))},
+        sections={"eastbound": ("west_in", "east_out", 30.0), "westbound": ("east_in", "west_out", 50.0)},
         survey=np.array(survey, float),
         aim=(6.0, -2.0),
         azimuth=np.radians(42),

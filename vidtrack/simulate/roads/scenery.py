@@ -40,11 +40,11 @@ def empty_road(parts: tuple[Part, ...], camera: Pinhole, size: tuple[int, int], 
     return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
-def on_picture(polygon: Floats, camera: Pinhole) -> Floats:
-    """A ground polygon (V, 2) m in the picture (W, 2) px, what is behind the camera cut off."""
+def on_picture(polygon: Floats, camera: Pinhole, step_m: float = EDGE_M) -> Floats:
+    """A ground polygon (V, 2) m in the picture (W, 2) px, a point each `step_m`, what is behind the camera left out."""
     points = []
     for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        count = max(int(np.ceil(np.linalg.norm(b - a) / EDGE_M)), 1)
+        count = max(int(np.ceil(np.linalg.norm(b - a) / step_m)), 1)
         points.append(a + np.linspace(0, 1, count, endpoint=False)[:, None] * (b - a))
     along = np.concatenate(points)
     xy, depth = camera.project(np.column_stack([along, np.zeros(len(along))]))

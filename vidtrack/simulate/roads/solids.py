@@ -1,4 +1,4 @@
-"""What vehicles are made of: convex bodies with painted faces, in their own frame (x forwards, y left, z up), metres."""
+"""Vehicles as convex bodies with painted faces, in their own frame (x forwards, y left, z up), metres."""
 
 from __future__ import annotations
 
@@ -137,7 +137,9 @@ def _motorcycle(length: float, width: float, height: float, paint: Colour) -> So
     machine += _lamps(machine, 0.55, 0.9) + _wheels((-0.66 * x, 0.66 * x), 0.36 * y, 0.31)
     bars = _box((0.34 * x, 0.46 * x), y, (0.58 * height, 0.64 * height), (0.34 * x, 0.46 * x), y, TYRE)
     rider = _box((-0.4 * x, 0.12 * x), 0.6 * y, (0.5 * height, 0.86 * height), (-0.2 * x, 0.2 * x), 0.55 * y, jacket)
-    head = _box((-0.08 * x, 0.2 * x), 0.3 * y, (0.84 * height, height), (-0.05 * x, 0.16 * x), 0.24 * y, (215, 215, 220))
+    head = _box(
+        (-0.08 * x, 0.2 * x), 0.3 * y, (0.84 * height, height), (-0.05 * x, 0.16 * x), 0.24 * y, (215, 215, 220)
+    )
     under = _underneath(-0.8 * x, 0.8 * x, 0.5 * y)
     return _vehicle(((*under, *machine), tuple(bars), tuple(rider), tuple(head)), None, x, 0.0, 0.8)
 
@@ -157,7 +159,9 @@ def _box(
     """A box whose rectangle at z[1] may be smaller: front, left, rear, right, top."""
     (rear, front), (low, high), (rear_top, front_top) = bottom, z, top
     a = np.array([(front, -y, low), (front, y, low), (rear, y, low), (rear, -y, low)])
-    b = np.array([(front_top, -y_top, high), (front_top, y_top, high), (rear_top, y_top, high), (rear_top, -y_top, high)])
+    b = np.array(
+        [(front_top, -y_top, high), (front_top, y_top, high), (rear_top, y_top, high), (rear_top, -y_top, high)]
+    )
     sides = [np.stack([a[k], a[(k + 1) % 4], b[(k + 1) % 4], b[k]]) for k in range(4)]
     return [_face(polygon, paint) for polygon in (*sides, b)]
 

@@ -132,7 +132,9 @@ def draw(canvas: Image, actor: Actor, camera: Pinhole, sun: Floats | None) -> No
         faces = np.flatnonzero((solid.body == body) & faced)
         if len(faces) == 0:
             continue
-        cv2.fillConvexPoly(canvas, _fixed(actor.silhouette[body]), colour[faces[0]].tolist(), cv2.LINE_AA, SUBPIXEL_BITS)
+        cv2.fillConvexPoly(
+            canvas, _fixed(actor.silhouette[body]), colour[faces[0]].tolist(), cv2.LINE_AA, SUBPIXEL_BITS
+        )
         for face in faces:
             cv2.fillConvexPoly(canvas, fixed[face], colour[face].tolist(), cv2.LINE_AA, SUBPIXEL_BITS)
 

@@ -64,8 +64,12 @@ class _Simulation:
     def _arrivals(self, flow: float, rng: Generator) -> tuple[list[deque[tuple[float, int]]], int]:
         """For each origin when which vehicle comes; times between are exponential."""
         net = self.net
-        share = np.array([sum(route.share for route, o in zip(net.routes, net.origin, strict=True) if o == origin)
-                          for origin in range(net.origin.max() + 1)])
+        share = np.array(
+            [
+                sum(route.share for route, o in zip(net.routes, net.origin, strict=True) if o == origin)
+                for origin in range(net.origin.max() + 1)
+            ]
+        )
         due: list[tuple[float, int]] = []
         for origin, part in enumerate(share / share.sum()):
             mean = 3600 / (flow * part)
@@ -105,7 +109,7 @@ class _Simulation:
         return np.minimum(self.net.speed(route, s) * self.fleet.faster[vehicle], self.fleet.top[vehicle])
 
     def _gaps(self) -> Floats:
-        """(N, N) m from the front of the row's vehicle to the nearest part ahead of the column's; infinite: not ahead."""
+        """(N, N) m from the front of vehicle i to the nearest part of j on its way; infinite: j is not ahead."""
         on = self.on
         half = self._half(on.vehicle)
         points = on.s[:, None] + half[:, None] * np.array([-1.0, 0.0, 1.0])

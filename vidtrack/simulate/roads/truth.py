@@ -45,12 +45,13 @@ def numbered(vehicle: Ints) -> Ints:
 
 def visible_share(actor: Actor, nearer: list[Actor], size: tuple[int, int]) -> float:
     """Share of the actor's silhouette that is in the picture and behind none of the nearer ones."""
-    left_top, extent = actor.box[:2], actor.box[2:] - actor.box[:2]
+    left_top: Floats = actor.box[:2]
+    extent: Floats = actor.box[2:] - left_top
     outside = (left_top < 0).any() or (actor.box[2:] > size).any()
     meets = [other for other in nearer if (other.box[:2] < actor.box[2:]).all() and (other.box[2:] > left_top).all()]
     if not outside and not meets:
         return 1.0
-    scale = CELLS / extent.max()
+    scale = CELLS / max(float(extent[0]), float(extent[1]))
     cells = np.ceil(extent * scale).astype(int)
     mask = np.zeros((cells[1], cells[0]), np.uint8)
     _cover(mask, actor, left_top, scale, 1)
