@@ -125,6 +125,7 @@ class Network:
         self._beside = np.full((count, count, longest), np.nan)
         self._trees = [cKDTree(route.xy) for route in routes]
         self._near = {(r, q): self._relate(r, q) for r in range(count) for q in range(count)}
+        self.related = ~np.isnan(self._beside).all(axis=2)
 
     def _at(self, column: str, route: Ints, s: Floats) -> Floats:
         return np.interp(np.clip(s, 0, self.length[route]) + self._span * route, self._key, self._columns[column])

@@ -207,7 +207,7 @@ ROADS: dict[str, Callable[[], Layout]] = {
 
 
 def _red(time: float) -> bool:
-    """The signal of the pedestrian crossing."""
+    """Whether the signal of the pedestrian crossing is amber or red."""
     return (time - 8.0) % CYCLE_S < RED_S
 
 

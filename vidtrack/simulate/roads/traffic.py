@@ -20,6 +20,7 @@ AT_LINE_M = 0.7  # gap that is left to a stop line
 CALM_BRAKING = 2.0  # m/s^2; before a stop line
 MARGIN_S = 1.0  # between a vehicle that crosses and the next
 MERGE_MARGIN_S = 2.0
+WAITING_SPEED = 2.0  # m/s; slower vehicles at a stop line wait
 THINK_STEPS = 10  # between two thoughts of changing lanes
 REST_S = 3.0  # between two changes of lanes
 
@@ -111,16 +112,17 @@ class _Simulation:
     def _gaps(self) -> Floats:
         """(N, N) m from the front of vehicle i to the nearest part of j on its way; infinite: j is not ahead."""
         on = self.on
-        half = self._half(on.vehicle)
-        points = on.s[:, None] + half[:, None] * np.array([-1.0, 0.0, 1.0])
+        front = on.s + self._half(on.vehicle)
         gap = np.full((len(on.s), len(on.s)), np.inf)
-        changing = bool((on.old >= 0).any())
-        lanes = (on.route, np.where(on.old >= 0, on.old, on.route))
-        for mine in lanes[: 1 + changing]:
-            for other in lanes[: 1 + changing]:
-                place = self.net.beside(mine[:, None, None], other[None, :, None], points[None])
-                ahead = np.where(place > on.s[:, None, None], place, np.inf).min(axis=2)
-                gap = np.minimum(gap, ahead - (on.s + half)[:, None])
+        changing = on.old >= 0
+        for mine in (on.route, on.old) if changing.any() else (on.route,):
+            for other in (on.route, on.old) if changing.any() else (on.route,):
+                i, j = np.nonzero(self.net.related[mine[:, None], other] & (mine >= 0)[:, None] & (other >= 0))
+                length = self.fleet.length[on.vehicle[j]]
+                points = on.s[j] + np.array([-0.5, 0.0, 0.5])[:, None] * length
+                place = self.net.beside(mine[i], other[j], points)
+                ahead = np.where(place > on.s[i], place, np.inf).min(axis=0)
+                gap[i, j] = np.minimum(gap[i, j], ahead - front[i])
         np.fill_diagonal(gap, np.inf)
         return gap
 
@@ -203,8 +205,15 @@ class _Simulation:
         wish, a = net.speed(mine, leaves), self._drivers(on.vehicle[i : i + 1]).a[0]
         needs += np.maximum(wish - on.v[i], 0) ** 2 / (2 * a * wish)
         soon = arrives < needs + np.where(merges, MERGE_MARGIN_S, MARGIN_S)
-        heeded = np.where(on.may_go, ~merges | soon, soon & (net.rank[r] > net.rank[on.route]))
+        comes = soon & (net.rank[r] > net.rank[on.route]) & ~self._held_up()
+        heeded = np.where(on.may_go, ~merges | soon, comes)
         return bool((there & heeded).any())
+
+    def _held_up(self) -> Mask:
+        """(N,) vehicles behind another one that waits at the same stop line."""
+        on, origin = self.on, self.net.origin[self.on.route]
+        waits = ~on.may_go & (on.v < WAITING_SPEED)
+        return np.asarray((waits & (origin[:, None] == origin) & (on.s > on.s[:, None])).any(axis=1))
 
     def _change_lanes(self, step: int) -> None:
         """MOBIL for those whose turn it is to think of it."""

@@ -43,24 +43,24 @@ def numbered(vehicle: Ints) -> Ints:
     return np.argsort(np.argsort(first))[inverse] + 1
 
 
-def visible_share(actor: Actor, nearer: list[Actor], size: tuple[int, int]) -> float:
-    """Share of the actor's silhouette that is in the picture and behind none of the nearer ones."""
-    left_top: Floats = actor.box[:2]
-    extent: Floats = actor.box[2:] - left_top
+def visible_share(actor: Actor, nearer: list[Actor], picture: tuple[int, int]) -> float:
+    """Share of the actor's silhouette that is in a picture of this size and behind none of the nearer ones."""
+    size = np.array(picture, float)
+    left_top, extent = actor.box[:2], actor.box[2:] - actor.box[:2]
     outside = (left_top < 0).any() or (actor.box[2:] > size).any()
     meets = [other for other in nearer if (other.box[:2] < actor.box[2:]).all() and (other.box[2:] > left_top).all()]
     if not outside and not meets:
         return 1.0
-    scale = CELLS / max(float(extent[0]), float(extent[1]))
+    scale = CELLS / extent.max()
     cells = np.ceil(extent * scale).astype(int)
     mask = np.zeros((cells[1], cells[0]), np.uint8)
     _cover(mask, actor, left_top, scale, 1)
-    total = np.count_nonzero(mask)
+    total = int(np.count_nonzero(mask))
     for other in meets:
         _cover(mask, other, left_top, scale, 0)
     low, high = np.rint((np.zeros(2) - left_top) * scale).astype(int), np.rint((size - left_top) * scale).astype(int)
     inside = mask[max(low[1], 0) : max(high[1], 0), max(low[0], 0) : max(high[0], 0)]
-    return float(np.count_nonzero(inside) / max(total, 1))
+    return int(np.count_nonzero(inside)) / total if total else 0.0
 
 
 def _cover(mask: cv2.typing.MatLike, actor: Actor, origin: Floats, scale: float, level: int) -> None:
