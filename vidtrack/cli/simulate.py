@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,11 +16,17 @@ if TYPE_CHECKING:
     from vidtrack.detection.amplitude import Weibull
 
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
+ROADS = ("road", "junction-3d", "roundabout", "motorway")
 RADAR = ("radar-tws", "radar-incoming", "radar-altitude", "radar-speed", "radar-crossing", "radar-unresolved")
-VIDEO_ONLY = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "leaves", "clock")
+PICTURE = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "clock")
 WEATHER = ("clear", "rain", "snow", "fog")
 LIGHT = ("day", "low-sun", "dusk", "night")
-RADAR_ONLY = ("snr_db", "pfa", "weibull", "glint")
+OPTIONS = {
+    VIDEO: (*PICTURE, "leaves"),
+    ROADS: (*PICTURE, "seconds", "flow", "camera_height", "tilt_deg", "lens", "click_sigma"),
+    RADAR: ("snr_db", "pfa", "weibull", "glint"),
+}
+"""Which options the scenarios of each kind have."""
 
 
 class _Size(click.ParamType):
@@ -52,10 +59,20 @@ class SimulateOptions(Options):
     wet: bool
     leaves: float
     clock: bool
+    seconds: float | None
+    flow: float | None
+    camera_height: float
+    tilt_deg: float | None
+    lens: float
+    click_sigma: float
     snr_db: float | None
     pfa: float | None
     weibull: Weibull | None
     glint: float | None
+
+    def chosen(self, names: tuple[str, ...]) -> dict[str, Any]:
+        """The options of these names."""
+        return {name: getattr(self, name) for name in names}
 
 
 @click.command(
@@ -67,13 +84,16 @@ Examples:
   vidtrack simulate crossing-45 -o crossing --seed 7 --fps 25
   vidtrack simulate junction -o hard --size 1280x720 --noise 5 --shake 1.5 --light-steps 2
   vidtrack simulate junction -o rainy-night --weather rain --light night --clock
+  vidtrack simulate junction-3d -o crossroads --seconds 120 --flow 1200 --lens -0.15
   vidtrack simulate radar-tws -o tws --seed 3 --snr-db 16""",
 )
-@click.argument("scenario", type=click.Choice(VIDEO + RADAR), metavar="SCENARIO")
+@click.argument("scenario", type=click.Choice(VIDEO + ROADS + RADAR), metavar="SCENARIO")
 @common("Folder to write.  [default: runs/SCENARIO]")
 @seed_option
-@click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15]")
-@click.option("--size", type=_Size(), help="The same scene at this size.  [default: 320x240, junction 240x180]")
+@click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15, roads 25]")
+@click.option(
+    "--size", type=_Size(), help="The same scene at this size.  [default: 320x240, junction 240x180, roads 1280x720]"
+)
 @click.option("--noise", default=2.0, show_default=True, help="Sensor noise, standard deviation in grey levels.")
 @click.option("--shake", default=0.0, show_default=True, help="Camera shake, standard deviation in px.")
 @click.option("--light-steps", default=0, show_default=True, help="Sudden changes of the exposure.")
@@ -88,6 +108,12 @@ Examples:
 @click.option("--wet", is_flag=True, help="A wet road that mirrors vehicles and lamps.")
 @click.option("--leaves", default=1.0, show_default=True, help="How far the tree's leaves swing, a factor.")
 @click.option("--clock", is_flag=True, help="Burn a running clock into the picture.")
+@click.option("--seconds", type=float, help="Roads: length of the video.  [default: 60]")
+@click.option("--flow", type=float, help="Roads: vehicles/h in all.  [default: the scenario's]")
+@click.option("--camera-height", type=float, default=8.0, show_default=True, help="Roads: m above the road.")
+@click.option("--tilt-deg", type=float, help="Roads: camera's axis below the horizon.  [default: the scenario's]")
+@click.option("--lens", default=0.0, show_default=True, help="Roads: k1 of Brown-Conrady, -0.3 to 0.3; barrel below 0.")
+@click.option("--click-sigma", default=1.0, show_default=True, help="Roads: error of clicked points in site.toml, px.")
 @click.option("--snr-db", type=float, help="Radar: mean signal to noise ratio of a target.  [default: the scenario's]")
 @click.option(
     "--pfa", type=click.FloatRange(0, 0.1), help="Radar: false alarms per resolution cell.  [default: the scenario's]"
@@ -96,14 +122,20 @@ Examples:
 @click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
 @receives(SimulateOptions)
 def command(options: SimulateOptions) -> None:
-    """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a radar scenario
-    as plots.csv and truth.csv.
+    """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a road with
+    site.toml, road_truth.csv and road_events.csv besides, a radar scenario as plots.csv and truth.csv.
 
     \b
     crossing     two vehicles cross in mid-picture and are one blob for half a second or more
     crossing-45  the same, turned by 45 degrees
     nine         nine vehicles cross on an open yard
     junction     a T-junction: people, a motorcycle, cars, a lorry; 14 targets in 17 s
+
+    \b
+    road         a street with a signal at a pedestrian crossing, in perspective
+    junction-3d  a crossroads with a major road, in perspective
+    roundabout   a compact roundabout with four legs, in perspective
+    motorway     two carriageways of three lanes, in perspective
 
     \b
     radar-tws         track while scan: eight aircraft, two of them turn with 2.5 g, Weibull clutter
@@ -114,23 +146,27 @@ def command(options: SimulateOptions) -> None:
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     """
     start_log(options.verbose, options.quiet)
-    is_video = options.scenario in VIDEO
-    _refuse_options_of(RADAR_ONLY if is_video else VIDEO_ONLY, options.scenario)
-    if is_video:
-        _draw_video(options)
-    else:
+    scenarios = next(kind for kind in OPTIONS if options.scenario in kind)
+    _refuse_others_than(OPTIONS[scenarios], options.scenario)
+    if scenarios is RADAR:
         _draw_plots(options)
+    else:
+        _draw_video(options, options.chosen(OPTIONS[scenarios]))
 
 
-def _draw_video(options: SimulateOptions) -> None:
+def _draw_video(options: SimulateOptions, conditions: dict[str, Any]) -> None:
     from vidtrack.output.folder import open_folder
-    from vidtrack.simulate import simulate, write
+    from vidtrack.simulate import simulate, simulate_road, write, write_road
 
-    kind: dict[str, Any] = {name: getattr(options, name) for name in VIDEO_ONLY}
-    clip = simulate(options.scenario, seed=options.seed, **kind)
+    if options.scenario in ROADS:
+        road = simulate_road(options.scenario, seed=options.seed, **conditions)
+        frames, count, save = iter(road), len(road), partial(write_road, road)
+    else:
+        flat = simulate(options.scenario, seed=options.seed, **conditions)
+        frames, count, save = iter(flat), len(flat), partial(write, flat)
     folder = open_folder(options.output, options.scenario, options.force)
-    with click.progressbar(clip, length=len(clip), label=str(folder), file=sys.stderr, hidden=options.quiet) as frames:
-        write(clip, folder, frames)
+    with click.progressbar(frames, length=count, label=str(folder), file=sys.stderr, hidden=options.quiet) as shown:
+        save(folder, shown)
 
 
 def _draw_plots(options: SimulateOptions) -> None:
@@ -149,9 +185,9 @@ def _draw_plots(options: SimulateOptions) -> None:
     write_radar(seen, open_folder(options.output, options.scenario, options.force))
 
 
-def _refuse_options_of(other_kind: tuple[str, ...], scenario: str) -> None:
+def _refuse_others_than(options: tuple[str, ...], scenario: str) -> None:
     """An option that the scenario's kind does not have is a mistake."""
     context = click.get_current_context()
-    for name in other_kind:
+    for name in sorted({name for kind in OPTIONS.values() for name in kind} - set(options)):
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
             raise click.UsageError(f"--{name.replace('_', '-')} does nothing for {scenario}; leave it out")

@@ -1,7 +1,7 @@
 """Traffic video and radar plots with exact truth.
 
-Video: scenes as data, drawn by a camera with noise, shake and light changes. Radar: flights, seen with errors, misses
-and clutter; that part needs no OpenCV.
+Video: scenes as data, drawn by a camera with noise, shake and light changes; `roads`: traffic over a road plane in
+perspective. Radar: flights, seen with errors, misses and clutter; that part needs no OpenCV.
 """
 
 from importlib import import_module
@@ -11,10 +11,14 @@ if TYPE_CHECKING:
     from vidtrack.simulate.clip import SCENARIOS as SCENARIOS
     from vidtrack.simulate.clip import Clip as Clip
     from vidtrack.simulate.clip import simulate as simulate
+    from vidtrack.simulate.roads.clip import RoadClip as RoadClip
+    from vidtrack.simulate.roads.clip import simulate_road as simulate_road
+    from vidtrack.simulate.roads.write import write_road as write_road
     from vidtrack.simulate.truth import Truth as Truth
     from vidtrack.simulate.video_write import write as write
 
 _HOME = {"SCENARIOS": "clip", "Clip": "clip", "Truth": "truth", "simulate": "clip", "write": "video_write"}
+_HOME |= {"RoadClip": "roads.clip", "simulate_road": "roads.clip", "write_road": "roads.write"}
 __all__ = sorted(_HOME)
 
 

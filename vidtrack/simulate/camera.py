@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -31,6 +32,27 @@ class Camera:
     gain: Floats
     noise: NDArray[np.int16]
     window: Ints
+
+    @property
+    def margin(self) -> int:
+        """px that a background must have beyond every edge of the picture."""
+        return int(np.ceil(np.abs(self.shake).max()))
+
+    def framed(self, ground: NDArray[np.uint8], k: int) -> NDArray[np.uint8]:
+        """What frame k shows of a background that is larger by `margin` on every side; a copy."""
+        if self.margin == 0:
+            return ground.copy()
+        dx, dy = self.shake[k] - self.margin
+        shift = np.array([[1, 0, dx], [0, 1, dy]])
+        return np.asarray(cv2.warpAffine(ground, shift, self.size, borderMode=cv2.BORDER_REPLICATE))
+
+    def exposed(self, picture: NDArray[np.uint8], k: int) -> NDArray[np.uint8]:
+        """The picture as frame k's exposure and the sensor's noise leave it."""
+        if self.gain[k] != 1:
+            picture = np.asarray(cv2.convertScaleAbs(picture, alpha=self.gain[k]), dtype=np.uint8)
+        row, col = self.window[k]
+        noise = self.noise[row : row + self.size[1], col : col + self.size[0]]
+        return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), dtype=np.uint8)
 
 
 def camera(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from datetime import timedelta
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.scan import Floats
 from vidtrack.simulate import draw
 from vidtrack.simulate.camera import Camera, camera
-from vidtrack.simulate.clock import burn_in
+from vidtrack.simulate.clock import beginning, burn_in
 from vidtrack.simulate.conditions import Conditions, Effect
 from vidtrack.simulate.crossing import crossing, crossing_45
 from vidtrack.simulate.junction import junction
@@ -69,9 +69,8 @@ class Clip:
 
     def frame(self, k: int) -> NDArray[np.uint8]:
         """Frame k, (H, W, 3) BGR."""
-        time, shake = self.times[k], self.camera.shake[k]
         moment = self._moment(k)
-        picture = self._empty_street(shake)
+        picture = self.camera.framed(self._ground, k)
         for effect in self.conditions.below():
             picture = effect(picture, moment)
         if self.scene.sun is not None:
@@ -80,13 +79,9 @@ class Clip:
             draw.place(picture, placed.sprite, placed.to_picture, placed.corners)
         for effect in self._above:
             picture = effect(picture, moment)
-        if self.camera.gain[k] != 1:
-            picture = np.asarray(cv2.convertScaleAbs(picture, alpha=self.camera.gain[k]), dtype=np.uint8)
-        row, col = self.camera.window[k]
-        noise = self.camera.noise[row : row + self.size[1], col : col + self.size[0]]
-        picture = np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), dtype=np.uint8)
+        picture = self.camera.exposed(picture, k)
         if self.conditions.clock:
-            burn_in(picture, time, self.seed)
+            burn_in(picture, beginning(self.seed) + timedelta(seconds=self.times[k]))
         return picture
 
     def _moment(self, k: int) -> Moment:
@@ -116,20 +111,9 @@ class Clip:
         turn = np.stack([x - zero, y - zero], axis=1)
         return np.column_stack([turn * self.camera.scale[:, None], zero * self.camera.scale + shake])
 
-    def _empty_street(self, shake: Floats) -> NDArray[np.uint8]:
-        margin, (width, height) = self._margin, self.size
-        if margin == 0:
-            return self._ground.copy()
-        shift = np.array([[1, 0, shake[0] - margin], [0, 1, shake[1] - margin]])
-        return np.asarray(cv2.warpAffine(self._ground, shift, (width, height), borderMode=cv2.BORDER_REPLICATE))
-
-    @cached_property
-    def _margin(self) -> int:
-        return int(np.ceil(np.abs(self.camera.shake).max()))
-
     @cached_property
     def _ground(self) -> NDArray[np.uint8]:
-        return draw.ground(self.scene, self.camera, self._margin, np.random.default_rng((self.seed, 1)))
+        return draw.ground(self.scene, self.camera, self.camera.margin, np.random.default_rng((self.seed, 1)))
 
     @cached_property
     def _sprites(self) -> dict[Actor, draw.Sprite]:
@@ -169,7 +153,7 @@ def simulate(
     scene_rng, camera_rng = np.random.default_rng(seed).spawn(2)
     scene = SCENARIOS[name](scene_rng)
     conditions = Conditions(weather, light, wet, leaves, clock)
-    conditions.check(scene)
+    conditions.check(trees=bool(scene.props))
     scene = conditions.on(scene, seed)
     times = scene.times(fps)
     view = camera(scene.size, size or scene.size, times, camera_rng, noise=noise, shake=shake, light_steps=light_steps)
@@ -182,6 +166,13 @@ def _check(
     if name not in SCENARIOS:
         near = difflib.get_close_matches(name, SCENARIOS, n=1) or [", ".join(SCENARIOS)]
         raise ConfigError(f"no scenario is called {name!r}; did you mean {near[0]}?")
+    check_camera(seed, fps, size, noise, shake, light_steps)
+
+
+def check_camera(
+    seed: int, fps: float | None, size: tuple[int, int] | None, noise: float, shake: float, light_steps: int
+) -> None:
+    """Raises ConfigError for a value out of range."""
     if seed < 0:
         raise ConfigError(f"seed is {seed}; it must be 0 or more")
     if fps is not None and not 1 <= fps <= 1000:

@@ -13,10 +13,14 @@ FIRST = datetime(2024, 1, 1)
 SECONDS = 366 * 24 * 3600
 
 
-def burn_in(picture: Image, time_s: float, seed: int) -> None:
-    """Write the time to a tenth of a second, white with a dark rim; the seed draws when the clip began."""
-    begin = FIRST + timedelta(seconds=int(np.random.default_rng((seed, 8)).integers(SECONDS)))
-    text = (begin + timedelta(seconds=time_s)).strftime("%Y-%m-%d %H:%M:%S.%f")[:-5]
+def beginning(seed: int) -> datetime:
+    """When a clip began, drawn by its seed."""
+    return FIRST + timedelta(seconds=int(np.random.default_rng((seed, 8)).integers(SECONDS)))
+
+
+def burn_in(picture: Image, now: datetime) -> None:
+    """Write the time to a tenth of a second, white with a dark rim."""
+    text = now.strftime("%Y-%m-%d %H:%M:%S.%f")[:-5]
     height, width = picture.shape[:2]
     size = 0.55 * width / cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 1.0, 1)[0][0]
     place = (round(0.02 * width), round(0.07 * height))

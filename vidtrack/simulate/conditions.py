@@ -36,14 +36,14 @@ class Conditions:
     leaves: float = 1.0
     clock: bool = False
 
-    def check(self, scene: Scene) -> None:
-        """Raises ConfigError for an unknown or needless condition."""
+    def check(self, trees: bool) -> None:
+        """For a scene with or without trees. Raises ConfigError for an unknown or needless condition."""
         for name, value, known in (("weather", self.weather, WEATHER), ("light", self.light, LIGHT)):
             if value not in known:
                 raise ConfigError(f"{name} is {value!r}; it must be one of {', '.join(known)}")
         if not 0 <= self.leaves <= MOST_LEAVES:
             raise ConfigError(f"leaves is {self.leaves}; it must be 0 to {MOST_LEAVES:g}")
-        if self.leaves != 1 and not scene.props:
+        if self.leaves != 1 and not trees:
             raise ConfigError("leaves does nothing in a scene without trees; leave it out")
         if self.wet and self.weather == "rain":
             raise ConfigError("rain wets the road; leave wet out")
@@ -67,28 +67,38 @@ class Conditions:
 
     def below(self) -> list[Effect]:
         """What changes the street before anybody is drawn on it."""
-        return [wet.Shine()] if self.wet or self.weather == "rain" else []
+        return [wet.Shine()] if self.shining else []
+
+    @property
+    def shining(self) -> bool:
+        """The road is wet."""
+        return self.wet or self.weather == "rain"
+
+    @property
+    def dark(self) -> bool:
+        """Lamps are on."""
+        return self.light in ("dusk", "night")
 
     def above(self, scene: Scene, size: tuple[int, int], scale: float, seed: int) -> list[Effect]:
         """What lies over the drawn scene, in this order."""
         effects: list[Effect] = []
         if self.weather == "rain":
             effects.append(wet.Spray((seed, 4)))
-        if self.light in ("dusk", "night"):
+        if self.dark:
             share = light.AMBIENT[self.light]
             lamps = self.light == "night"
-            shining = self.wet or self.weather == "rain"
-            effects.append(light.Lamplight(share, size, scale, (seed, 5), street_lamps=lamps, wet=shining))
+            effects.append(light.Lamplight(share, size, scale, (seed, 5), street_lamps=lamps, wet=self.shining))
         if self.light == "low-sun":
             assert scene.sun is not None  # set above
             effects.append(light.Glare(scene.sun, size))
+        return effects + self.air(size, scale, seed)
+
+    def air(self, size: tuple[int, int], scale: float, seed: int) -> list[Effect]:
+        """What falls or hangs in the air, and the noise of little light."""
         falling: dict[str, Effect] = {
             "rain": weather.Rain((seed, 6)),
             "snow": weather.Snow(size, scale, (seed, 6)),
             "fog": weather.Fog(size, scale, (seed, 6)),
         }
-        if self.weather in falling:
-            effects.append(falling[self.weather])
-        if self.light in ("dusk", "night"):
-            effects.append(light.ShotNoise((seed, 7)))
-        return effects
+        effects = [falling[self.weather]] if self.weather in falling else []
+        return [*effects, light.ShotNoise((seed, 7))] if self.dark else effects

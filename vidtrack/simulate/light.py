@@ -96,10 +96,10 @@ class Lamplight:
         for lamps, colour, power in ((look.headlamps, BEAM, 255.0), (look.tail_lamps, RED, 150.0)):
             for lamp in lamps:
                 at = draw.apply(placed.to_picture, np.array(lamp))
-                _add_spot(glow, at, (1.3 * scale, 1.3 * scale), power * colour)
-                _add_spot(glow, at, (4 * scale, 4 * scale), 0.18 * power * colour)
+                add_spot(glow, at, (1.3 * scale, 1.3 * scale), power * colour)
+                add_spot(glow, at, (4 * scale, 4 * scale), 0.18 * power * colour)
                 if self._wet:
-                    _add_spot(glow, at + np.array([0, 9 * scale]), (1.6 * scale, 7 * scale), 0.4 * power * colour)
+                    add_spot(glow, at + np.array([0, 9 * scale]), (1.6 * scale, 7 * scale), 0.4 * power * colour)
 
 
 class ShotNoise:
@@ -114,7 +114,7 @@ class ShotNoise:
         return rounded(picture + sigma * rng.standard_normal(picture.shape, dtype=np.float32))
 
 
-def _add_spot(glow: NDArray[np.float32], at: Floats, sigma: tuple[float, float], colour: NDArray[np.float32]) -> None:
+def add_spot(glow: NDArray[np.float32], at: Floats, sigma: tuple[float, float], colour: NDArray[np.float32]) -> None:
     """Add a Gaussian spot of light."""
     reach = 3 * np.array(sigma)
     roi = draw.window(np.stack([at - reach, at + reach]), glow, 0)
