@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from vidtrack.video.background.distance import contrast, veil
+from vidtrack.config import DetectorSettings
+from vidtrack.video.background import create
+from vidtrack.video.background.distance import contrast, haziness, veil
 from vidtrack.video.background.shadow import SHADOW, reclaim
+from vidtrack.video.frame import Frame
 
 VEHICLE = 1
 
@@ -95,3 +98,36 @@ def test_the_veil_is_what_haze_adds_to_black():
 def test_a_picture_that_shows_nothing_black_tells_nothing_of_haze(haze):
     flat = np.random.default_rng(1).uniform(90 + haze, 150 + haze, (120, 160))
     assert veil(flat.astype(np.uint8)) is None
+
+
+def marked(height, base=100.0):
+    """A smooth road with one mark of this height, and few edges therefore."""
+    luma = np.full((120, 160), base, np.float32)
+    luma[60:62, 40:80] += height
+    return luma
+
+
+@pytest.mark.parametrize("turn", [np.asarray, np.transpose])
+@pytest.mark.parametrize(("height", "expected"), [(100, 0.0), (65, 0.0), (57.5, 0.5), (50, 1.0), (10, 1.0), (0, 1.0)])
+def test_haze_is_told_by_the_steepest_edges_however_few_and_whichever_way_they_run(height, expected, turn):
+    assert haziness(turn(marked(height))) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (10, 2), (2, 10)])
+def test_a_picture_too_small_for_edges_is_flat_or_clear_but_no_error(shape):
+    assert haziness(np.zeros(shape, np.float32)) in (0, 1)
+
+
+def test_the_shadow_on_a_smooth_road_in_clear_light_is_no_foreground():
+    """Nothing black is in view and edges are few; that is no haze, and black is not lifted."""
+    assert contrast(marked(100.0)) == 0.5
+    detector = create(DetectorSettings(), None, None)
+    colour = np.full((60, 80), 128, np.uint8)
+    for k in range(30):
+        light = marked(100.0)
+        light[:6, :40] = 50
+        if k >= 20:
+            light[80:100, 60:100] *= 0.6
+        seen = np.clip(light + np.random.default_rng(k).normal(0, 1, light.shape), 0, 255).astype(np.uint8)
+        mask = detector.apply(Frame(k, k / 25, seen, colour, colour, full_range=True), np.empty((0, 4))).mask
+    assert (mask[80:100, 60:100] > 0).mean() < 0.05

@@ -13,6 +13,8 @@ _ONE = np.float32(1)
 _CLEAR = 40.0  # grey levels over two pixels; one pixel in a hundred of a scene in clear light has a steeper edge
 _STEEP = 99.0  # percent
 LEAST_CONTRAST = 0.5  # of the threshold in clear light
+_SHARP, _BLURRED = 65.0, 50.0  # grey levels over two pixels of the steepest edges in clear light, and in haze
+_STEEPEST = 99.9  # percent
 _DARKEST = 0.5  # percent of the pixels
 _STANDS_OUT = 1.25  # interquartile ranges below the median; evenly spread levels reach down by 1.0
 _DARK_PAINT = 10.0  # grey levels; tyres are not quite black
@@ -26,6 +28,19 @@ def contrast(luma: Levels) -> np.float32:
     return (
         np.float32(min(max(float(np.percentile(edges, _STEEP)) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
     )
+
+
+def haziness(luma: Levels) -> np.float32:
+    """How far haze or darkness blurs the scene (h, w), 0 clear .. 1: by its steepest edges, across or down.
+
+    A clear view of a smooth road has few edges, but those of its marks and kerbs are steep.
+    """
+    steepest = [
+        float(np.percentile(edges, _STEEPEST))
+        for edges in (np.abs(luma[::_ROWS, 2:] - luma[::_ROWS, :-2]), np.abs(luma[2:, ::_ROWS] - luma[:-2, ::_ROWS]))
+        if edges.size
+    ]
+    return np.float32(np.clip((_SHARP - max(steepest, default=_SHARP)) / (_SHARP - _BLURRED), 0, 1))
 
 
 def veil(luma: Image) -> float | None:

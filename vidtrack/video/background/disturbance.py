@@ -15,7 +15,7 @@ from vidtrack.scan import Floats, Ints
 from vidtrack.video.background.camera import Camera
 from vidtrack.video.background.canvas import lay, mark_unseen, settled
 from vidtrack.video.background.change import Change
-from vidtrack.video.background.distance import LEAST_CONTRAST, contrast, disturbance, veil
+from vidtrack.video.background.distance import contrast, disturbance, haziness, veil
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
@@ -46,6 +46,7 @@ class Disturbance:
         "_start_s",
         "_frames",
         "_contrast",
+        "_hazy",
         "_veil",
         "_sunlight",
     )
@@ -59,7 +60,7 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._contrast, self._veil = np.float32(1), 0.0
+        self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
         self._sunlight = Sunlight()
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
@@ -122,7 +123,7 @@ class Disturbance:
             self._heal_ghosts(picture, scene, mask)
         self._learn(picture, scene, mask, hit, dt, span)
         if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
-            self._contrast = contrast(scene.luma)
+            self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
             haze = veil(picture.luma)
             self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
             self._absorb(picture, scene, hit)
@@ -141,14 +142,14 @@ class Disturbance:
         self._change.restart(time_s)
         self._camera.restart()
         scene = start(picture)
-        self._contrast, self._veil = contrast(scene.luma), veil(picture.luma) or 0.0
+        self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
+        self._veil = veil(picture.luma) or 0.0
         return scene
 
     @property
     def _black(self) -> np.float32:
-        """Luminance of black as it is seen: haze lifts it where it takes contrast away."""
-        lift = max(0.0, self._veil - self._view.black) * (1 - self._contrast) / (1 - LEAST_CONTRAST)
-        return np.float32(self._view.black + lift)
+        """Luminance of black as it is seen: haze lifts it where it blurs the scene."""
+        return np.float32(self._view.black + self._hazy * max(0.0, self._veil - self._view.black))
 
     @property
     def _unsure(self) -> bool:
