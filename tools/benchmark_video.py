@@ -4,7 +4,8 @@
 
 Rows: clips with crossings found by eye (hit/missed/false, and pooled), CDnet traffic (F of the masks, MOTA and IDF1),
 CDnet highway and PETS09 (MOTA, IDF1, switches), the simulated junction under shake and in weather (mean IDF1 at IoU
-0.3; four times the shake at 960x720). vidtrack runs with its defaults but for --set. The scripts are MOG2 with SORT and
+0.3; four times the shake at 960x720), roads in perspective (mean MOTA and IDF1 of the first two seeds).
+vidtrack runs with its defaults but for --set. The scripts are MOG2 with SORT and
 KNN with ByteTrack (peers/count_lines.py) in an environment that pip makes in --peers-in, where their results are kept
 too; without --peers-in they are left out. The junctions are drawn once into --clips.
 """
@@ -20,7 +21,17 @@ from statistics import mean
 import cv2
 from benchmark_background import f_measure
 from score_events import Judged, judge
-from video_clips import DEVELOPMENT, FILES, TRAFFIC_FIRST, TRAFFIC_LAST, Clip, simulated, with_events, with_identities
+from video_clips import (
+    DEVELOPMENT,
+    FILES,
+    TRAFFIC_FIRST,
+    TRAFFIC_LAST,
+    Clip,
+    simulated,
+    simulated_road,
+    with_events,
+    with_identities,
+)
 from video_trackers import Contender, Tracked, contenders
 
 from vidtrack import score
@@ -28,6 +39,8 @@ from vidtrack import score
 SHAKES = (0.0, 0.3, 1.0, 2.0, 4.0)
 LARGE = (960, 720)
 LOOSE = 0.3  # IoU for the simulated junction, whose people are six pixels wide
+ROADS = ("road", "junction-3d", "roundabout", "motorway")
+ROAD_SEEDS = 2
 
 CONDITIONS: dict[str, dict[str, object]] = {
     "rain": {"weather": "rain"},
@@ -48,7 +61,7 @@ Cells = dict[str, str]
 
 def main() -> None:
     """Print the table, row by row."""
-    names = (*FILES, "traffic", "highway", "pets", "junction", "junction-large", "conditions")
+    names = (*FILES, "traffic", "highway", "pets", "junction", "junction-large", "conditions", "roads")
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", nargs="+", choices=(*names, "events"), default=["events", *names[len(FILES) :]])
     add_options(parser)
@@ -68,6 +81,8 @@ def main() -> None:
     for label, knobs in CONDITIONS.items() if "conditions" in options.rows else ():
         clips = simulated(options.clips, label, range(options.seeds), **knobs)
         print_row(label, f"IDF1, mean of {options.seeds}", mean_idf1(clips, rivals))
+    for road in ROADS if "roads" in options.rows else ():
+        road_rows(simulated_road(options.clips, road, range(ROAD_SEEDS)), road, rivals)
 
 
 def add_options(parser: argparse.ArgumentParser, *, peers: bool = True) -> None:
@@ -154,6 +169,18 @@ def junction_rows(
         label = f"shake-{shake:g}" if size is None else f"shake-{4 * shake:g}-{size[0]}x{size[1]}"
         clips = simulated(options.clips, label, range(options.seeds), **knobs)
         print_row(label, f"IDF1, mean of {options.seeds}", mean_idf1(clips, rivals))
+
+
+def road_rows(clips: Sequence[Clip], road: str, rivals: dict[str, Contender]) -> None:
+    """Mean MOTA and IDF1 of a road, for boxes that fit and for boxes that are there."""
+    results = {rival: list(run(clips)) for rival, run in rivals.items()}
+    for iou in (0.5, LOOSE):
+        cells = {}
+        for rival, found in results.items():
+            pairs = zip(clips, found, strict=True)
+            scores = [score.evaluate(*clip.scored(result.tracks), iou=iou) for clip, result in pairs]
+            cells[rival] = " / ".join(f"{mean(float(one[name]) for one in scores):.3f}" for name in ("mota", "idf1"))
+        print_row(road, f"MOTA / IDF1 at IoU {iou:g}, mean of {len(clips)}", cells)
 
 
 def mean_idf1(clips: Sequence[Clip], rivals: dict[str, Contender]) -> Cells:

@@ -12,7 +12,7 @@ from score_events import Event, read_truth
 
 from vidtrack import formats
 from vidtrack.formats import Table
-from vidtrack.simulate import simulate, write
+from vidtrack.simulate import simulate, simulate_road, write, write_road
 
 DEVELOPMENT = ("street", "handheld", "tunnel")
 """Clips whose single events may be looked at; the others are kept aside, and only their totals are printed."""
@@ -99,5 +99,18 @@ def simulated(folder: Path, label: str, seeds: Iterable[int], **knobs: Any) -> l
         if not (place / "gt.txt").is_file():  # written last
             place.mkdir(parents=True, exist_ok=True)
             write(simulate("junction", seed=seed, **knobs), place)
+        clips.append(Clip(name, place / "video.avi", truth=place / "gt.txt"))
+    return clips
+
+
+def simulated_road(folder: Path, road: str, seeds: Iterable[int]) -> list[Clip]:
+    """A simulated road in perspective, drawn into `folder` where it is not there yet."""
+    clips = []
+    for seed in seeds:
+        name = f"{road}-{seed}"
+        place = folder / name
+        if not (place / "site.toml").is_file():  # written last
+            place.mkdir(parents=True, exist_ok=True)
+            write_road(simulate_road(road, seed=seed), place)
         clips.append(Clip(name, place / "video.avi", truth=place / "gt.txt"))
     return clips
