@@ -17,26 +17,25 @@ FLOORS = (
     "papers",
     "doctor",
     "run",
+    "recording",
     "serve",
     "simulate",
     "output",
     "score",
     "traffic",
+    "detections",
     "video",
     "radar",
     "tracking",
     "associate",
     "estimate",
-    "detection",
+    "amplitude",
     "formats",
-    "plane",
-    "rows",
     "scan",
-    "usable",
-    "explain",
+    "tracks",
+    "decision",
+    "arrays",
     "config",
-    "settings",
-    "toml_file",
     "state",
     "errors",
     "compiled",
@@ -104,7 +103,7 @@ def test_no_module_imports_itself_by_way_of_others():
 
 
 def test_rerun_is_imported_where_recordings_are_made():
-    assert users_of("rerun") == {"output.rerun_recording", "output.rerun", "output.rerun_radar"}
+    assert users_of("rerun") == {"output.rerun.recording", "output.rerun.pictures", "output.rerun.plots"}
 
 
 def test_opencv_is_used_where_there_are_pictures():

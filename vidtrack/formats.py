@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import FormatError, SourceError
-from vidtrack.scan import Floats, Ints, Mask
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -6,10 +6,11 @@ import pytest
 from vidtrack.associate.hard import GNN
 from vidtrack.associate.jpda import JPDA
 from vidtrack.associate.trust import Trust
-from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Scan, Status
+from vidtrack.estimate.motion.velocity import ConstantVelocity
+from vidtrack.scan import Scan
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status
 
 R = np.eye(2)
 

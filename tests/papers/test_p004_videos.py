@@ -7,8 +7,8 @@ from vidtrack.papers.p004.clips import Watched, ids_on_targets, unshared, watch
 from vidtrack.papers.p004.fig5 import moments, outcome
 from vidtrack.papers.p004.fig6 import lost_identities
 from vidtrack.papers.p004.junction import DEFAULT, GREY, LINE, NEAR, REGION, filmed, story, uncovered
-from vidtrack.scan import Status
 from vidtrack.simulate import simulate
+from vidtrack.tracks import Status
 
 
 def tracks(*rows):

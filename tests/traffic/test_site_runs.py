@@ -12,13 +12,13 @@ from command_line import start
 from pinhole import HEIGHT, POINTS, WIDTH, Pinhole
 from synthetic_steps import make_step
 
-from vidtrack.config import Settings
+from vidtrack.arrays.affine import shift
+from vidtrack.config.settings import Settings
 from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
-from vidtrack.plane import shift
 from vidtrack.run.live.parts import Part
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.road import road_at
+from vidtrack.traffic.metres import road_at
 
 CAMERA = Pinhole()
 FPS = 25.0

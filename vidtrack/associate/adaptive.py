@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from vidtrack.amplitude.densities import RAYLEIGH, detection_probability
+from vidtrack.amplitude.threshold import ThresholdController
 from vidtrack.associate.problem import Problem
-from vidtrack.detection.amplitude import RAYLEIGH, detection_probability
-from vidtrack.detection.threshold import ThresholdController
 from vidtrack.errors import ScanError
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Ints
 
 
 @kernel

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 WIDEST = 30
 """Most bits of a frontier."""

@@ -10,12 +10,13 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
 from vidtrack.compiled import kernel, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.rows import starts
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 
 Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
 FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)

@@ -7,12 +7,13 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Decision, Floats, Ints
 
 
 class Associator(Protocol):

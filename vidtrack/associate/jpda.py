@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.assignment import solve
 from vidtrack.associate.belief import propagate
 from vidtrack.associate.clusters import clusters
@@ -14,7 +15,7 @@ from vidtrack.associate.events import Side, exact, frontier, plan, reverse
 from vidtrack.associate.jpda_star import likeliest_events
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
-from vidtrack.scan import Decision, Floats, Ints, Mask
+from vidtrack.decision import Decision
 
 log = logging.getLogger(__name__)
 

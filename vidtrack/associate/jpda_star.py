@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.events import Side
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 
 @kernel

@@ -6,9 +6,9 @@ from heapq import heapify, heappop, heappush
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.assignment import solve
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask
 
 IMPOSSIBLE, FEASIBLE = 1e12, 1e11
 """Cost of a row that has no choice left, and what everything else stays below."""

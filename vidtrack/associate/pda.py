@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.widening import widening
 from vidtrack.compiled import kernel
-from vidtrack.scan import Decision, Floats, Ints
+from vidtrack.decision import Decision
 
 
 @dataclass(frozen=True, slots=True)

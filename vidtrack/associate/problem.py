@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate, Pairs
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 
 VANISHING = 2000.0
 """A factor that is zero in a limit (no clutter; P_D P_G of one) is taken as exp(-2000) or less: against it no

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.clusters import find
 from vidtrack.associate.gate import Gate
 from vidtrack.compiled import kernel
 from vidtrack.estimate.sensor import wrapped
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 BLOCK = 256
 """Measurements that are compared with all others at a time, which bounds the memory that a heap of them takes."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Pairs, quantile
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints, Mask
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull, log_ratio, swerling1
+from vidtrack.amplitude.reduction import gate_volume
+from vidtrack.amplitude.strongest import Strongest
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.hard import one_hot
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.widening import widening
 from vidtrack.compiled import kernel
-from vidtrack.detection.amplitude import RAYLEIGH, Weibull, log_ratio, swerling1
-from vidtrack.detection.reduction import gate_volume
-from vidtrack.detection.strongest import Strongest
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError, ScanError
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 TINY = 1e-300
 MOST = 0.999

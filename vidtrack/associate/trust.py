@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Mask
 from vidtrack.associate.hard import Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Mask, Scan
+from vidtrack.decision import Decision
+from vidtrack.scan import Scan
 
 
 @dataclass(frozen=True, slots=True)

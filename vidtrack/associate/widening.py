@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Floats
 
 
 def widening(problem: Problem, seen: Floats) -> Floats:

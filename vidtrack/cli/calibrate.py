@@ -73,7 +73,7 @@ def command(options: CalibrateOptions) -> int:
 
 def _first_picture(source: str) -> Image:
     """(H, W, 3) of an image, or the first of a video."""
-    from vidtrack.config import SourceSettings
+    from vidtrack.config.settings import SourceSettings
     from vidtrack.video.source import open_source
 
     with open_source(source, SourceSettings()) as frames:

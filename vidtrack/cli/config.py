@@ -30,7 +30,7 @@ Examples:
 @receives(ConfigOptions)
 def command(options: ConfigOptions) -> None:
     """Print the effective settings as TOML, ready for --config. Settings that are None are commented out."""
-    from vidtrack.explain import as_toml
+    from vidtrack.config.explain import as_toml
     from vidtrack.output.folder import writing
 
     start_log(options.verbose, options.quiet)

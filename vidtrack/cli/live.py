@@ -16,7 +16,7 @@ from vidtrack.cli.options import announce_compiling, common, receives, settings_
 from vidtrack.cli.tracking import PictureOptions, picture_options
 
 if TYPE_CHECKING:
-    from vidtrack.config import Settings
+    from vidtrack.config.settings import Settings
     from vidtrack.output.status import LiveStatus
     from vidtrack.run.live.outputs import LiveExtras
     from vidtrack.serve.page import Page
@@ -108,7 +108,7 @@ def command(options: LiveOptions) -> int:
     try:
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_many import are_many, track_many
-        from vidtrack.config import Input
+        from vidtrack.config.inputs import Input
         from vidtrack.video.live.address import secrets
 
         hidden = [text for source in options.sources for text in secrets(source)]

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from vidtrack.config import Input, Settings
+    from vidtrack.config.inputs import Input
+    from vidtrack.config.settings import Settings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Received = TypeVar("Received")
@@ -71,7 +72,7 @@ class WithSettings(Options):
 
     def settings(self, kind: Input | None = None, base: Mapping[str, Any] | None = None) -> Settings:
         """All settings: see `config.load`. Raises ConfigError."""
-        from vidtrack.config import load
+        from vidtrack.config.load import load
 
         return load(self.config_file, self.given(), base, kind)
 

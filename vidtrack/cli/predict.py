@@ -13,7 +13,7 @@ from vidtrack.cli.options import common, receives, seed_option, start_log
 from vidtrack.cli.radar_problem import ProblemOptions, problem_options
 
 if TYPE_CHECKING:
-    from vidtrack.radar.forecast import Forecast, Trial
+    from vidtrack.radar.performance.forecast import Forecast, Trial
 
 NAMES = {
     "paper": "eq. (33) of the paper, a lower bound",
@@ -67,8 +67,8 @@ def command(options: PredictOptions) -> None:
     With --runs a track counts as lost if its last error is above 20 (pda: 10), or the target was outside the gate
     in each of the last five scans.
     """
-    from vidtrack.detection.amplitude import RAYLEIGH
-    from vidtrack.radar.forecast import forecast, trial
+    from vidtrack.amplitude.densities import RAYLEIGH
+    from vidtrack.radar.performance.forecast import forecast, trial
 
     start_log(options.verbose, options.quiet)
     folder = options.folder("predict")

@@ -8,7 +8,7 @@ import click
 
 from vidtrack.cli.options import announce_compiling, common, receives, seed_option, settings_options, start_log
 from vidtrack.cli.tracking import TrackingOptions, association_options, choice, finish, smooth_option
-from vidtrack.settings import names
+from vidtrack.config import names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ def command(options: RadarOptions) -> None:
     y north, z up. The results' folder is printed; it holds tracks.csv, tracks.parquet, summary.json and tracks.png.
     Ctrl-C ends with complete results up to then.
     """
-    from vidtrack.config import Input
+    from vidtrack.config.inputs import Input
     from vidtrack.run.radar import run_plots
     from vidtrack.run.run import Extras
 

@@ -12,7 +12,7 @@ from vidtrack.cli.options import Options
 from vidtrack.errors import ConfigError
 
 if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
+    from vidtrack.amplitude.densities import Weibull
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -23,7 +23,7 @@ class _Clutter(click.ParamType):
     name = "B,C"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Weibull:
-        from vidtrack.detection.amplitude import Weibull
+        from vidtrack.amplitude.densities import Weibull
 
         try:
             shape, rate = map(float, str(value).split(","))
@@ -53,7 +53,7 @@ class ProblemOptions(Options):
         """The linear SNR. Raises ConfigError for one that is no number, or too high to mean anything."""
         from math import isfinite
 
-        from vidtrack.detection.amplitude import linear
+        from vidtrack.amplitude.densities import linear
 
         if not (isfinite(self.snr_db) and self.snr_db <= 100):
             raise ConfigError(f"--snr-db is {self.snr_db:g}; it must be a number of at most 100")

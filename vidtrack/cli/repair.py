@@ -40,7 +40,7 @@ def command(options: RepairOptions) -> None:
     from vidtrack.errors import StoppedEarly
     from vidtrack.output.folder import open_run, spare
     from vidtrack.output.repair import repair
-    from vidtrack.run.live.retention import parts_of
+    from vidtrack.recording.retention import parts_of
 
     start_log(options.verbose, options.quiet)
     folder = options.source

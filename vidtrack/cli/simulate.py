@@ -13,7 +13,7 @@ from vidtrack.cli.options import Options, common, receives, seed_option, start_l
 from vidtrack.cli.radar_problem import weibull_option
 
 if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
+    from vidtrack.amplitude.densities import Weibull
 
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
 ROADS = ("road", "junction-3d", "roundabout", "motorway")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 import click
 
 from vidtrack.cli.options import WithSettings
-from vidtrack.settings import names
+from vidtrack.config import names
 
 if TYPE_CHECKING:
     from vidtrack.run.run import Run

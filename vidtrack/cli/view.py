@@ -45,8 +45,8 @@ def command(options: ViewOptions) -> None:
 
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
-    from vidtrack.output.rerun import RerunSink
-    from vidtrack.output.rerun_radar import RadarRerun
+    from vidtrack.output.rerun.pictures import RerunSink
+    from vidtrack.output.rerun.plots import RadarRerun
     from vidtrack.traffic.lines import parse_lines
     from vidtrack.video.source import open_source
 

@@ -8,7 +8,8 @@ from time import perf_counter
 
 import numpy as np
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import is_detections, open_detections
 from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.objects import ObjectMeter, finer
 from vidtrack.doctor.opening import is_live, looked_at, open_pictures
@@ -16,7 +17,6 @@ from vidtrack.errors import SourceError
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.tracking.tracker import Tracker
-from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import redact
 from vidtrack.video.live.stats import LiveStats

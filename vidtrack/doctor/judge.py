@@ -5,7 +5,7 @@ The limits are from simulated junctions with each trouble in growing strength, t
 
 from __future__ import annotations
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.doctor.advice import Advice
 from vidtrack.doctor.findings import Findings
 from vidtrack.doctor.on_motion import on_camera, on_objects

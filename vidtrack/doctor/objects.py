@@ -8,13 +8,15 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.config import BlobSettings, Settings
+from vidtrack.arrays.types import Floats, Mask
+from vidtrack.config.settings import Settings
+from vidtrack.config.video import BlobSettings
 from vidtrack.doctor.findings import Objects
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE, Floats, Mask
 from vidtrack.tracking.boxes import best_cover, longer, widened
+from vidtrack.tracks import TENTATIVE
 from vidtrack.video.background.picture import reduction
-from vidtrack.video.blobs import find_blobs
+from vidtrack.video.blobs.blobs import find_blobs
 from vidtrack.video.foreground import Foreground
 
 _SETTLE_S = 2.0  # in which what stood in the first picture comes out of the scene

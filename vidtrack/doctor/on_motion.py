@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.doctor.advice import Advice, scale_option, set_option
 from vidtrack.doctor.findings import Findings, Objects
 from vidtrack.video.background.picture import reduction

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import monotonic
 
-from vidtrack.config import Input, Settings
-from vidtrack.video.detections import is_detections
+from vidtrack.config.inputs import Input
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import is_detections
+from vidtrack.recording.source import Recording, is_recording
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.source import LiveSource
-from vidtrack.video.recording import Recording, is_recording
 from vidtrack.video.source import Source, open_source
 
 

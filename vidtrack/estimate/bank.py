@@ -6,9 +6,11 @@ from typing import Protocol
 
 import numpy as np
 
-from vidtrack.estimate.model import Motion
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.decision import Decision
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 
 class Estimator(Protocol):

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle import NO_GLINT, Glint, ParticleBank
 from vidtrack.estimate.particle_kernels import copy, normalise
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 
 
 class ErrorSignalBank(ParticleBank):

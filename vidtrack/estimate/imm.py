@@ -9,11 +9,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor, wrapped
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 LEAST = 1e-9
 """Smallest probability of a mode: none is ever ruled out for good."""

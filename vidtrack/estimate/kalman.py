@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.estimate.kernels import mixture_update, projection, propagation
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 
 class KalmanBank:

@@ -11,9 +11,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import specialised
-from vidtrack.rows import starts
-from vidtrack.scan import Floats, Ints
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats, Floats], Floats]

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 LASTING_S = 0.5
 """s; correlation time of what a detector misses or adds at a vehicle's ends. In the simulated junction the errors of

@@ -6,14 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.blocks import in_blocks
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
-from vidtrack.rows import starts
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 BLOCK = 50_000
 """Particles in a block: enough that a thread of its own pays."""

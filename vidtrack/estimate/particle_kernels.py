@@ -10,11 +10,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel, specialised
 from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.resampling import choose
 from vidtrack.estimate.stream import normal
-from vidtrack.scan import Floats, Ints
 
 Kernel = Callable[..., None]
 

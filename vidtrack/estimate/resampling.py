@@ -10,9 +10,9 @@ from enum import IntEnum
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
 from vidtrack.estimate.stream import exponential, uniform
-from vidtrack.scan import Floats, Ints
 
 
 class Resampling(IntEnum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 
 def smoothing_gain(P: Floats, F: Floats, prior_P: Floats) -> Floats:

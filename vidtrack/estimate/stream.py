@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import erfc
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 
 STEP, MIX1, MIX2 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 SHIFT1, SHIFT2, SHIFT3, LAYER = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(255)

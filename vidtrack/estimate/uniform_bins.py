@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 RANGE_M = (10e3, 30e3, 50e3, 70e3, 100e3)
 """m; edges of the range bins of paper 003, table 1."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.sensor import Sensor, wrapped
-from vidtrack.scan import Floats
 
 
 class UnscentedBank(KalmanBank):

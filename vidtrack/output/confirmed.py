@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.scan import TENTATIVE
+from vidtrack.tracks import TENTATIVE
 
 
 @dataclass(slots=True)

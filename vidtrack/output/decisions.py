@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vidtrack.decision import Choices, Event
 from vidtrack.output.linefile import LineFile
 from vidtrack.output.sink import Step
-from vidtrack.scan import Choices, Event
 
 HEADER = "time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,candidates,reason\n"
 

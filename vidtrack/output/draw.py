@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vidtrack import plane
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats
 from vidtrack.output.colours import Colour, colour
-from vidtrack.scan import Floats, Status, Tracks
+from vidtrack.tracks import Status, Tracks
 from vidtrack.traffic.lines import Line, counted
 from vidtrack.video.frame import Image
 
@@ -105,7 +106,7 @@ def moved_lines(lines: Sequence[Line], motion: Floats | None) -> list[Line]:
     """The lines where the road is in a picture; motion (2, 3) from the scene to it, None: where it was."""
     if motion is None:
         return list(lines)
-    ends = [plane.points(motion, np.array([[k.x1, k.y1], [k.x2, k.y2]])).ravel().tolist() for k in lines]
+    ends = [affine.points(motion, np.array([[k.x1, k.y1], [k.x2, k.y2]])).ravel().tolist() for k in lines]
     return [Line(k.name, *end) for k, end in zip(lines, ends, strict=True)]
 
 

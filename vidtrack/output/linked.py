@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.gate import quantile
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.rows import starts
-from vidtrack.scan import COASTING, Floats, Ints, Tracks
 from vidtrack.tracking.boxes import absolute, longer
+from vidtrack.tracks import COASTING, Tracks
 
 PROBABILITY = 0.999
 """Share of broken tracks whose motion and size are within the gate."""

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.sink import Step
 from vidtrack.output.tables import csv_text, stacked
-from vidtrack.scan import Floats, Ints
 
 _FRAME, _ID, _SEEN = 0, 1, 7
 

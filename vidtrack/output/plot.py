@@ -8,12 +8,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Patch, Pen, draw_lines
 from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Tracks
+from vidtrack.tracks import Tracks
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.output.colours import colour
 from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 _NUMBERED = 60
 """Most tracks that get their number; with more of them nothing could be read."""

@@ -11,11 +11,14 @@ import cv2
 import numpy as np
 import pyarrow as pa
 
-from vidtrack.config import Settings, parse
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.load import parse
+from vidtrack.config.settings import Settings
 from vidtrack.errors import FormatError
 from vidtrack.output.repair import read_tracks
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import Scan
+from vidtrack.tracks import Status, Tracks
 from vidtrack.video.frame import Frame, Image
 
 _NO_BLOBS = (np.empty((0, 2)), np.eye(2))

@@ -7,9 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.output.draw import Pen
 from vidtrack.output.folder import replacing
-from vidtrack.scan import Floats
 from vidtrack.traffic.ground import Ground
 from vidtrack.video.frame import Image
 

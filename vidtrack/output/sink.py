@@ -8,8 +8,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
-from vidtrack import plane
-from vidtrack.scan import Floats, Scan, Tracks
+from vidtrack.arrays.types import Floats
+from vidtrack.output.in_picture import moved, seen
+from vidtrack.scan import Scan
+from vidtrack.tracks import Tracks
 
 if TYPE_CHECKING:  # radar runs have no pictures, and must not need OpenCV
     from vidtrack.video.foreground import Foreground
@@ -41,13 +43,13 @@ class Step:
     @property
     def shown(self) -> Tracks:
         """The tracks in pixels of this picture, as users see them."""
-        return plane.moved(self.tracks, self.motion)
+        return moved(self.tracks, self.motion)
 
     def in_picture(self) -> Step:
         """The step with scan and tracks where they are in this picture."""
         if self.motion is None:
             return self
-        return replace(self, scan=plane.seen(self.scan, self.motion), tracks=self.shown, motion=None)
+        return replace(self, scan=seen(self.scan, self.motion), tracks=self.shown, motion=None)
 
 
 class Sink(Protocol):

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.estimate.smoother import smoothed
 from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.scan import Tracks
 from vidtrack.tracking.boxes import absolute
+from vidtrack.tracks import Tracks
 
 
 class Smoothed:

@@ -12,10 +12,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, moved_lines
 from vidtrack.output.sink import Step
-from vidtrack.scan import Status, Tracks
+from vidtrack.tracks import Status, Tracks
 from vidtrack.traffic.lines import LineCounter
 
 _LATENCIES = 500  # the last so many are looked at

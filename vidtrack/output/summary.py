@@ -11,11 +11,11 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from vidtrack import plane
-from vidtrack.config import Settings
+from vidtrack.arrays import affine
+from vidtrack.config.settings import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE
+from vidtrack.tracks import TENTATIVE
 from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
@@ -40,7 +40,7 @@ class CameraAccount:
         self._frames += 1
         if step.motion is not None:
             height, width = step.frame.shape
-            px = plane.displacement(step.motion, width, height)
+            px = affine.displacement(step.motion, width, height)
             self._moved_s += dt
             self._largest_px = max(self._largest_px, px)
             self._squares += px * px

@@ -12,10 +12,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 
+from vidtrack.arrays.types import Floats
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.parquet import ParquetParts
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Status
+from vidtrack.tracks import Status
 
 if TYPE_CHECKING:  # SciPy, only at sites with a calibration
     from vidtrack.traffic.footprint import Footprints

@@ -6,8 +6,9 @@ from collections import deque
 
 import numpy as np
 
-from vidtrack import plane
-from vidtrack.scan import Floats, Ints, Status, Tracks
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.tracks import Status, Tracks
 
 
 class Trails:
@@ -34,7 +35,7 @@ class Trails:
         alive = self._scans[-1][1]
         ids = np.concatenate([scan[1] for scan in self._scans])
         xy = np.concatenate([scan[2] for scan in self._scans])
-        xy = xy if motion is None else plane.points(motion, xy)
+        xy = xy if motion is None else affine.points(motion, xy)
         order = np.argsort(ids, kind="stable")
         ids, xy = ids[order], xy[order]
         first, last = np.searchsorted(ids, alive), np.searchsorted(ids, alive, side="right")

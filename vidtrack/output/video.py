@@ -11,14 +11,14 @@ import numpy as np
 from av.container import OutputContainer
 from av.video.stream import VideoStream
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.disk import Disk
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails, moved_lines
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
-from vidtrack.scan import Status
+from vidtrack.tracks import Status
 from vidtrack.traffic.lines import Line, LineCounter
 from vidtrack.video.frame import Image
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import quantile
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

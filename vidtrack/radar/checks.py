@@ -6,8 +6,8 @@ from bisect import bisect_right
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.radar.table import Table
-from vidtrack.scan import Floats, Mask
 
 TIME = ("scan", "time_s")
 POLAR = ("range_m", "azimuth_deg", "elevation_deg")

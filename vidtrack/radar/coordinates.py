@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 
 def wrap(angle: Floats) -> Floats:

@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from vidtrack.config import RadarSettings
-from vidtrack.estimate.acceleration import ConstantAcceleration, Singer
+from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.error_signal import ErrorSignalBank
 from vidtrack.estimate.fixed_gain import FixedGainBank
 from vidtrack.estimate.imm import IMMBank
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.acceleration import ConstantAcceleration, Singer
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.estimate.motion.turn import CoordinatedTurn
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import Glint, ParticleBank
 from vidtrack.estimate.resampling import Resampling
-from vidtrack.estimate.turn import CoordinatedTurn
 from vidtrack.estimate.unscented import UnscentedBank
 from vidtrack.radar.scans import Measurements
 

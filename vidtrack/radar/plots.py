@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vidtrack.config import RadarSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.table import Table, nearest, read_table
-from vidtrack.scan import Floats, Ints
 
 _log = logging.getLogger(__name__)
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.config import RadarSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
+from vidtrack.radar.performance.sweep import Sweep
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
-from vidtrack.radar.sweep import Sweep
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 NONLINEAR = ("ekf", "ukf", "particle")
 """Estimators that take range and angles as they are; the others get positions, converted without bias."""

@@ -11,8 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.radar.coordinates import to_polar, unbiased
-from vidtrack.scan import Floats
 
 NEAREST_M = 1e-6
 """The line of sight has no direction at the sensor itself: no target is nearer than this."""

@@ -13,8 +13,8 @@ import pyarrow.compute
 import pyarrow.csv
 import pyarrow.parquet
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import PlotFormatError, SourceError
-from vidtrack.scan import Floats, Ints, Mask
 
 Faults = dict[int, str]
 """What is wrong, by line of the file; the first fault of a line is kept."""

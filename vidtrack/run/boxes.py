@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import open_detections
 from vidtrack.output.confirmed import HOLD_S
 from vidtrack.output.folder import spare
 from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.sinks import file_sinks, file_subject
 from vidtrack.run.steps import scan_steps
 from vidtrack.run.trackers import build_box_tracker
-from vidtrack.video.detections import open_detections
 
 
 @contextmanager

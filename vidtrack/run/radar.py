@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.methods import STRENGTH
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
@@ -26,10 +26,10 @@ from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
-from vidtrack.scan import Tracks
 from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Tracks
 
 
 def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 0) -> Iterator[tuple[int, Tracks]]:
@@ -86,7 +86,7 @@ def radar_sinks(settings: Settings, extras: Extras, dim: int, folder: Path) -> I
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv", index="scan")
     if extras.rerun is not None:
-        from vidtrack.output.rerun_radar import RadarRerun
+        from vidtrack.output.rerun.plots import RadarRerun
 
         yield Threaded(RadarRerun(extras.rerun, settings))
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vidtrack.config import Settings
-from vidtrack.estimate.model import Motion
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import Detections
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
@@ -21,13 +22,12 @@ from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
+from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
-from vidtrack.traffic.road import road_at
-from vidtrack.video.detections import Detections
+from vidtrack.traffic.metres import road_at
 from vidtrack.video.frame import Image
-from vidtrack.video.recording import Recording
 from vidtrack.video.source import Source
 
 if TYPE_CHECKING:
@@ -136,6 +136,6 @@ def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]
 
         yield "video", AnnotatedVideo(extras.video, subject.fps, settings.output, subject.lines)
     if extras.rerun is not None:
-        from vidtrack.output.rerun import RerunSink
+        from vidtrack.output.rerun.pictures import RerunSink
 
         yield "rerun", RerunSink(extras.rerun, subject.shape, settings, subject.lines)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
 from vidtrack.associate.trust import EQUAL, Trust
-from vidtrack.config import DetectionSettings, Settings, TrackerSettings
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.config.settings import DetectionSettings, Settings, TrackerSettings
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.occlusion.occlusion import Occlusion

@@ -10,25 +10,26 @@ from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
-from vidtrack.config import Settings
+from vidtrack.arrays.types import Mask
+from vidtrack.config.settings import Settings
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S
 from vidtrack.output.folder import spare
 from vidtrack.output.sink import Step
+from vidtrack.recording.source import Recording, is_recording
 from vidtrack.run.live.checkpoint import Checkpoint
 from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.trackers import build_blob_tracker
-from vidtrack.scan import TENTATIVE, Mask, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.video import background
+from vidtrack.video.blobs.explain import explain
+from vidtrack.video.blobs.outlook import Outlook
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
-from vidtrack.video.recording import Recording, is_recording
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import open_source
-from vidtrack.video.vehicles.explain import explain
-from vidtrack.video.vehicles.outlook import Outlook
 
 log = logging.getLogger(__name__)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Ints, Mask
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.score.matching import Matchup, best_pairs, split_contests
 
 EPS = float(np.finfo(float).eps)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaincinv
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.formats import Table
-from vidtrack.scan import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)

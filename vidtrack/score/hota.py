@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.score.matching import Matchup, assign
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)

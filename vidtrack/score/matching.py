@@ -9,9 +9,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
 from vidtrack.formats import Table
-from vidtrack.scan import Floats, Ints, Mask
 
 FRAME_SPACING = 3.0  # in units of the reach: rows of different frames are never near
 ROUNDING = 1e-9  # keeps pairs exactly at the reach, which are judged afterwards

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints
 from vidtrack.score.matching import Matchup, assign
 
 

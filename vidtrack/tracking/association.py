@@ -6,11 +6,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Event, Ints, Mask, Tracks
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import Tracks
 
 
 class Association(NamedTuple):

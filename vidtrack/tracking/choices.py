@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Pairs
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
-from vidtrack.scan import Choices, Decision, Floats, Ints
+from vidtrack.decision import Choices, Decision
 
 LISTED = 10
 """Candidates told of each track and scan: of a heap of measurements not all."""

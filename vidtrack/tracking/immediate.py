@@ -6,16 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.trust import Trust
-from vidtrack.scan import CONFIRMED, TENTATIVE, Decision, Event, Ints, Mask, Tracks
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.occlusion.sharing import Sharing
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 CLAIMED = 0.1
 """A measurement whose weights over all tracks sum to more than this starts no track."""

@@ -9,10 +9,11 @@ from typing import Protocol
 import numpy as np
 from scipy.special import bdtrc
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Floats, Ints, Mask
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import MERGED, TENTATIVE
 
 
 class Life(Protocol):

@@ -7,8 +7,8 @@ from math import inf, log
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Mask
 from vidtrack.tracking.lifecycle import grown, missed, refuse_immortal, unseen
 from vidtrack.tracking.register import Register
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Decision, Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import MERGED, TENTATIVE
 
 MEMORY_S = 300.0
 """Time constant with which old scans are forgotten."""

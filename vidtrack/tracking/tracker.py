@@ -7,21 +7,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vidtrack.amplitude.threshold import ThresholdController
+from vidtrack.arrays.checks import check_states
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.adaptive import thresholded
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.trust import EQUAL, Trust
-from vidtrack.detection.threshold import ThresholdController
+from vidtrack.decision import Choices, Event
 from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.noise import for_update
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.estimate.smoother import smoothing_gain
-from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Event, Floats, Ints, Mask, Scan, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association, Timing
 from vidtrack.tracking.boxes import absolute, longer
 from vidtrack.tracking.choices import choices, evidence
@@ -35,7 +38,7 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.snapshot import snapshot
-from vidtrack.usable import check_states
+from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 
 class Outcome(NamedTuple):

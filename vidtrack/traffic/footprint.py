@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.ground import Ground
 
 _SLENDER, _SLENDER_SIGMA = 0.4, 0.1

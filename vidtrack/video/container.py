@@ -9,7 +9,7 @@ from pathlib import Path
 
 import av
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack import plane
-from vidtrack.scan import Floats
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats
 from vidtrack.video.frame import Frame, Image
 
 
@@ -43,13 +43,13 @@ class Foreground:
         """(h, w) the mask in the processed picture of that shape."""
         if self.place is None or self.motion is None:
             return self.mask
-        to_picture = plane.rescaled(plane.after(self.motion, self.place), 1 / self.step)
+        to_picture = affine.rescaled(affine.after(self.motion, self.place), 1 / self.step)
         return _warped(self.mask, to_picture, shape)
 
     def full_size(self, shape: tuple[int, int]) -> Image:
         """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""
         if self.place is not None and self.motion is not None:
-            to_picture = plane.after(plane.after(self.motion, self.place), enlargement(self.step))
+            to_picture = affine.after(affine.after(self.motion, self.place), enlargement(self.step))
             return _warped(self.mask, to_picture, shape)
         mask = self.mask.repeat(self.step, axis=0).repeat(self.step, axis=1)
         rows, columns = (max(0, size - found) for size, found in zip(shape, mask.shape, strict=True))

@@ -10,7 +10,7 @@ from typing import cast
 
 import av
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.stats import SourceStats

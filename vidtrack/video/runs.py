@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Ints
 from vidtrack.video.frame import Image
 
 Runs = NDArray[np.int32]

@@ -6,7 +6,7 @@ import configparser
 from dataclasses import dataclass
 from pathlib import Path
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import FormatError
 from vidtrack.video.clock import FALLBACK_FPS
 from vidtrack.video.stats import SourceStats

@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from types import TracebackType
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.container import VideoFile
 from vidtrack.video.frame import Frame

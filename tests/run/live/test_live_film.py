@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import av
 from command_line import SAMPLES
 
-from vidtrack.run.live.film import Film
+from vidtrack.recording.film import Film
 
 
 def test_all_but_the_last_second_is_on_the_disk(tmp_path):

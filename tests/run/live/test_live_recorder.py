@@ -5,9 +5,9 @@ from threading import Event, Thread
 import pytest
 from cameras import Picture, Script, grey
 
-from vidtrack.config import Settings
-from vidtrack.run.live import recorder
-from vidtrack.run.live.retention import Retention, parts_of
+from vidtrack.config.settings import Settings
+from vidtrack.recording import recorder
+from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.video.frame import Frame
 
 

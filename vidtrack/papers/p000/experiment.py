@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from vidtrack.detection.amplitude import detection_probability
-from vidtrack.detection.reduction import q2, q2_fit
-from vidtrack.detection.threshold import closed_form, optimum
-from vidtrack.radar.prediction import Factor, Scenario, normalised
+from vidtrack.amplitude.densities import detection_probability
+from vidtrack.amplitude.reduction import q2, q2_fit
+from vidtrack.amplitude.threshold import closed_form, optimum
+from vidtrack.radar.performance.prediction import Factor, Scenario, normalised
 
 SNR, FIXED, SCANS, LOST = 10.0, 1e-2, 35, 10.0
 CELLS = (4.0, 2.0)

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vidtrack.detection.amplitude import detection_probability
-from vidtrack.detection.reduction import gate_volume, q2
+from vidtrack.amplitude.densities import detection_probability
+from vidtrack.amplitude.reduction import gate_volume, q2
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
 from vidtrack.papers.p000.experiment import CELLS, SCANS, SNR, best_p_fa, controlled, scenario
 from vidtrack.papers.result import Result, Row
-from vidtrack.radar.prediction import predict
-from vidtrack.scan import Floats
+from vidtrack.radar.performance.prediction import predict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.amplitude.densities import detection_probability
+from vidtrack.amplitude.threshold import ThresholdController
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.pda import PDA
-from vidtrack.detection.amplitude import detection_probability
-from vidtrack.detection.threshold import ThresholdController
 from vidtrack.papers import style
 from vidtrack.papers.p000.experiment import CELLS, FIXED, LOST, SCANS, SNR, controlled, scenario
 from vidtrack.papers.result import Result, Row
-from vidtrack.radar.in_gate import AllPlots
-from vidtrack.radar.monte_carlo import Outcome, root_mean_square, simulate
-from vidtrack.radar.prediction import pda_factor, position_error, predict
-from vidtrack.scan import Floats
+from vidtrack.radar.performance.in_gate import AllPlots
+from vidtrack.radar.performance.monte_carlo import Outcome, root_mean_square, simulate
+from vidtrack.radar.performance.prediction import pda_factor, position_error, predict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.hard import Associator
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import METHODS
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status, Tracks
 
 RUNS = 500
 SCANS, PERIOD_S, JUDGED = 30, 2.0, 10

@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN, GreedyGNN
 from vidtrack.associate.problem import Problem
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
 from vidtrack.scan import Scan

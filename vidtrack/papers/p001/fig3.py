@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Gate, quantile
+from vidtrack.decision import Decision
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 RUNS = 10_000
 SCANS, PERIOD_S, SPEED, SIGMA = 12, 2.0, 150.0, 30.0

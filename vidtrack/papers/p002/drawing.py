@@ -9,7 +9,7 @@ import numpy as np
 
 from vidtrack.papers import style
 from vidtrack.papers.p002.experiment import SCANS, Study
-from vidtrack.radar.monte_carlo import root_mean_square
+from vidtrack.radar.performance.monte_carlo import root_mean_square
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

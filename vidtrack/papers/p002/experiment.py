@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull, linear
+from vidtrack.amplitude.strongest import Strongest
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.strongest import PSN, StrongestNeighbour
-from vidtrack.detection.amplitude import RAYLEIGH, Weibull, linear
-from vidtrack.detection.strongest import Strongest
 from vidtrack.papers.result import Row
-from vidtrack.radar.in_gate import StrongestPlot
-from vidtrack.radar.monte_carlo import Outcome, root_mean_square, simulate
-from vidtrack.radar.prediction import normalised, position_error, predict, psn_factor
-from vidtrack.scan import Floats
+from vidtrack.radar.performance.in_gate import StrongestPlot
+from vidtrack.radar.performance.monte_carlo import Outcome, root_mean_square, simulate
+from vidtrack.radar.performance.prediction import normalised, position_error, predict, psn_factor
 
 RUNS = 10_000
 """The paper has 1,000 and 500; lost tracks are so rare that their share needs more."""

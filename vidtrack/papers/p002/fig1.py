@@ -7,7 +7,7 @@ import numpy as np
 from vidtrack.papers.p002.drawing import draw
 from vidtrack.papers.p002.experiment import RUNS, Case, Study, study
 from vidtrack.papers.result import Result
-from vidtrack.radar.monte_carlo import root_mean_square
+from vidtrack.radar.performance.monte_carlo import root_mean_square
 
 CASES = tuple(
     Case(f"{db} dB, P_FA {p_fa:g}", db, p_fa) for db in (16, 13) for p_fa in (1e-1, 1e-5)

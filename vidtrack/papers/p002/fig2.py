@@ -6,7 +6,7 @@ from math import log
 
 import numpy as np
 
-from vidtrack.detection.amplitude import Weibull
+from vidtrack.amplitude.densities import Weibull
 from vidtrack.papers.p002.drawing import draw
 from vidtrack.papers.p002.experiment import RUNS, Case, Study, study
 from vidtrack.papers.result import Result

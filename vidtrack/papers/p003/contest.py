@@ -9,17 +9,17 @@ from math import sqrt
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.error_signal import ErrorSignalBank
 from vidtrack.estimate.fixed_gain import FixedGainBank
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import NO_GLINT, Glint, ParticleBank
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.uniform_bins import RANGE_M, UniformBinsBank
 from vidtrack.papers.p003.experiment import PARTICLES, TIMES, estimate, mean_and_se, measure, polar
-from vidtrack.scan import Floats
 from vidtrack.simulate.radar_scenarios import speed
 
 SIGMA_M, ALPHA_M = 5.0, 25.0

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
 from vidtrack.papers.p003.experiment import SCANS, SETTLED, TIMES, mean_and_se
 from vidtrack.papers.p003.scenario import CHANNELS, UNITS, WAYS, Study
 from vidtrack.papers.result import Row
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

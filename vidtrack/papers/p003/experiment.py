@@ -11,11 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.estimate.bank import Estimator
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import NO_GLINT, Glint
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 from vidtrack.simulate.flight import Flight
 from vidtrack.simulate.radar_scenarios import MULTIFUNCTION
 

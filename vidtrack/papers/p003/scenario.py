@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.error_signal import ErrorSignalBank
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.particle import ParticleBank
 from vidtrack.papers import style
 from vidtrack.papers.p003.experiment import MODEL, PARTICLES, SCAN_S, SCANS, SETTLED, estimate, measure, polar
-from vidtrack.scan import Floats
 from vidtrack.simulate.flight import Flight
 from vidtrack.simulate.radar_scenarios import MULTIFUNCTION
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
 from vidtrack.papers.p003.contest import BEGIN_S, CONTESTS, END_S, WINDOWS, Contest, mean_abs, run
 from vidtrack.papers.p003.experiment import RUNS, TIMES, mean_and_se
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

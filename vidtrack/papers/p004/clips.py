@@ -10,13 +10,16 @@ import av
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from vidtrack.config import DetectorSettings, Settings, TrackerSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.settings import Settings, TrackerSettings
+from vidtrack.config.video import DetectorSettings
 from vidtrack.papers import style
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import Scan
 from vidtrack.simulate import Clip
-from vidtrack.video.blobs import find_blobs
+from vidtrack.tracks import Status, Tracks
+from vidtrack.video.blobs.blobs import find_blobs
 from vidtrack.video.frame import Frame
 from vidtrack.video.planes import to_frame
 

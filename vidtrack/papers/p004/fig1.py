@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Gate
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 PREDICTED = np.array([[0.0], [6.0]])
 SIGMA = np.array([2.4, 0.8])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import NN
 from vidtrack.associate.problem import Problem
+from vidtrack.decision import Decision
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 MODEL = ConstantVelocity(accel=0.8, cross=0.2, warmup=6, heading=0.0)
 R = 0.49 * np.eye(2)

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Distance, Gate
 from vidtrack.associate.hard import GNN, NN
 from vidtrack.associate.problem import Problem
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -21,8 +21,8 @@ from vidtrack.papers.p004.ways import (
     follow_all,
 )
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Tracks
 from vidtrack.simulate import simulate
+from vidtrack.tracks import Tracks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

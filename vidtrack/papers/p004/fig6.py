@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.papers import style
 from vidtrack.papers.p004 import reference
 from vidtrack.papers.p004.clips import Watched, draw, ids_on_targets, watch
@@ -19,8 +20,8 @@ from vidtrack.papers.p004.ways import (
     follow_all,
 )
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Ints, Tracks
 from vidtrack.simulate import simulate
+from vidtrack.tracks import Tracks
 
 SEEDS = 30
 

@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Distance
-from vidtrack.config import DetectorSettings, PaperSettings, TrackerSettings
+from vidtrack.config.settings import TrackerSettings
+from vidtrack.config.video import DetectorSettings, PaperSettings
 from vidtrack.papers import style
 from vidtrack.papers.p004.clips import Watched, believed, by_default, draw, follow, ids_on_targets, watch
 from vidtrack.papers.result import Row
-from vidtrack.scan import Floats, Ints, Tracks
 from vidtrack.simulate import simulate
 from vidtrack.simulate.junction import HALF, ROAD, STOP_LINE
+from vidtrack.tracks import Tracks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Distance
 from vidtrack.papers import style
 from vidtrack.papers.p004 import reference
 from vidtrack.papers.p004.scenarios import DISTANCES, crossing, nine, shares, wrong_identities
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

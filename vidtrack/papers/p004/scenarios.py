@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Distance, Gate
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers.p004.simulated import MEASUREMENT_SIGMA, Targets, drive, nearest_target, track
-from vidtrack.scan import Floats
 from vidtrack.tracking.methods import METHODS
 
 DISTANCES: tuple[Distance, ...] = ("euclidean", "decoupled", "mahalanobis")

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import Associator
-from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
+from vidtrack.estimate.motion.velocity import ConstantVelocity
+from vidtrack.scan import Scan
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Tracks
 
 MEASUREMENT_SIGMA = 0.7
 """px, of a blob's centroid in each axis."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from vidtrack.associate.gate import Distance
-from vidtrack.config import TrackerSettings
+from vidtrack.config.settings import TrackerSettings
 from vidtrack.papers.p004.clips import Watched, follow, unshared
-from vidtrack.scan import Tracks
+from vidtrack.tracks import Tracks
 
 WORDS: dict[Distance, str] = {"euclidean": "minimum distance", "mahalanobis": "confidence region"}
 

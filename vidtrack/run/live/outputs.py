@@ -12,9 +12,9 @@ from vidtrack.output.confirmed import LIVE_HOLD_S, Confirmed
 from vidtrack.output.folder import open_run, usable
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
+from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.run.live.beside import Beside
 from vidtrack.run.live.parts import Parts
-from vidtrack.run.live.retention import Retention, parts_of
 from vidtrack.run.run import Extras
 from vidtrack.run.sinks import Subject, picture_sinks
 

@@ -21,7 +21,7 @@ from vidtrack.output.repair import add_parquet, repair
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import ROAD, VIDEO, csv_text, track_rows
-from vidtrack.run.live.retention import Retention, new_part, parts_of, size_of
+from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.sinks import Subject
 
 log = logging.getLogger(__name__)

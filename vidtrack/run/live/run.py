@@ -11,19 +11,19 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
+from vidtrack.recording.recorder import NoRecorder, Recorder
+from vidtrack.recording.retention import Retention
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
 from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
-from vidtrack.run.live.recorder import NoRecorder, Recorder
-from vidtrack.run.live.retention import Retention
 from vidtrack.run.run import recorded
 from vidtrack.run.sinks import Subject, line_counter
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.traffic.road import road_at
+from vidtrack.traffic.metres import road_at
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection

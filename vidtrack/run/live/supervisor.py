@@ -16,7 +16,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
-from vidtrack.run.live.retention import parts_of
+from vidtrack.recording.retention import parts_of
 from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, unknown, work
 from vidtrack.video.live.address import redact
 from vidtrack.video.live.backoff import Backoff

@@ -16,7 +16,7 @@ from threading import Lock, Thread
 from types import FrameType
 from typing import Any
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.errors import Error
 from vidtrack.output.status import StatusBoard
 from vidtrack.run.live.outputs import LiveExtras

@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.trust import Trust
-from vidtrack.scan import CONFIRMED, Event, Ints, Mask, Tracks
+from vidtrack.decision import Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.deferred.forest import Forest
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import CONFIRMED, Tracks
 
 UNSURE = 0.01
 """Factor on the likelihood of a detection with a low score: more of these are false."""

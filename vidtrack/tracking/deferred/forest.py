@@ -6,8 +6,9 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Event, Floats, Ints, Mask
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.register import Register
 
 

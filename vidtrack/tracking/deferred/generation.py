@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.kbest import k_best
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.deferred.hypotheses import Hypotheses, log_sum
 
 NEVER = -1e6

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
+from vidtrack.decision import Event
 from vidtrack.errors import ConfigError
-from vidtrack.scan import TENTATIVE, Event, Floats, Ints, Mask
 from vidtrack.tracking.deferred.forest import Growth, Window, one_each
 from vidtrack.tracking.deferred.generation import NEVER, agreeing, children, likeliest
 from vidtrack.tracking.deferred.hypotheses import Hypotheses, surviving
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import TENTATIVE
 
 SURE = 0.9
 """A track is confirmed only when the hypotheses that have it are together at least so probable."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
+from vidtrack.decision import Event
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Event, Floats, Ints, Mask
 from vidtrack.tracking.deferred.forest import Growth, Window, one_each
 from vidtrack.tracking.deferred.generation import NEVER, likeliest
 from vidtrack.tracking.register import Register

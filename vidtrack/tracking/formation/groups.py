@@ -8,12 +8,15 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.redundancy import linked
+from vidtrack.decision import Event
 from vidtrack.errors import ConfigError
-from vidtrack.scan import TENTATIVE, Event, Ints, Scan, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.formation.members import Members, rows_of
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import TENTATIVE, Tracks
 
 
 @dataclass(frozen=True, slots=True)

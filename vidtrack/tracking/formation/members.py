@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.redundancy import linked
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 from vidtrack.tracking.choices import heaviest
 
 

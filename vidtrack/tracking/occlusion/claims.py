@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.estimate.noise import edge_sigma
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.boxes import best_cover
 
 ONE_SIDED = 4.0

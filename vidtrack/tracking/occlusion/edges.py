@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.estimate.noise import edge_variance
-from vidtrack.scan import Floats, Ints, Mask
 
 UNKNOWN = 1e8
 """Variance of a coordinate that no edge tells about."""

@@ -13,11 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.decision import Decision, Event
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.noise import as_if_new, middle_variance
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Event, Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import pieces
 from vidtrack.tracking.boxes import absolute, overlapping

@@ -7,8 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.decision import Decision, Event
 from vidtrack.estimate.bank import Estimator
-from vidtrack.scan import Decision, Event, Floats, Ints, Mask
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register

@@ -6,15 +6,17 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
-from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import absolute, follow, longer
 from vidtrack.tracking.picture.border import EXIT_S, Border
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import Tracks
 
 
 class View(NamedTuple):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats, Tracks
+from vidtrack.arrays.types import Floats
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.sizes import SizeField
+from vidtrack.tracks import Tracks
 
 _CAUTION = 3.0  # times as far must a track travel to be confirmed where the picture is restless
 _FASTEST = 1.2  # times as large can a vehicle become from one scan to the next

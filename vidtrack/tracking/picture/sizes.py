@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import CONFIRMED, Floats, Ints, Mask, Tracks
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.tracking.boxes import longer
+from vidtrack.tracks import CONFIRMED, Tracks
 
 _SAMPLES = 400  # kept, the newest
 _STRIDE = 1 / 3  # sizes that a vehicle moves between two samples of it

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from vidtrack.config import DetectorSettings
+from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background.disturbance import Disturbance
 from vidtrack.video.background.opencv import OpenCV
 from vidtrack.video.background.paper import Paper

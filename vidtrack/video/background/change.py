@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 from vidtrack.video.frame import Image
 
 _CELLS = (12, 8)  # columns and rows of a grid over the picture

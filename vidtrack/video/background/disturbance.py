@@ -9,11 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack import plane
-from vidtrack.config import DisturbanceSettings
-from vidtrack.scan import Floats, Ints
-from vidtrack.video.background.camera import Camera
-from vidtrack.video.background.canvas import lay, mark_unseen, settled
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.video import DisturbanceSettings
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import LEAST_CONTRAST, contrast, disturbance, veil
 from vidtrack.video.background.exposure import follow_gain
@@ -22,6 +20,8 @@ from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
 from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
+from vidtrack.video.camera.camera import Camera
+from vidtrack.video.camera.canvas import lay, mark_unseen, settled
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -132,7 +132,7 @@ class Disturbance:
         """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
         scene = self._scene
         if not self._camera.at_home:
-            scene = settled(scene, plane.inverse(self._camera.place), self._view.reduced)
+            scene = settled(scene, affine.inverse(self._camera.place), self._view.reduced)
         return self._view.enlarge(Picture(*scene[:3]))
 
     def _start(self, picture: Picture, time_s: float) -> Scene:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.config import PaperSettings
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
+from vidtrack.config.video import PaperSettings
 from vidtrack.video.background.picture import Picture, View
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image

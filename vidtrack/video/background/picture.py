@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack import plane
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import Error
-from vidtrack.scan import Floats
 from vidtrack.video.background.filters import LARGEST_STEP, area_average, smoothed
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -71,7 +71,7 @@ class View:
         return reduce(frame, self.step)
 
     def foreground(
-        self, mask: Image, strength: NDArray, place: Floats = plane.IDENTITY, motion: Floats = plane.IDENTITY
+        self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY
     ) -> Foreground:
         """The mask (h, w), 0 and 255, cleared where `keep` is dark, with strength (h, w), and where both are.
 
@@ -80,7 +80,7 @@ class View:
         if self._keep is not None:
             h, w = self.reduced
             keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)
-            if keep.shape != mask.shape or not np.array_equal(place, plane.IDENTITY):
+            if keep.shape != mask.shape or not np.array_equal(place, affine.IDENTITY):
                 back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
                 keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
             mask = np.where(keep > 127, mask, np.uint8(0))
@@ -91,12 +91,12 @@ class View:
         scene the picture is (4,): left, top, right, bottom; all in source px.
         """
         h, w = (side * self.step for side in self.reduced)
-        if np.array_equal(place, plane.IDENTITY) and np.array_equal(motion, plane.IDENTITY):
+        if np.array_equal(place, affine.IDENTITY) and np.array_equal(motion, affine.IDENTITY):
             return None, None, np.array([0.0, 0.0, w, h])
-        to_scene = plane.rescaled(place, self.step)
-        to_picture = plane.after(plane.rescaled(motion, self.step), plane.inverse(to_scene))
+        to_scene = affine.rescaled(place, self.step)
+        to_picture = affine.after(affine.rescaled(motion, self.step), affine.inverse(to_scene))
         upper_left, upper_right, lower_left, lower_right = (
-            plane.points(plane.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
+            affine.points(affine.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
         )
         inside = (
             max(upper_left[0], lower_left[0]), max(upper_left[1], upper_right[1]),

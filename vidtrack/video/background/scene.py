@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.shadow import SHADOW
 from vidtrack.video.frame import Image

@@ -12,7 +12,7 @@ from typing import Any
 
 import av
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.backoff import Backoff

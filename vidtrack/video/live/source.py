@@ -7,7 +7,7 @@ from dataclasses import replace
 from time import monotonic
 from types import TracebackType
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.video.clock import FALLBACK_FPS
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import Address

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.video.quality.samples import Samples
 
 _DARK, _BRIGHT = 24, 235  # grey levels between which a ratio means something

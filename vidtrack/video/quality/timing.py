@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Mask
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.video.clock import stamp_rate
 
 _GAP = 1.5  # usual intervals; a longer one lacks a picture

@@ -1,0 +1,1 @@
+"""All settings: their groups and defaults (`settings.py` first), and how they are read (`load.py`)."""

@@ -1,0 +1,1 @@
+"""The boxes of a detector, stored in a file, become scans."""

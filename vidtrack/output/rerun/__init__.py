@@ -1,0 +1,1 @@
+"""What the tracker sees and decides, in rerun."""

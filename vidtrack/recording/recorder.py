@@ -1,0 +1,207 @@
+"""Records what a camera sends, so that a run can be repeated bit by bit."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import time
+from collections import deque
+from math import inf
+from pathlib import Path
+from threading import RLock
+from time import monotonic
+
+import av
+
+from vidtrack.config.settings import Settings
+from vidtrack.errors import StoppedEarly
+from vidtrack.output.folder import usable, writing
+from vidtrack.output.linefile import LineFile
+from vidtrack.recording.film import Film
+from vidtrack.recording.retention import Retention, new_part
+from vidtrack.recording.source import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VIDEO
+from vidtrack.state import State, write_state
+from vidtrack.video.frame import Frame
+from vidtrack.video.live.connection import Connection
+from vidtrack.video.live.tape import NoTape, Place
+
+log = logging.getLogger(__name__)
+
+_RETRY_S = 5.0  # after a failed write
+_TELL_S = 60.0  # a loss that lasts is told so often
+_END_S = 0.5  # that the reader gets at the end to finish a packet
+_NOWHERE: Place = (-1, 0)
+
+
+class NoRecorder(NoTape):
+    """Records nothing, where there is no --record."""
+
+    lost = 0
+
+    def begins(self, place: Place) -> bool:
+        """Never."""
+        return False
+
+    def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
+        """It is forgotten."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class Recorder:
+    """Tape in parts: the packets, the list of frames that were tracked, and the checkpoint before the first of them.
+
+    A part begins with a connection, at a key picture after `roll_s` of the clock, or when it is large. When the
+    disk refuses, recording pauses and is tried again in a new part.
+
+    lost  packets that could not be written
+
+    `log_frame` is for the tracker's thread; everything is written in the reader's, which calls the rest.
+    Raises OutputError if nothing can be written into `root`.
+    """
+
+    def __init__(self, root: Path, settings: Settings, roll_s: float | None, retention: Retention) -> None:
+        self.lost = 0
+        self._root = usable(root)
+        retention.roots.append(root)
+        self._settings = settings.model_dump_json(indent=2)
+        self._roll_s = roll_s
+        self._retention = retention
+        self._writing = RLock()  # on a slow disk the reader still holds it when the run ends
+        self._film: Film | None = None
+        self._folders: dict[int, Path] = {}
+        self._part = 0
+        self._period = 0
+        self._retry_s = 0.0
+        self._told_s = -_TELL_S
+        self._logged = _NOWHERE[0]
+        self._to_write: deque[tuple[int, State | str]] = deque()
+        self._list: LineFile | None = None
+        self._listed = _NOWHERE[0]
+
+    def cut(self, connection: Connection, packet: av.Packet) -> bool:
+        """Begin a new part with this packet if there is none, or it is time and the packet a key picture's."""
+        with self._writing:
+            begins = self._film is None and monotonic() >= self._retry_s
+            if not begins and not (self._film is not None and packet.is_keyframe and self._due(self._film)):
+                return False
+            self.hang_up()
+            try:
+                self._begin(connection)
+            except (OSError, av.FFmpegError) as error:
+                self._pause(error.strerror or str(error))
+            return True
+
+    def place(self) -> Place:
+        """Number of the part, and of the next packet in it."""
+        with self._writing:
+            return _NOWHERE if self._film is None else (self._part, self._film.packets)
+
+    def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
+        """Keep a packet, and what the tracker logged meanwhile."""
+        with self._writing:
+            if self._film is None:
+                self.lost += 1
+                return
+            try:
+                self._film.take(packet, pictures, arrived_s)
+                self._write_log()
+            except (StoppedEarly, av.FFmpegError) as error:
+                self._pause(str(error))
+                return
+            if self._film.error is not None:
+                self._pause(self._film.error.strerror or str(self._film.error))
+
+    def hang_up(self) -> None:
+        """End the part."""
+        with self._writing:
+            film, self._film = self._film, None
+            if film is None:
+                return
+            try:
+                film.close()
+            except (OSError, av.FFmpegError) as error:
+                log.warning("the end of a recording is lost: %s", error.strerror)
+
+    def begins(self, place: Place) -> bool:
+        """Whether the frame at this place is the first of its part that is tracked."""
+        return place[0] not in (self._logged, _NOWHERE[0])
+
+    def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
+        """The frame that is tracked next; with the checkpoint before it if it `begins` a part."""
+        part, packet = place
+        if part == _NOWHERE[0]:
+            return
+        if state is not None:
+            self._logged = part
+            self._to_write.append((part, state))
+        self._to_write.append((part, f"{frame.index},{frame.time_s!r},{packet}\n"))
+
+    def close(self) -> None:
+        """Write what the tracker logged last; call it when the reader was told to stop."""
+        if not self._writing.acquire(timeout=_END_S):
+            log.warning("the end of the recording is lost: the disk does not answer")
+            return
+        try:
+            self.hang_up()
+            self._retry_s = inf  # the reader may still have a packet in hand: it begins no part
+            self._write_log()
+            self._end_list()
+        except StoppedEarly as error:
+            log.warning("%s", error)
+        finally:
+            self._writing.release()
+
+    def _due(self, film: Film) -> bool:
+        large = self._retention.part_size is not None and film.size > self._retention.part_size
+        return large or self._period != self._now()
+
+    def _now(self) -> int:
+        """Which stretch of the clock this is."""
+        return 0 if self._roll_s is None else int(time.time() // self._roll_s)
+
+    def _begin(self, connection: Connection) -> None:
+        folder = new_part(self._root)
+        self._part += 1
+        self._folders[self._part] = folder
+        self._period = self._now()
+        (folder / SETTINGS).write_text(self._settings)
+        self._film = Film(folder / VIDEO, connection)
+        self._folders.pop(self._part - 3, None)  # its last frame was tracked long ago
+
+    def _pause(self, why: str) -> None:
+        self.lost += 1
+        self._retry_s = monotonic() + _RETRY_S
+        self.hang_up()
+        folder = self._folders.get(self._part)
+        if folder is not None and not (folder / FRAMES).exists():  # nothing of it can be repeated
+            del self._folders[self._part]
+            shutil.rmtree(folder, ignore_errors=True)
+        if monotonic() - self._told_s > _TELL_S:
+            self._told_s = monotonic()
+            log.warning("recording pauses: %s; tracking goes on", why)
+
+    def _end_list(self) -> None:
+        ended, self._list = self._list, None
+        if ended is not None:
+            ended.close()
+
+    def _write_log(self) -> None:
+        """Bring states and lists of frames to their parts."""
+        while self._to_write:
+            part, entry = self._to_write.popleft()
+            if not isinstance(entry, str):
+                self._begin_list(part, entry)
+            elif self._list is not None and part == self._listed:
+                self._list.add(entry)
+
+    def _begin_list(self, part: int, state: State) -> None:
+        self._end_list()
+        folder = self._folders.get(part)
+        if folder is None:  # the disk refused its pictures
+            return
+        with writing(folder):
+            write_state(folder / STATE, state)
+        self._list = LineFile(folder / FRAMES, FRAMES_HEADER)
+        self._listed = part
