@@ -1,6 +1,7 @@
 """The shape of the package: imports point downwards, heavy libraries stay where they belong."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -195,3 +196,11 @@ def test_public_names_are_what_they_say_in_any_order(first):
         "assert inspect.isfunction(vt.track), vt.track\n"
     )
     assert result.returncode == 0, result.stderr
+
+
+def test_the_page_on_the_architecture_names_what_there_is():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`([\w/]+(?:\.py|/))`", page)
+    rooms = [ROOT, PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir())]
+    assert not {name for name in named if not any((room / name).exists() for room in rooms)}
+    assert set(FLOORS) - {"__main__"} <= {name.rstrip("/").removesuffix(".py") for name in named}
