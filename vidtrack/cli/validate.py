@@ -82,25 +82,27 @@ def _print(result: Validation) -> None:
     from vidtrack.traffic.event_tables import written
 
     console = Console()
-    table = Table(
-        "gate", "by hand", "hit", "missed", "false", "recall %", "precision %", "bias %", "GEH", "min for 5 %"
-    )
-    for column in table.columns[1:]:
+    table = Table("gate", "figure", "value", "95 % from", "to")
+    for column in table.columns[2:]:
         column.justify = "right"
     for name, row in [*result.gates.items(), ("all", result.pooled)]:
-        shares = [_with_interval(share, 100, 1) for share in (row.recall, row.precision, row.bias)]
-        minutes = "" if row.minutes is None else f"{row.minutes:.0f}"
-        numbers = [str(number) for number in (row.noted, row.hit, row.missed, row.false)]
-        table.add_row(name, *numbers, *shares, _with_interval(row.geh, 1, 2), minutes)
+        table.add_row(name, "noted by hand", str(row.noted))
+        for what, number in (("hit", row.hit), ("missed", row.missed), ("false", row.false)):
+            table.add_row("", what, str(number))
+        table.add_row("", "recall %", *_cells(row.recall, 100, 1))
+        table.add_row("", "precision %", *_cells(row.precision, 100, 1))
+        table.add_row("", "net bias %", *_cells(row.bias, 100, 1))
+        table.add_row("", "GEH of hourly flows", *_cells(row.geh, 1, 2))
+        table.add_row("", "minutes by hand for +-5 %", "" if row.minutes is None else f"{row.minutes:.0f}")
+        table.add_section()
     console.print(table)
     begin, end = (written(time, result.clock) for time in (result.begin, result.end))
-    console.print(f"From {begin} to {end}; in brackets 95 % intervals; GEH of hourly flows.")
+    console.print(f"From {begin} to {end}.")
     if result.unnoted:
         console.print(f"Without a count by hand, and left out: {', '.join(result.unnoted)}.")
 
 
-def _with_interval(estimate: Estimate | None, factor: float, decimals: int) -> str:
+def _cells(estimate: Estimate | None, factor: float, decimals: int) -> list[str]:
     if estimate is None:
-        return ""
-    value, low, high = (f"{factor * number:.{decimals}f}" for number in (estimate.value, estimate.low, estimate.high))
-    return f"{value} [{low}, {high}]"
+        return ["", "", ""]
+    return [f"{factor * number:.{decimals}f}" for number in (estimate.value, estimate.low, estimate.high)]

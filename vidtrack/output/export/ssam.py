@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import struct
+from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO
 
@@ -55,7 +56,7 @@ def _write_rows(file: BinaryIO, rows: Rows, origin: Floats, frame: int) -> int:
     records["rear"] = 2 * rows.xy - rows.front - origin
     records["length"], records["width"], records["speed"] = rows.length, rows.width, rows.speed
     frames, first = np.unique(rows.frame, return_index=True)
-    for number, start, end in zip(frames.tolist(), first, [*first[1:], len(rows)], strict=True):
+    for number, (start, end) in zip(frames.tolist(), pairwise([*first, len(rows)]), strict=True):
         if number != frame:
             file.write(struct.pack("<Bf", _TIMESTEP, rows.time[start]))
         file.write(records[start:end].tobytes())
