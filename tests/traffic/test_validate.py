@@ -67,6 +67,12 @@ def test_what_does_not_overlap_is_refused():
         validate(early, early, 1.0, begin=10.0, end=2.0)
 
 
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, np.inf])
+def test_a_tolerance_is_a_number_of_seconds(tolerance):
+    with pytest.raises(ConfigError, match="give a number of seconds above 0"):
+        validate(events((1, "a", "up")), events((1, "a", "up")), tolerance)
+
+
 def test_exact_interval_of_a_share():
     """Values of Clopper and Pearson's tables."""
     assert proportion(0, 10) == Estimate(0.0, 0.0, pytest.approx(0.3085, abs=1e-4))

@@ -20,8 +20,18 @@ class ExportOptions(Options):
     site: Path | None
 
 
+_HELP = f"""Write the tracks of the folder RUN, made with `vidtrack track --site`, in a format of other programs.
+
+Rows outside the calibrated part of the picture have no position and are left out.
+
+\b
+{chr(10).join(f"{name:10}  {form.writes}" for name, form in FORMATS.items())}
+"""
+
+
 @click.command(
     name="export",
+    help=_HELP,
     short_help="Tracks in metres for other programs.",
     epilog="""\b
 Examples:
@@ -35,18 +45,7 @@ Examples:
 @click.option("--site", type=click.Path(path_type=Path), metavar="SITE.toml", help="[default: the site of the run]")
 @receives(ExportOptions)
 def command(options: ExportOptions) -> None:
-    """Write the tracks of the folder RUN, made with `vidtrack track --site`, in a format of other programs.
-
-    \b
-    geojson     tracks.geojson: a line a vehicle, with times and speeds, in WGS84
-    geoparquet  tracks.geo.parquet: all columns and a point a row
-    mf-json     tracks.mf.json: OGC Moving Features, in WGS84
-    level-x     00_tracks.csv and its two tables of meta data, as inD has them
-    sumo        fcd.xml: floating car data
-    ssam        tracks.trj: trajectories for conflicts, version 1.04
-
-    Rows outside the calibrated part of the picture have no position and are left out.
-    """
+    """Export a run."""
     from contextlib import suppress
 
     from vidtrack.errors import Error
@@ -65,5 +64,6 @@ def command(options: ExportOptions) -> None:
         raise
     if not options.quiet:
         tracks = f"{len(run.vehicles.track)} track{'s' if len(run.vehicles.track) > 1 else ''}"
-        click.echo(f"{tracks}; {run.positions} of {run.rows} rows have a position in metres", err=True)
+        positions = f"{run.positions} of {run.rows} rows have a position in metres"
+        click.echo(f"site {run.site.camera.name}; {tracks}; {positions}", err=True)
     click.echo(folder)

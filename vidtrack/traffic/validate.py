@@ -88,8 +88,11 @@ def validate(
     tolerance_s  largest difference in time of a hit
     begin, end   of the count by hand; None: the first and the last noted crossing, and the tolerance around them
 
-    What was noted outside this time counts as uncertain. Raises ConfigError where the two do not overlap in time.
+    What was noted outside this time counts as uncertain. Raises ConfigError for a tolerance that is not above 0, and
+    where the two do not overlap in time.
     """
+    if not 0 < tolerance_s < np.inf:
+        raise ConfigError(f"a tolerance of {tolerance_s} s; give a number of seconds above 0")
     begin = float(noted.time.min()) - tolerance_s if begin is None else begin
     end = float(noted.time.max()) + tolerance_s if end is None else end
     _check_overlap(counted, noted, begin, end, tolerance_s)
