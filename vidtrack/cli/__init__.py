@@ -23,6 +23,8 @@ COMMANDS = {
     "predict": "Track error of a radar filter in clutter, before there is a plot.",
     "threshold": "The detection threshold that suits a tracker best.",
     "reproduce": "Figures and tables of the papers, ours beside theirs.",
+    "export": "Tracks in metres for other programs: GeoJSON, SUMO, SSAM and more.",
+    "validate": "Compare counted crossings with a count by hand.",
     "view": "Look at a finished run in rerun.",
     "repair": "Make a killed run's files whole.",
     "config": "Show the settings and what each one does.",
