@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 
 _WRITTEN_S = 1e-6
 """Times are written to a microsecond: a difference that is the tolerance itself is within it."""

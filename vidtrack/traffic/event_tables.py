@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError, SourceError
-from vidtrack.scan import Floats, Mask
 
 _GATE = ("gate", "line")
 _CLOCKS = ("time_s", "utc")

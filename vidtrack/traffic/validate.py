@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.special import betaincinv, gammaincinv
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.traffic.event_matching import match
 from vidtrack.traffic.event_tables import Events, written
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Floats
 from vidtrack.output.export.globe import system_of
 from vidtrack.output.export.road_run import RoadRun
 from vidtrack.output.parquet import write_parquet
-from vidtrack.scan import Floats
 
 _WKB_POINT = np.dtype([("order", "u1"), ("type", "<u4"), ("xy", "<f8", 2)])
 """Well-known binary of a point: little endian (1), kind of geometry (1), x, y."""

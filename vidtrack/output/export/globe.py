@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
 from vidtrack.traffic.site import Site
 
 if TYPE_CHECKING:

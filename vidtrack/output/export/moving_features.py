@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
 from vidtrack.output.export.geojson import numbers
 from vidtrack.output.export.globe import to_globe
 from vidtrack.output.export.pieces import Piece, pieces
 from vidtrack.output.export.road_run import RoadRun
 from vidtrack.output.folder import replacing
-from vidtrack.scan import Floats
 
 _WGS84 = {"type": "Name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}
 _CALENDAR = {"type": "Name", "properties": {"name": "urn:ogc:data:datetime:iso8601"}}

@@ -13,8 +13,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.traffic.site import Site, read_site
 
 _BATCH = 1 << 16

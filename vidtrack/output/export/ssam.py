@@ -13,10 +13,10 @@ from typing import BinaryIO
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.output.export.road_run import RoadRun, Rows
 from vidtrack.output.folder import replacing
 from vidtrack.output.linefile import replace_text
-from vidtrack.scan import Floats
 
 _FORMAT, _DIMENSIONS, _TIMESTEP, _VEHICLE = range(4)
 _VERSION = 1.04
