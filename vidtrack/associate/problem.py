@@ -9,7 +9,9 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate, Pairs
+from vidtrack.associate.mixture import mixture_pairs
 from vidtrack.compiled import kernel
+from vidtrack.estimate.bank import Modes
 from vidtrack.scan import Scan
 
 VANISHING = 2000.0
@@ -49,13 +51,18 @@ class Problem:
         run: Ints | None = None,
         label: Ints | None = None,
         angles: tuple[int, ...] = (),
+        modes: Modes | None = None,
     ) -> Problem:
         """The problem of the pairs inside a gate, of predicted measurements zhat (T, m), cov (T, m, m) and a scan.
 
         run (T,) Monte Carlo runs, label (T,) classes, -1 unknown: both sides of a pair are of one run, and of one class
-        where both classes are known. angles: components of z that wrap.
+        where both classes are known. angles: components of z that wrap. modes: the predicted measurements are a
+        mixture of these, with moments zhat and cov.
         """
-        pairs = gate.pairs(zhat, cov, scan, run, angles)
+        if modes is None:
+            pairs = gate.pairs(zhat, cov, scan, run, angles)
+        else:
+            pairs = mixture_pairs(gate, modes, scan, run, angles)
         if label is not None and scan.label is not None:
             mine, theirs = label[pairs.row], scan.label[pairs.measurement]
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -57,3 +57,22 @@ class Estimator(Protocol):
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
+
+
+class Modes(NamedTuple):
+    """Predicted measurements as Gaussian mixtures.
+
+    weight (r, T) probability, zhat (r, T, m) mean and cov (r, T, m, m) covariance of each mode
+    """
+
+    weight: Floats
+    zhat: Floats
+    cov: Floats
+
+
+@runtime_checkable
+class Mixture(Protocol):
+    """An estimator with several modes."""
+
+    def modes(self, sensor: Sensor) -> Modes:
+        """The predicted measurement of each mode; S adds R."""

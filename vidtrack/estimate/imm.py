@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 from vidtrack.arrays.types import Floats
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
+from vidtrack.estimate.bank import Modes
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor, wrapped
@@ -67,11 +68,15 @@ class IMMBank:
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance (T, m, m) over all modes; the innovation covariance is that plus R."""
+        weight, zhat, cov = self.modes(sensor)
+        off = np.stack([wrapped(mean - zhat[0], sensor.angles) for mean in zhat])
+        mean, over_all = _mixture(weight, off, cov)
+        return wrapped(zhat[0] + mean, sensor.angles), over_all
+
+    def modes(self, sensor: Sensor) -> Modes:
+        """The predicted measurement of each mode, by which a measurement is gated and weighed."""
         each = [bank.predicted_measurement(sensor) for bank in self.banks]
-        first = each[0][0]
-        off = np.stack([wrapped(zhat - first, sensor.angles) for zhat, _ in each])
-        mean, cov = _mixture(self.mode.T, off, np.stack([cov for _, cov in each]))
-        return wrapped(first + mean, sensor.angles), cov
+        return Modes(self.mode.T, np.stack([zhat for zhat, _ in each]), np.stack([cov for _, cov in each]))
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
         """Successor rows of each mode, with the weights as that mode sees them, and the modes' new probabilities.

@@ -17,7 +17,7 @@ from vidtrack.associate.problem import Problem
 from vidtrack.associate.trust import EQUAL, Trust
 from vidtrack.decision import Choices, Event
 from vidtrack.errors import ConfigError, ScanError
-from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.bank import Estimator, Mixture
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.motion.velocity import ConstantVelocity
@@ -229,6 +229,7 @@ class Tracker:
         problem = Problem.gated(
             self.gate, zhat, cov, scan, *self.rates.of(self.register.run),
             run=self.register.run, label=self.register.label, angles=sensor.angles,
+            modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
         )  # fmt: skip
         if self.threshold is not None:
             problem = thresholded(problem, self.threshold)
