@@ -38,7 +38,7 @@ Examples:
 @json_option
 @receives(MeasureOptions)
 def command(options: MeasureOptions) -> None:
-    """Crossings, trips, intervals and checks from the folders of finished runs, without tracking again.
+    """Crossings, trips, intervals, stays, queues and checks from finished runs, without tracking again.
 
     All RUNs are of one site and one day: files of hours, or a live run with its parts. RUN@TIME gives the time of a
     run's first picture; without it a live run knows its own, and a file goes on where the one before it ended.

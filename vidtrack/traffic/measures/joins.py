@@ -84,7 +84,10 @@ def odds(tail: End, head: End, length: Floats, a: Ints, b: Ints) -> Floats:
 
 
 def gap_rows(tail: End, head: End, joins: Joins) -> Rows:
-    """(2 J,) rows that bridge the gaps: the end of the one track and the beginning of the other, `track` the join."""
+    """(2 J,) rows that bridge the gaps: the end of the one track and the beginning of the other, `track` the join.
+
+    How fast a vehicle went meanwhile is not known.
+    """
     last, first = joins.before, joins.after
 
     def both(name: str) -> Floats:
@@ -92,7 +95,8 @@ def gap_rows(tail: End, head: End, joins: Joins) -> Rows:
             2 * len(last), *getattr(tail, name).shape[1:]
         )
 
-    v, rows = both("v"), 2 * len(last)
+    rows = 2 * len(last)
     yes, unknown = np.ones(rows, bool), np.full(rows, np.nan)
     number = np.repeat(np.arange(len(last)), 2)
-    return Rows(number, both("t"), yes, ~yes, both("xy"), both("sigma"), np.zeros(rows), v, *(unknown,) * 4)
+    state = both("xy"), both("sigma"), np.zeros(rows), np.full((rows, 2), np.nan)
+    return Rows(number, both("t"), yes, ~yes, *state, *(unknown,) * 4)

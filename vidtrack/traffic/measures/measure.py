@@ -24,8 +24,10 @@ from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
 from vidtrack.traffic.measures.lives import Lives, class_of
 from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
+from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.tables import stamps, table
 from vidtrack.traffic.measures.trips import at_edge, trips_of
 from vidtrack.traffic.site import Site
@@ -55,18 +57,22 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     grounds = {size: None if one.calibration is None else calibrated(one) for size, one in drawn.items()}
     gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
     reach = REACH_PX if site.calibration is None else REACH_M
+    outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
+    staying = Staying(outlines, metres=site.calibration is not None)
     for rows in reader:
-        passing.add(rows)
-        lives.add(rows)
-    return _Figures(day, site, gates, reader, passing.passed(), lives).measures()
+        for part in (passing, lives, staying):
+            part.add(rows)
+    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
 
 
 class _Figures:
     """All figures of a day, from what is left of its tracks."""
 
-    def __init__(self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives) -> None:
-        self.day, self.site, self.gates = day, site, gates
+    def __init__(
+        self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives, staying: Staying
+    ) -> None:
+        self.day, self.site, self.gates, self.staying = day, site, gates, staying
         self.metres = site.calibration is not None
         self.spans = day.spans
         self.session, self.track_id = reader.names
@@ -101,6 +107,8 @@ class _Figures:
             "crossings": self._crossings(),
             "trips": self._trips(allowed),
             "intervals": self._intervals(),
+            "stays": self._stays(),
+            "queues": self._queues(),
             "checks": self._checks(),
         }
         report = {
@@ -240,6 +248,48 @@ class _Figures:
                 "v85_kmh": ("km/h", 3.6 * found.v85.ravel()),
                 "occupancy": ("1", found.occupancy.ravel()),
                 "density_per_km": ("1/km", found.density.ravel()),
+            }
+        )
+
+    def _stays(self) -> pa.Table:
+        stays, names = self.staying.in_zones(self.vehicle), list(self.site.zones)
+        length = self.length[stays.vehicle]
+        return table(
+            {
+                "zone": ("", [names[zone] for zone in stays.zone.tolist()]),
+                "run": ("n", self.session[stays.vehicle]),
+                "track_id": ("n", self.track_id[stays.vehicle]),
+                "class": ("", class_of(length, self.site.classes)),
+                "begin_s": ("s", stays.begin),
+                "end_s": ("s", stays.end),
+                "begin_utc": ("utc", stamps(self.day.utc, stays.begin)),
+                "end_utc": ("utc", stamps(self.day.utc, stays.end)),
+                "stay_s": ("s", stays.end - stays.begin),
+                "standing_s": ("s", stays.stood),
+                "came": ("yes", stays.came),
+                "left": ("yes", stays.left),
+            }
+        )
+
+    def _queues(self) -> pa.Table:
+        """Queues of vehicles by the legs that their trips began on."""
+        standing, legs = self.staying.standing(self.vehicle), self.site.legs
+        number = np.array([legs.index(name) for name in self.gates.legs])
+        entered = self.trips.entry >= 0
+        leg, left_s = np.full(len(self.vehicle), -1), np.full(len(self.vehicle), -np.inf)
+        leg[self.trips.vehicle[entered]] = number[self.passed.gate[self.trips.entry[entered]]]
+        left_s[self.trips.vehicle] = self.trips.to_s
+        inside = standing.begin < left_s[standing.vehicle]
+        found = queues_of(standing, np.where(inside, leg[standing.vehicle], -1), self.length[standing.vehicle])
+        return table(
+            {
+                "leg": ("", [legs[k] for k in found.leg.tolist()]),
+                "begin_s": ("s", found.begin),
+                "end_s": ("s", found.end),
+                "begin_utc": ("utc", stamps(self.day.utc, found.begin)),
+                "end_utc": ("utc", stamps(self.day.utc, found.end)),
+                "vehicles": ("n", found.vehicles),
+                "length_m": ("m", found.length),
             }
         )
 

@@ -31,6 +31,8 @@ _STATE = (
     *("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "sigma_vx_px_s", "sigma_vy_px_s"),
     *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *_BOX),
 )
+ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
+"""What is read of a run with metres."""
 _NOT_SEEN = "coasting"
 
 
@@ -147,7 +149,7 @@ def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     if ground is None:
         return *_ALWAYS, *_PICTURE
     if set(_ROAD) <= names and _of_this_site(folder, ground):
-        return *_ALWAYS, *_ROAD, *_BOX
+        return ROAD_COLUMNS
     _demand(folder, names, _STATE, "has no metres of this site, and they cannot be computed")
     return *_ALWAYS, *_STATE
 
@@ -221,7 +223,7 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
         return
     waiting: list[pa.RecordBatch] = []
     try:
-        with pq.ParquetFile(path, read_dictionary=["status"]) as file:
+        with pq.ParquetFile(path, read_dictionary=["status"], pre_buffer=False) as file:  # else all of it is buffered
             for batch in file.iter_batches(BLOCK, columns=list(columns)):
                 waiting.append(batch)
                 if sum(map(len, waiting)) >= BLOCK:

@@ -89,7 +89,7 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
         )
     utc = min([*known, *([start] if start is not None and found[0].zero is None else [])], default=None)
     sessions: dict[str, int] = {}
-    recordings = []
+    recordings: list[Recording] = []
     next_s = 0.0 if utc is None or start is None or found[0].zero else (start - utc).total_seconds()
     for number, one in enumerate(found):
         own = one.zero is not None and utc is not None
