@@ -124,9 +124,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", nargs="+", type=Path)
     clips = parser.parse_args().clips
-    print(
-        "| clip | crossings | recall | precision | movements | recall | precision | speed: median, median abs | in 95 % | with speed |"
-    )
+    of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"
+    print(f"| clip | crossings | {of} | movements | {of} | {speed} |")
     exact, real = [], []
     with tempfile.TemporaryDirectory() as folder:
         for number, clip in enumerate(clips):

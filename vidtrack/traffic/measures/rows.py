@@ -245,7 +245,7 @@ def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
             for batch in reader:
                 yield pa.Table.from_batches([batch])
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise FormatError(f"{path} is damaged: {error}") from None
+        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
 
 
 def _columns(folder: Path) -> set[str]:
