@@ -32,6 +32,7 @@ def parts_of(run, cut_s):
         part.mkdir()
         pq.write_table(table.filter(rows), part / "tracks.parquet")
         new = summary | {"frames": round(length * FPS), "media_s": seconds - 1 / FPS}
+        new["began"] = BEGAN if name == "first" else BEGAN.replace("00.000", "00.007")  # the clock was set
         (part / "summary.json").write_text(json.dumps(new))
         yield str(part)
 
@@ -161,6 +162,16 @@ def test_metres_of_another_site_are_not_used(tmp_path):
         measured([run], site(CALIBRATED | {"calibration": moved}))
 
 
+def test_a_live_run_that_was_started_again_has_other_vehicles(tmp_path):
+    track = straight(1, 2.0, 50, 240, 100, 5)
+    first = write_run(tmp_path / "a", [track], seconds=20, began=BEGAN)
+    again = write_run(tmp_path / "b", [track], seconds=20, began=BEGAN.replace("05:00:00", "05:01:00"))
+    found = measured([first, again], site())
+    assert found.tables["trips"]["run"].to_pylist() == [0, 1]
+    assert found.tables["trips"]["begin_s"].to_pylist() == [2.5, 62.5]
+    assert found.report["watched_s"] == 40
+
+
 @pytest.mark.parametrize(
     ("suffixes", "error", "words"),
     [
@@ -190,12 +201,12 @@ TOML = '[site]\nname = "{name}"\nwidth = 640\nheight = 480\n[gates."{gate}"]\nli
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (TOML.format(name="a", gate="a,b"), "letters, digits, spaces"),
-        (TOML.format(name="a", gate="<b>x</b>"), "letters, digits, spaces"),
+        (TOML.format(name="a", gate="<b>x,y</b>"), "letters, digits, spaces"),
         (TOML.format(name="=1+1", gate="g"), "letters, digits, spaces"),
         ('[site]\nname = "a"\nwidth = 640\nheight = 480\n', "has no gates"),
         (TOML.format(name="a", gate="g").replace("640", "650"), "not the same shape"),
     ],
+    ids=["a tag", "a formula", "no gates", "another picture"],
 )
 def test_the_command_refuses_in_one_line_and_keeps_the_run(tmp_path, text, words):
     run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))

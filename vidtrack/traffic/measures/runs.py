@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
-from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +15,9 @@ from vidtrack.scan import Floats
 
 _JOINED_S = 1.0
 """Parts of one live run with less between them are watched without a break."""
+_CLOCK_S, _CLOCK_SHARE = 5.0, 1e-4
+"""s, and share of the time since: by so much the clock that a live run tells its beginning by may have been set"""
+_ROUNDING_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,7 @@ class Recording:
     size        (width, height) px of its pictures
     offset_s    what its `time_s` is behind the site's time
     begin_s, end_s   of what was watched, in the site's time
-    session     recordings with the same number continue each other: their tracks have the same numbers
+    session     recordings with the same number are parts of one live run: their tracks have the same numbers
     """
 
     folder: Path
@@ -61,12 +62,12 @@ class Day:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A run as its folder and the user describe it; `zero`: the time of its `time_s` 0."""
+    """A run as its folder and the user describe it, in its own time_s; `zero`: the time of time_s 0."""
 
     folder: Path
-    summary: dict[str, Any]
+    size: tuple[int, int]
     zero: datetime | None
-    began: str | None
+    live: bool
     begin_s: float
     end_s: float
 
@@ -81,25 +82,43 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
     cannot be read, SourceError where there is no run.
     """
     found = [_found(run) for run in runs]
-    known = [one.zero for one in found if one.zero is not None]
-    if known and found[0].zero is None and start is None:
-        raise ConfigError(
-            f"{found[0].folder} does not tell its time, and others do; write {found[0].folder}@TIME, "
-            "for example 2026-06-01T07:00:00+02:00"
-        )
-    utc = min([*known, *([start] if start is not None and found[0].zero is None else [])], default=None)
-    sessions: dict[str, int] = {}
+    zeros = [one.zero for one in found]
+    if zeros[0] is None:
+        if start is None and any(zeros):
+            raise ConfigError(
+                f"{found[0].folder} does not tell its time, and others do; write {found[0].folder}@TIME, "
+                "for example 2026-06-01T07:00:00+02:00"
+            )
+        zeros[0] = start
+    sessions = _sessions(found)
+    zeros = [zeros[session] for session in sessions]  # the clock of a live run goes on: one zero for all its parts
+    utc = min((zero for zero in zeros if zero is not None), default=None)
     recordings: list[Recording] = []
-    next_s = 0.0 if utc is None or start is None or found[0].zero else (start - utc).total_seconds()
-    for number, one in enumerate(found):
-        own = one.zero is not None and utc is not None
-        offset = (one.zero - utc).total_seconds() if own else next_s - (one.begin_s if recordings else 0.0)  # type: ignore[operator]
-        session = sessions.setdefault(one.began or f"run {number}", len(sessions))
-        size = int(one.summary["width"]), int(one.summary["height"])
-        recordings.append(Recording(one.folder, size, offset, offset + one.begin_s, offset + one.end_s, session))
-        next_s = recordings[-1].end_s
-    recordings.sort(key=lambda one: one.begin_s)
+    for one, zero, session in zip(found, zeros, sessions, strict=True):
+        if zero is not None and utc is not None:
+            offset = (zero - utc).total_seconds()
+        else:
+            offset = recordings[-1].end_s - one.begin_s if recordings else 0.0
+        recordings.append(Recording(one.folder, one.size, offset, offset + one.begin_s, offset + one.end_s, session))
+    recordings.sort(key=lambda one: one.end_s)
     return Day(tuple(_apart(recordings)), utc)
+
+
+def _sessions(found: list[_Found]) -> list[int]:
+    """Of each run the number of the first one in the list that it is a part of, or its own.
+
+    Parts of a live run tell the same beginning, but for what the clock was set by meanwhile.
+    """
+    sessions: list[int] = []
+    for one in found:
+        same = (
+            number
+            for number, other in enumerate(found[: len(sessions)])
+            if one.live and other.live and one.zero is not None and other.zero is not None
+            if abs((one.zero - other.zero).total_seconds()) < _CLOCK_S + _CLOCK_SHARE * max(one.end_s, other.end_s)
+        )
+        sessions.append(next(same, len(sessions)))
+    return sessions
 
 
 def _found(run: str) -> _Found:
@@ -121,7 +140,7 @@ def _found(run: str) -> _Found:
     zero = time or (datetime.fromisoformat(began) if began else None)
     # a part of a live run begins somewhere in it
     begin = end - (frames - 1) / fps if began else float(source.get("start_s") or 0.0)
-    return _Found(folder, summary, zero, began, min(begin, end), end + 1 / fps)
+    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps)
 
 
 def _split(run: str) -> tuple[Path, datetime | None]:
@@ -139,11 +158,19 @@ def _split(run: str) -> tuple[Path, datetime | None]:
 
 
 def _apart(recordings: list[Recording]) -> list[Recording]:
-    """The recordings, when no two are of the same time; parts of one live run may touch."""
-    for first, second in pairwise(recordings):
+    """The recordings, in order of their ends, when no two are of the same time.
+
+    Where a part of a live run begins is known by its frames and its nominal rate, and not before the last one ended.
+    """
+    apart = recordings[:1]
+    for second in recordings[1:]:
+        first = apart[-1]
         early = first.end_s - second.begin_s
-        if early > (_JOINED_S if first.session == second.session else 1e-6):
+        if early > 0 and first.session == second.session:
+            second = replace(second, begin_s=first.end_s)
+        elif early > _ROUNDING_S:
             raise ConfigError(
                 f"{second.folder} begins {early:.1f} s before {first.folder} ends; one site is watched once at a time"
             )
-    return recordings
+        apart.append(second)
+    return apart
