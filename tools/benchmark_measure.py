@@ -146,7 +146,7 @@ def main() -> None:
         begin = time.perf_counter()
         (read if options.only == "read" else measure)(options.output)
         seconds, peak = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        print(f"{options.only}: {seconds:.1f} s, at most {peak:.0f} MB")
+        print(f"{options.only}: {seconds:.1f} s, {time.process_time():.1f} s of CPU, at most {peak:.0f} MB")
         return
     if not (options.output / "summary.json").exists():
         write_day(options.output, options.vehicles)

@@ -27,6 +27,7 @@ from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.site import read_site
 
 TOLERANCE_S = 1.0
+FPS = 25.0
 SIGMA = 0.01  # of exact states, in the units of their columns
 
 
@@ -56,7 +57,7 @@ def exact_run(clip: Path, folder: Path) -> None:
     folder.mkdir()
     pq.write_table(pa.table(table), folder / "tracks.parquet")
     frames = int(column["frame"].max())
-    summary = {"frames": frames, "media_s": float(column["time_s"].max()), "fps": 25.0, "width": 1280, "height": 720}
+    summary = {"frames": frames, "media_s": float(column["time_s"].max()), "fps": FPS, "width": 1280, "height": 720}
     (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": 0.0}}}))
 
 
@@ -70,6 +71,23 @@ def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:
                 cost[i, j] = off
     rows, columns = linear_sum_assignment(cost)
     return [(i, j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1e3]
+
+
+def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
+    """Whether a track lies on the vehicle of an event at that time, with an IoU of 0.3 or more."""
+    boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)
+    frame = round(float(event["time_s"]) * FPS)
+    true = boxes[(boxes[:, 0] == frame + 1) & (boxes[:, 1] == int(event["target_id"])), 2:6]
+    table = pq.read_table(run / "tracks.parquet")
+    there = np.abs(table["time_s"].to_numpy() - frame / FPS) < 0.5 / FPS
+    box = np.column_stack([table[f"{name}_px"].to_numpy() for name in ("left", "top", "width", "height")])[there]
+    for left, top, width, height in true:
+        wide = np.minimum(box[:, 0] + box[:, 2], left + width) - np.maximum(box[:, 0], left)
+        high = np.minimum(box[:, 1] + box[:, 3], top + height) - np.maximum(box[:, 1], top)
+        common = np.maximum(wide, 0) * np.maximum(high, 0)
+        if (common >= 0.3 * (width * height + box[:, 2] * box[:, 3] - common)).any():
+            return True
+    return False
 
 
 def score(clip: Path, run: Path) -> dict[str, float]:
@@ -101,22 +119,22 @@ def score(clip: Path, run: Path) -> dict[str, float]:
         "movements": len(moved),
         "trips": len(whole),
         "right": len(right),
+        "untracked": sum(not tracked(clip, run, true[i]) for i in set(range(len(true))) - {i for i, _ in pairs}),
         "off": np.array(off),
         "sigma": np.array(sigma),
     }
 
 
 def told(name: str, results: list[dict[str, float]]) -> str:
-    total = {
-        key: sum(result[key] for result in results) for key in ("true", "found", "hit", "movements", "trips", "right")
-    }
+    counts = ("true", "found", "hit", "movements", "trips", "right", "untracked")
+    total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
     off, sigma = (np.concatenate([result[key] for result in results]) for key in ("off", "sigma"))
     inside = np.mean(np.abs(off) <= 1.96 * sigma)
     return (
         f"| {name} | {total['true']:.0f} | {total['hit'] / total['true']:.3f} | {total['hit'] / total['found']:.3f} "
         f"| {total['movements']:.0f} | {total['right'] / total['movements']:.3f} "
         f"| {total['right'] / total['trips']:.3f} | {np.median(off):+.2f}, {np.median(np.abs(off)):.2f} "
-        f"| {inside:.2f} | {len(off) / total['hit']:.2f} |"
+        f"| {inside:.2f} | {len(off) / total['hit']:.2f} | {total['untracked']:.0f} |"
     )
 
 
@@ -125,7 +143,7 @@ def main() -> None:
     parser.add_argument("clips", nargs="+", type=Path)
     clips = parser.parse_args().clips
     of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"
-    print(f"| clip | crossings | {of} | movements | {of} | {speed} |")
+    print(f"| clip | crossings | {of} | movements | {of} | {speed} | missed without a track |")
     exact, real = [], []
     with tempfile.TemporaryDirectory() as folder:
         for number, clip in enumerate(clips):

@@ -12,7 +12,7 @@ from drawn_runs import CALIBRATED, FPS, SITE, site, straight, write_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidtrack.errors import ConfigError, SourceError
+from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
@@ -184,6 +184,27 @@ def test_times_that_cannot_be(tmp_path, suffixes, error, words):
     runs = [write_run(tmp_path / name, [straight(1, 2.0, 50, 240, 100, 5)]) for name in "ab"]
     with pytest.raises(error, match=words):
         measured([run + suffix for run, suffix in zip(runs, suffixes, strict=True)], site())
+
+
+@pytest.mark.parametrize("csv", [True, False])
+def test_an_empty_road_is_counted_as_zero(tmp_path, csv):
+    tables = measured([write_run(tmp_path / "run", [], seconds=10, csv=csv)], site(ZONES | SITE)).tables
+    assert [row["count"] for row in tables["intervals"].to_pylist()] == [0] * 6
+    assert all(len(tables[name]) == 0 for name in ("crossings", "trips", "stays", "queues"))
+
+
+def test_a_run_of_radar_is_refused(tmp_path):
+    run = Path(write_run(tmp_path / "run", []))
+    (run / "summary.json").write_text('{"source": "plots.csv", "scans": 5, "media_s": 1.0}')
+    with pytest.raises(ConfigError, match="not a run over video"):
+        measured([str(run)], site())
+
+
+def test_a_damaged_table_is_told(tmp_path):
+    run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
+    (run / "tracks.parquet").write_bytes(b"PAR1 and then nothing")
+    with pytest.raises(FormatError, match="is damaged"):
+        measured([str(run)], site())
 
 
 def test_a_run_without_a_summary_or_tables(tmp_path):

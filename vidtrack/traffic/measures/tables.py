@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from datetime import datetime, timedelta
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
+
+from vidtrack.scan import Floats
 
 _TIME = pa.timestamp("ms", "UTC")
 _KINDS: dict[str, pa.DataType] = {"": pa.string(), "1": pa.float64(), "n": pa.int64(), "yes": pa.bool_(), "utc": _TIME}
@@ -31,9 +34,11 @@ def table(columns: Mapping[str, tuple[str, Any]]) -> pa.Table:
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
-def stamps(utc: datetime | None, t: Iterable[float]) -> Sequence[datetime | None]:
-    """UTC of times of the site [s], to the millisecond; None where it is not known."""
-    seconds = np.asarray(list(t), float).tolist()
+def stamps(utc: datetime | None, t: Floats) -> NDArray[np.datetime64]:
+    """UTC of times of the site [s], to the millisecond; NaT where it is not known."""
     if utc is None:
-        return [None] * len(seconds)
-    return [utc + timedelta(milliseconds=round(1000 * s)) if s == s else None for s in seconds]
+        return np.full(len(t), np.datetime64("NaT", "ms"))
+    since = np.full(len(t), np.timedelta64("NaT", "ms"))
+    known = np.isfinite(t)
+    since[known] = np.round(1000 * t[known]).astype("timedelta64[ms]")
+    return np.datetime64(utc.astimezone(UTC).replace(tzinfo=None), "ms") + since
