@@ -186,6 +186,20 @@ def test_times_that_cannot_be(tmp_path, suffixes, error, words):
         measured([run + suffix for run, suffix in zip(runs, suffixes, strict=True)], site())
 
 
+def test_the_folder_above_the_parts_stands_for_them(tmp_path):
+    whole = write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], began=BEGAN)
+    (tmp_path / "cam").mkdir()
+    for part, name in zip(parts_of(whole, 30), ("2026-06-01T05-00-00Z", "2026-06-01T05-00-30Z"), strict=True):
+        Path(part).rename(tmp_path / "cam" / name)
+    (tmp_path / "site.toml").write_text(TOML.format(name="a", gate="g"))
+    process = start("measure", "cam", "--site", "site.toml", "-o", "out", "--json", "-", cwd=tmp_path)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    report = json.loads(out)
+    assert [Path(run["folder"]).parent.name for run in report["runs"]] == ["cam", "cam"]
+    assert (report["watched_s"], report["crossings"]) == (60, 1)
+
+
 @pytest.mark.parametrize("csv", [True, False])
 def test_an_empty_road_is_counted_as_zero(tmp_path, csv):
     tables = measured([write_run(tmp_path / "run", [], seconds=10, csv=csv)], site(ZONES | SITE)).tables
