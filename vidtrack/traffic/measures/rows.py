@@ -85,7 +85,7 @@ _ROUGH_M = 1.0
 class Reader:
     """Reads the recordings of a day, one block after the other; numbers the tracks of all of them from 0.
 
-    ground  None: positions stay in pixels, and there are no speeds
+    grounds  by the size of the picture; None: positions stay in pixels, and there are no speeds
     """
 
     def __init__(self, day: Day, grounds: dict[tuple[int, int], Ground | None]) -> None:
