@@ -16,6 +16,7 @@ COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
     "live": "Tracks from a camera or a stream, until stopped.",
     "calibrate": "Check what a site's calibration is worth.",
+    "measure": "Traffic figures of a site from finished runs.",
     "doctor": "Look at a source, and say which setting will hurt.",
     "radar": "Tracks from a table of radar plots.",
     "simulate": "Draw a traffic video or radar plots with exact truth.",
