@@ -46,7 +46,7 @@ def command(options: MeasureOptions) -> None:
     from vidtrack.cli.json_file import write_json
     from vidtrack.output.figures import write_figures
     from vidtrack.output.folder import open_folder
-    from vidtrack.run.live.retention import parts_of
+    from vidtrack.recording.retention import parts_of
     from vidtrack.traffic.measures.measure import measured
     from vidtrack.traffic.site import read_site
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.passing import Passed
 from vidtrack.traffic.measures.trips import Trips

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.lines import Line
 from vidtrack.traffic.polyline import turn

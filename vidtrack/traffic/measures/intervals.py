@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta, tzinfo
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.measures.passing import Passed
 
 _SIGMAS = 1.96

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.lives import End
 from vidtrack.traffic.measures.rows import Rows
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.traffic.measures.rows import Rows
 
 _LEAST_SIGMA_M = 0.01

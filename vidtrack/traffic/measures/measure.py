@@ -12,13 +12,7 @@ import pyarrow as pa
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibrate import calibrated
 from vidtrack.traffic.measures.checks import balance, movements
-from vidtrack.traffic.measures.crossings import (
-    confidence,
-    following,
-    reasons,
-    section_speeds,
-    way_names,
-)
+from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined

@@ -11,8 +11,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.rows import Rows
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.measures.staying import STANDING_PAUSE_S, Stays
 
 _UNKNOWN_M = 4.5

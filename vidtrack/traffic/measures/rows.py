@@ -12,8 +12,8 @@ import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet as pq
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.traffic.footprint import Footprints, footprint
 from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.measures.runs import Day, Recording

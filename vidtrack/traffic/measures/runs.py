@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError, SourceError
-from vidtrack.scan import Floats
 
 _JOINED_S = 1.0
 """Parts of one live run with less between them are watched without a break."""

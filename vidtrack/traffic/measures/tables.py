@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 _TIME = pa.timestamp("ms", "UTC")
 _KINDS: dict[str, pa.DataType] = {"": pa.string(), "1": pa.float64(), "n": pa.int64(), "yes": pa.bool_(), "utc": _TIME}

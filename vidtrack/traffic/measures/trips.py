@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.passing import Passed
 
