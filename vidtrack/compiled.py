@@ -77,7 +77,9 @@ class KernelCache(FunctionCache):
             with _one_writer(folder):
                 super().save_overload(sig, data)
         except OSError as error:
-            _tell(f"compiled kernels cannot be kept in {folder} ({error.strerror}); the next run compiles them again")
+            _warn_once(
+                f"compiled kernels cannot be kept in {folder} ({error.strerror}); the next run compiles them again"
+            )
 
 
 @contextmanager
@@ -96,7 +98,7 @@ def _one_writer(folder: Path) -> Iterator[None]:
 
 
 @cache
-def _tell(what: str) -> None:
+def _warn_once(what: str) -> None:
     """A warning, once."""
     log.warning(what)
 

@@ -70,20 +70,20 @@ def main() -> None:
     try:
         code = cli.main(prog_name="vidtrack", standalone_mode=False)
     except Error as error:
-        code = _complain(str(error), error.exit_code)
+        code = _report_error(str(error), error.exit_code)
     except click.ClickException as error:
         error.show()
         code = 2
     except (KeyboardInterrupt, click.Abort):
-        code = _complain("interrupted", 130)
+        code = _report_error("interrupted", 130)
     except Terminated:
-        code = _complain("terminated", 143)
+        code = _report_error("terminated", 143)
     except OSError as error:  # a full disk or a read-only folder where no module gave a better message
         place = f" {error.filename}" if error.filename else ""
-        code = _complain(f"cannot read or write{place}: {error.strerror or error}", 1)
+        code = _report_error(f"cannot read or write{place}: {error.strerror or error}", 1)
     sys.exit(code)
 
 
-def _complain(message: str, code: int) -> int:
+def _report_error(message: str, code: int) -> int:
     click.echo(f"vidtrack: {message}", err=True)
     return code

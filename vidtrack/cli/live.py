@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from vidtrack.run.live.outputs import LiveExtras
     from vidtrack.serve.page import Page
 
-_TELL_S = 60.0
+_REPORT_S = 60.0
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
 
@@ -139,10 +139,10 @@ def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> N
     ):
         if page is not None:
             page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
-        told_s = time.monotonic()
+        reported_s = time.monotonic()
         for _ in run:
-            if not options.quiet and time.monotonic() - told_s > _TELL_S:
-                told_s = time.monotonic()
+            if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
+                reported_s = time.monotonic()
                 click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
         if not options.quiet:
             click.echo(f"{run.name}: {_line(run.board.now())}", err=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from vidtrack.run.live.many import Many, Supervisor
     from vidtrack.serve.page import Page
 
-_TELL_S = 60.0
+_REPORT_S = 60.0
 _LOOK_S = 0.2
 
 
@@ -50,10 +50,10 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     with Many(jobs, folder) as many, stopping(many.stop):
         if page is not None:
             _show(page, many)
-        told_s = time.monotonic()
+        reported_s = time.monotonic()
         while many.running(_LOOK_S):
-            if not options.quiet and time.monotonic() - told_s > _TELL_S:
-                told_s = time.monotonic()
+            if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
+                reported_s = time.monotonic()
                 for name, supervisor in many.supervisors.items():
                     click.echo(f"{name}: {_line(supervisor)}", err=True)
     if not options.quiet:

@@ -59,7 +59,7 @@ def _lines(items: Iterable[Item], expected: int | None, name: str, unit: str) ->
     click.echo(f"{name}: {done} {unit}s in {time.monotonic() - began:.1f} s", err=True)
 
 
-def tell_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
+def report_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
     """Say on stderr how many tracks and crossings a finished run found; `none` is said where there are no tracks."""
     if quiet:
         return

@@ -38,14 +38,14 @@ def command(options: RepairOptions) -> None:
     from shutil import Error, copytree
 
     from vidtrack.errors import StoppedEarly
-    from vidtrack.output.folder import open_run, spare
+    from vidtrack.output.folder import open_run, refuse_overwriting
     from vidtrack.output.repair import repair
     from vidtrack.recording.retention import parts_of
 
     start_log(options.verbose, options.quiet)
     folder = options.source
     if options.output is not None and folder.is_dir():
-        spare(folder, options.output)
+        refuse_overwriting(folder, options.output)
         copy = open_run(options.output, "repair", options.force)
         try:
             copytree(folder, copy, dirs_exist_ok=True)

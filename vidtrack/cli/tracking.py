@@ -135,7 +135,7 @@ def smooth_option(function: Function) -> Function:
 
 def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") -> None:
     """Let a run over a file go to its end, and tell what it found; `none` is said where there are no tracks."""
-    from vidtrack.cli.progress import progress, tell_outcome
+    from vidtrack.cli.progress import progress, report_outcome
     from vidtrack.cli.signals import Terminated, stoppable
 
     with run:
@@ -145,5 +145,5 @@ def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") 
         except (KeyboardInterrupt, Terminated):
             click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
             raise
-    tell_outcome(run.folder, quiet, none)
+    report_outcome(run.folder, quiet, none)
     click.echo(run.folder)

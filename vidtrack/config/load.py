@@ -13,9 +13,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from vidtrack.config.group import read_toml
 from vidtrack.config.inputs import Input, is_own, needs, reads
 from vidtrack.config.settings import Settings
-from vidtrack.config.toml_file import read_toml
 from vidtrack.errors import ConfigError
 
 

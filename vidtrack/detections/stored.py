@@ -11,7 +11,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config.settings import DetectionSettings, Settings
-from vidtrack.detections.habits import Chains, Habits, habits, natural_rate
+from vidtrack.detections.parameters import Chains, Parameters, estimate_parameters, natural_rate
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.estimate.noise import BOX_JITTER
 from vidtrack.formats import read_mot
@@ -84,7 +84,7 @@ class Detections:
         chains = Chains.of(self._frame, self._box, self._score)
         rate = (natural_rate(chains) if self.stats.fps_assumed else None) or self.fps
         self.pace = rate / self.fps
-        self.settings = _told(settings.detections, habits(chains, rate, settings.tracker.hold_s))
+        self.settings = _completed(settings.detections, estimate_parameters(chains, rate, settings.tracker.hold_s))
         right, bottom = np.ceil((self._box[:, :2] + self._box[:, 2:]).max(axis=0)).astype(int)
         self.width, self.height = info.width or int(right), info.height or int(bottom)
         length = max(info.length or 0, int(self._frame[-1]) + 1)
@@ -106,9 +106,9 @@ class Detections:
         """Nothing stays open: the file was read as a whole."""
 
 
-def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
+def _completed(settings: DetectionSettings, parameters: Parameters) -> DetectionSettings:
     """The settings, what they leave open taken from the file's habits."""
-    open_ones = {name: value for name, value in asdict(habits).items() if getattr(settings, name) is None}
+    open_ones = {name: value for name, value in asdict(parameters).items() if getattr(settings, name) is None}
     return settings.model_copy(update=open_ones)
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vidtrack.output.sink import Sink, Step, close_together
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.threaded import close_together
 from vidtrack.tracks import TENTATIVE
 
 

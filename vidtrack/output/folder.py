@@ -70,7 +70,7 @@ def withdraw(folder: Path) -> None:
         folder.rmdir()
 
 
-def spare(read: Path, *written: Path | None) -> None:
+def refuse_overwriting(read: Path, *written: Path | None) -> None:
     """Raise OutputError if one of the places to write to is the file, or the folder, that is read."""
     for path in written:
         if path is not None and path.resolve() == read.resolve():

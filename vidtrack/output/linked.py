@@ -15,7 +15,8 @@ from vidtrack.associate.gate import quantile
 from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.motion.model import Motion
-from vidtrack.output.sink import Sink, Step, close_together
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.threaded import close_together
 from vidtrack.tracking.boxes import absolute, longer
 from vidtrack.tracks import COASTING, Tracks
 

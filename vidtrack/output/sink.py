@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
+from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats
-from vidtrack.output.in_picture import moved, seen
 from vidtrack.scan import Scan
 from vidtrack.tracks import Tracks
 
@@ -43,13 +43,13 @@ class Step:
     @property
     def shown(self) -> Tracks:
         """The tracks in pixels of this picture, as users see them."""
-        return moved(self.tracks, self.motion)
+        return _moved(self.tracks, self.motion)
 
     def in_picture(self) -> Step:
         """The step with scan and tracks where they are in this picture."""
         if self.motion is None:
             return self
-        return replace(self, scan=seen(self.scan, self.motion), tracks=self.shown, motion=None)
+        return replace(self, scan=_seen(self.scan, self.motion), tracks=self.shown, motion=None)
 
 
 class Sink(Protocol):
@@ -62,13 +62,23 @@ class Sink(Protocol):
         """Write what is left; results stay valid if it is never called."""
 
 
-def close_together(*sinks: Sink) -> None:
-    """Close the sinks side by side, for most of it is encoding. All are closed, whatever one raises.
+def _moved(tracks: Tracks, to_picture: Floats | None) -> Tracks:
+    """The tracks as the picture shows them; to_picture (2, 3), None: they lie on it."""
+    if to_picture is None:
+        return tracks
+    x, turn = tracks.x.copy(), np.eye(tracks.x.shape[1])
+    for columns in (list(tracks.position), list(tracks.velocity)):
+        turn[np.ix_(columns, columns)] = to_picture[:, :2]
+    x = x @ turn.T
+    x[:, list(tracks.position)] += to_picture[:, 2]
+    return replace(tracks, x=x, P=turn @ tracks.P @ turn.T, box=affine.boxes(to_picture, tracks.box))
 
-    The last is closed in the calling thread: OpenCV loads its font anew for each thread that writes with it.
-    """
-    *others, last = sinks
-    with ExitStack() as closed, ThreadPoolExecutor() as pool:
-        for sink in others:
-            closed.callback(pool.submit(sink.close).result)
-        last.close()
+
+def _seen(scan: Scan, to_picture: Floats) -> Scan:
+    """The measurements of positions as the picture shows them."""
+    z = affine.points(to_picture, scan.z)
+    box = scan.box
+    if box is not None:
+        box = affine.boxes(to_picture, np.hstack([scan.z + box[:, :2], box[:, 2:]]))
+        box[:, :2] -= z
+    return replace(scan, z=z, R=to_picture[:, :2] @ scan.R @ to_picture[:, :2].T, box=box, lasting=None, surveyed=None)

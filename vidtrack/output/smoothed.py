@@ -9,7 +9,8 @@ import numpy as np
 
 from vidtrack.config.settings import OutputSettings
 from vidtrack.estimate.smoother import smoothed
-from vidtrack.output.sink import Sink, Step, close_together
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.threaded import close_together
 from vidtrack.tracking.boxes import absolute
 from vidtrack.tracks import Tracks
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 
 from vidtrack.output.sink import Sink, Step
 
@@ -34,3 +35,15 @@ class Threaded:
         finally:
             self._pool.shutdown(cancel_futures=True)
             self._sink.close()
+
+
+def close_together(*sinks: Sink) -> None:
+    """Close the sinks side by side, for most of it is encoding. All are closed, whatever one raises.
+
+    The last is closed in the calling thread: OpenCV loads its font anew for each thread that writes with it.
+    """
+    *others, last = sinks
+    with ExitStack() as closed, ThreadPoolExecutor() as pool:
+        for sink in others:
+            closed.callback(pool.submit(sink.close).result)
+        last.close()

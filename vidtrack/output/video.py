@@ -13,8 +13,8 @@ from av.video.stream import VideoStream
 
 from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
-from vidtrack.output.disk import Disk
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails, moved_lines
+from vidtrack.output.ffmpeg_file import FFmpegFile
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
@@ -43,11 +43,11 @@ class AnnotatedVideo:
         self._stream: VideoStream | None = None
         self._pts = -1
         try:
-            self._disk = Disk(path)
+            self._file = FFmpegFile(path)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}; give --video another file") from None
         self._container: OutputContainer = av.open(
-            self._disk,
+            self._file,
             "w",
             format="mp4",
             options={
@@ -68,7 +68,7 @@ class AnnotatedVideo:
         if self._stream is not None:
             self._container.mux(self._stream.encode(None))
         self._container.close()
-        self._disk.close()
+        self._file.close()
         if self._stream is None and self._path.is_file():
             self._path.unlink()  # nothing plays a video without a picture
         self._check_disk()
@@ -97,8 +97,8 @@ class AnnotatedVideo:
 
     def _check_disk(self) -> None:
         with writing(self._path):
-            if self._disk.error is not None:
-                raise self._disk.error
+            if self._file.error is not None:
+                raise self._file.error
 
     def _add_stream(self, width: int, height: int) -> VideoStream:
         stream = self._container.add_stream("libx264", rate=Fraction(self._fps).limit_denominator(1001))

@@ -17,7 +17,7 @@ from vidtrack.config.settings import Settings
 from vidtrack.errors import StoppedEarly
 from vidtrack.output.folder import usable, writing
 from vidtrack.output.linefile import LineFile
-from vidtrack.recording.film import Film
+from vidtrack.recording.muxer import Muxer
 from vidtrack.recording.retention import Retention, new_part
 from vidtrack.recording.source import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VIDEO
 from vidtrack.state import State, write_state
@@ -28,7 +28,7 @@ from vidtrack.video.live.tape import NoTape, Place
 log = logging.getLogger(__name__)
 
 _RETRY_S = 5.0  # after a failed write
-_TELL_S = 60.0  # a loss that lasts is told so often
+_WARN_S = 60.0  # a loss that lasts is told so often
 _END_S = 0.5  # that the reader gets at the end to finish a packet
 _NOWHERE: Place = (-1, 0)
 
@@ -69,12 +69,12 @@ class Recorder:
         self._roll_s = roll_s
         self._retention = retention
         self._writing = RLock()  # on a slow disk the reader still holds it when the run ends
-        self._film: Film | None = None
+        self._muxer: Muxer | None = None
         self._folders: dict[int, Path] = {}
         self._part = 0
         self._period = 0
         self._retry_s = 0.0
-        self._told_s = -_TELL_S
+        self._warned_s = -_WARN_S
         self._logged = _NOWHERE[0]
         self._to_write: deque[tuple[int, State | str]] = deque()
         self._list: LineFile | None = None
@@ -83,8 +83,8 @@ class Recorder:
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
         """Begin a new part with this packet if there is none, or it is time and the packet a key picture's."""
         with self._writing:
-            begins = self._film is None and monotonic() >= self._retry_s
-            if not begins and not (self._film is not None and packet.is_keyframe and self._due(self._film)):
+            begins = self._muxer is None and monotonic() >= self._retry_s
+            if not begins and not (self._muxer is not None and packet.is_keyframe and self._due(self._muxer)):
                 return False
             self.hang_up()
             try:
@@ -96,31 +96,31 @@ class Recorder:
     def place(self) -> Place:
         """Number of the part, and of the next packet in it."""
         with self._writing:
-            return _NOWHERE if self._film is None else (self._part, self._film.packets)
+            return _NOWHERE if self._muxer is None else (self._part, self._muxer.packets)
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
         """Keep a packet, and what the tracker logged meanwhile."""
         with self._writing:
-            if self._film is None:
+            if self._muxer is None:
                 self.lost += 1
                 return
             try:
-                self._film.take(packet, pictures, arrived_s)
+                self._muxer.take(packet, pictures, arrived_s)
                 self._write_log()
             except (StoppedEarly, av.FFmpegError) as error:
                 self._pause(str(error))
                 return
-            if self._film.error is not None:
-                self._pause(self._film.error.strerror or str(self._film.error))
+            if self._muxer.error is not None:
+                self._pause(self._muxer.error.strerror or str(self._muxer.error))
 
     def hang_up(self) -> None:
         """End the part."""
         with self._writing:
-            film, self._film = self._film, None
-            if film is None:
+            muxer, self._muxer = self._muxer, None
+            if muxer is None:
                 return
             try:
-                film.close()
+                muxer.close()
             except (OSError, av.FFmpegError) as error:
                 log.warning("the end of a recording is lost: %s", error.strerror)
 
@@ -153,8 +153,8 @@ class Recorder:
         finally:
             self._writing.release()
 
-    def _due(self, film: Film) -> bool:
-        large = self._retention.part_size is not None and film.size > self._retention.part_size
+    def _due(self, muxer: Muxer) -> bool:
+        large = self._retention.part_size is not None and muxer.size > self._retention.part_size
         return large or self._period != self._now()
 
     def _now(self) -> int:
@@ -167,7 +167,7 @@ class Recorder:
         self._folders[self._part] = folder
         self._period = self._now()
         (folder / SETTINGS).write_text(self._settings)
-        self._film = Film(folder / VIDEO, connection)
+        self._muxer = Muxer(folder / VIDEO, connection)
         self._folders.pop(self._part - 3, None)  # its last frame was tracked long ago
 
     def _pause(self, why: str) -> None:
@@ -178,8 +178,8 @@ class Recorder:
         if folder is not None and not (folder / FRAMES).exists():  # nothing of it can be repeated
             del self._folders[self._part]
             shutil.rmtree(folder, ignore_errors=True)
-        if monotonic() - self._told_s > _TELL_S:
-            self._told_s = monotonic()
+        if monotonic() - self._warned_s > _WARN_S:
+            self._warned_s = monotonic()
             log.warning("recording pauses: %s; tracking goes on", why)
 
     def _end_list(self) -> None:

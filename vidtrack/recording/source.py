@@ -48,7 +48,7 @@ class Recording:
 
     name, place, width, height, fps, frames, stats  as for Source
     like      a frame of the size and kind of all
-    remember  is given the memory of the live run before the first frame of each part; set it before iterating
+    restore  is given the memory of the live run before the first frame of each part; set it before iterating
 
     Raises SourceError if there is nothing in it, FormatError if it is damaged.
     """
@@ -65,12 +65,12 @@ class Recording:
         self.fps = FALLBACK_FPS
         self.frames = sum(_row_count(part) for part in self._parts)
         self.stats = SourceStats()
-        self.remember: Callable[[State], None] = lambda state: None
+        self.restore: Callable[[State], None] = lambda state: None
 
     def __iter__(self) -> Iterator[Frame]:
         last = -1
         for part in self._parts:
-            self.remember(read_state(part / STATE))
+            self.restore(read_state(part / STATE))
             for frame in self._replayed(part):
                 if frame.index <= last:
                     self.stats.warn(f"another run begins with {part}: its frames and tracks are numbered anew")

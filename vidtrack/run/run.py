@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 
 from vidtrack.errors import SourceError
-from vidtrack.output.folder import begun, spare, withdraw
+from vidtrack.output.folder import begun, refuse_overwriting, withdraw
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 
@@ -80,7 +80,7 @@ class Run:
         self._begun = False
         with ExitStack() as stack:  # if a later step fails, what is already open is closed
             opened = stack.enter_context(pipeline)
-            spare(opened.place, output)
+            refuse_overwriting(opened.place, output)
             self.name, self.count, self._steps = opened.name, opened.count, opened.steps
             with begun(output, opened.name, force) as self.folder, ExitStack() as written:
                 self._summary = opened.summary(self.folder)

@@ -13,7 +13,7 @@ from time import perf_counter
 from vidtrack.arrays.types import Mask
 from vidtrack.config.settings import Settings
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S
-from vidtrack.output.folder import spare
+from vidtrack.output.folder import refuse_overwriting
 from vidtrack.output.sink import Step
 from vidtrack.recording.source import Recording, is_recording
 from vidtrack.run.live.checkpoint import Checkpoint
@@ -63,13 +63,13 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         closing(Recording(path) if recorded else open_source(path, settings.source)) as source,
         frame_by_frame(settings.detector.kind),
     ):
-        spare(source.place, extras.masks, extras.video)
+        refuse_overwriting(source.place, extras.masks, extras.video)
         tracker = build_blob_tracker(
             settings.tracker, (source.width, source.height), explain=extras.explain, smooth=settings.output.smooth
         )
         detector = build_detector(settings)
         if isinstance(source, Recording):
-            source.remember = Checkpoint(detector, tracker, source.like).restore
+            source.restore = Checkpoint(detector, tracker, source.like).restore
         subject = file_subject(path, source, tracker, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S

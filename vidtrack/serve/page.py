@@ -10,10 +10,10 @@ from types import TracebackType
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from vidtrack.serve.access import protected
 from vidtrack.serve.app import Answers
 from vidtrack.serve.camera import Camera
-from vidtrack.serve.door import open_door, url_of
-from vidtrack.serve.guard import guarded
+from vidtrack.serve.listener import listen, url_of
 
 _MOST = 100  # connections at a time; a camera that is opened again needs file handles too
 _ASK_S = 5.0  # in which a client has to say something
@@ -33,16 +33,16 @@ class Page:
     """
 
     def __init__(self, place: str, token: str | None = None) -> None:
-        self._door = open_door(place, token)
+        self._listener = listen(place, token)
         self._token = token
         self._server: uvicorn.Server | None = None
-        self.url = url_of(self._door)
+        self.url = url_of(self._listener)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
         """Begin to answer; until then clients wait."""
         self._server = uvicorn.Server(
             uvicorn.Config(
-                guarded(Answers(cameras).app(), self._token),
+                protected(Answers(cameras).app(), self._token),
                 loop="asyncio",
                 http=_Connection,
                 ws="none",
@@ -55,7 +55,7 @@ class Page:
                 timeout_graceful_shutdown=0,
             )
         )
-        self._thread = Thread(target=self._server.run, args=([self._door],), name="page", daemon=True)
+        self._thread = Thread(target=self._server.run, args=([self._listener],), name="page", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
@@ -63,7 +63,7 @@ class Page:
         if self._server is not None:
             self._server.force_exit = self._server.should_exit = True
             self._thread.join(_END_S)
-        self._door.close()
+        self._listener.close()
 
     def __enter__(self) -> Page:
         return self

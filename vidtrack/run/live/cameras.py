@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from vidtrack.config.group import read_toml
 from vidtrack.config.inputs import Input
 from vidtrack.config.load import load, merged
 from vidtrack.config.settings import Settings
-from vidtrack.config.toml_file import read_toml
 from vidtrack.errors import ConfigError
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.video.live.address import redact

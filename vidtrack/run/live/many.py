@@ -49,7 +49,7 @@ class Many:
         if not self._stopping.is_set():
             wait([supervisor.sentinel for supervisor in _alive(self.supervisors.values())], timeout_s)
             for supervisor in self.supervisors.values():
-                supervisor.tend()
+                supervisor.restart_if_due()
         return not self._stopping.is_set() and not all(supervisor.ended for supervisor in self.supervisors.values())
 
     def stop(self) -> None:

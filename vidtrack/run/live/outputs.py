@@ -13,7 +13,7 @@ from vidtrack.output.folder import open_run, usable
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
 from vidtrack.recording.retention import Retention, parts_of
-from vidtrack.run.live.beside import Beside
+from vidtrack.run.live.background_writer import BackgroundWriter
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.run import Extras
 from vidtrack.run.sinks import Subject, picture_sinks
@@ -44,24 +44,24 @@ class Outputs:
     def __init__(
         self, folder: Path, subject: Subject, extras: Extras, roll_s: float | None, retention: Retention
     ) -> None:
-        self._besides = [Beside.of(name, sink) for name, sink in picture_sinks(subject, extras)]
+        self._writers = [BackgroundWriter.of(name, sink) for name, sink in picture_sinks(subject, extras)]
         # The last, so that what cannot be opened above leaves the folder empty.
         parts = Parts(folder, subject, extras.decisions, roll_s, retention)
-        tables = Beside("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
-        self.sinks: list[Sink] = [*self._besides, Confirmed(tables, hold_s=LIVE_HOLD_S)]
-        self._besides.append(tables)
+        tables = BackgroundWriter("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
+        self.sinks: list[Sink] = [*self._writers, Confirmed(tables, hold_s=LIVE_HOLD_S)]
+        self._writers.append(tables)
 
     @property
     def lost(self) -> dict[str, int]:
         """Frames that each output could not write."""
-        return {beside.name: beside.lost for beside in self._besides}
+        return {writer.name: writer.lost for writer in self._writers}
 
     def close(self, until_s: float) -> None:
         """Finish all by a monotonic time; what is not finished then stays as it is, and valid."""
         for sink in self.sinks:
             sink.close()
-        for beside in reversed(self._besides):  # the tables first
-            beside.join(max(_LEAST_S, until_s - monotonic()))
+        for writer in reversed(self._writers):  # the tables first
+            writer.join(max(_LEAST_S, until_s - monotonic()))
 
 
 def lock_extras(extras: LiveExtras, output: Path | None, locks: ExitStack) -> None:

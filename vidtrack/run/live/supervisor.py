@@ -30,7 +30,7 @@ _SPAWN = multiprocessing.get_context("spawn")  # a fork would copy locks that th
 class Supervisor:
     """A camera's process. It is started again, after growing pauses, when it ends without a last word.
 
-    All methods but `tend` may be called from any thread.
+    All methods but `restart_if_due` may be called from any thread.
 
     job        of the process that runs, or ran last
     restarts   so many took the place of one before
@@ -44,11 +44,11 @@ class Supervisor:
         self._first = job
         self._shown = redact(job.address)
         self._backoff = Backoff(live.backoff_s, live.backoff_longest_s, Random())
-        self._asking = Lock()
+        self._requesting = Lock()
         self._number = 0
-        self._told = False
+        self._stopped = False
         self._crashes: list[tuple[float, str]] = []
-        self._again_s: float | None = None  # monotonic time of the next start
+        self._restart_s: float | None = None  # monotonic time of the next start
         self._start(job)
 
     @property
@@ -64,25 +64,25 @@ class Supervisor:
     @property
     def ended(self) -> bool:
         """Whether it does not run, and will not be started again."""
-        return self.exit_code is not None and self._again_s is None
+        return self.exit_code is not None and self._restart_s is None
 
-    def tend(self) -> None:
+    def restart_if_due(self) -> None:
         """Start it again if it crashed, and the pause is over."""
         code = self.exit_code
-        if code is None or self._told:
+        if code is None or self._stopped:
             return
-        if self._again_s is not None:
-            if monotonic() >= self._again_s:
-                self._start_again()
-        elif code != 0 and (self.restarts or not self._last_word()):
+        if self._restart_s is not None:
+            if monotonic() >= self._restart_s:
+                self._restart()
+        elif code != 0 and (self.restarts or not self._has_final_status()):
             pause_s = self._pause_s()
-            self._again_s = monotonic() + pause_s
+            self._restart_s = monotonic() + pause_s
             self._crashes = [*self._crashes, (time.time(), f"{self._why()}; it is started again")][-5:]
             log.warning("%s: %s; it is started again in %.1f s", self._first.name, self._why(), pause_s)
 
     def status(self) -> Mapping[str, Any]:
         """As `LiveStatus` has it, plain, with `restarts`; what is not known yet is left out. Later the last one."""
-        answer = self._ask(STATUS)
+        answer = self._request(STATUS)
         if answer is not None:
             self._last = json.loads(answer)
         state = self._last["state"] if self.exit_code is None else "ended" if self.ended else "waiting"
@@ -91,21 +91,21 @@ class Supervisor:
 
     def picture(self) -> bytes | None:
         """The newest annotated picture as JPEG; None without one."""
-        return self._ask(PICTURE) or None
+        return self._request(PICTURE) or None
 
     @property
     def error(self) -> str | None:
         """Why it ended, if it was not told to and did not reach its end."""
         code = self.exit_code
-        if not self.ended or not code or (self._told and code < 0):
+        if not self.ended or not code or (self._stopped and code < 0):
             return None
         return self._why()
 
     def stop(self) -> None:
         """Tell it to end; without waiting."""
-        self._again_s = None
+        self._restart_s = None
         if self.exit_code is None:
-            self._told = True
+            self._stopped = True
             self._process.terminate()
 
     def kill(self) -> None:
@@ -115,7 +115,7 @@ class Supervisor:
     def summary(self) -> dict[str, Any]:
         """What the run of the process that runs, or ran last, wrote."""
         content: dict[str, Any] = {"source": self._shown}
-        self._ask(STATUS)
+        self._request(STATUS)
         if self._begun:  # otherwise what lies there is of another run
             with suppress(OSError, ValueError):
                 content = json.loads((self.job.folder / "summary.json").read_text(encoding="utf-8"))
@@ -124,18 +124,18 @@ class Supervisor:
     def _start(self, job: Job) -> None:
         self.job = job
         self._last = unknown(self._shown)
-        self._begun = self._said_goodbye = False
+        self._begun = self._final_status_came = False
         self._started_s = monotonic()
         self._channel, theirs = _SPAWN.Pipe()
         self._process = _SPAWN.Process(target=work, args=(job, theirs), name=job.name, daemon=True)
         self._process.start()
         theirs.close()
 
-    def _start_again(self) -> None:
-        self._again_s = None
+    def _restart(self) -> None:
+        self._restart_s = None
         self.summaries.append(self.summary())
         self.restarts += 1
-        with self._asking:
+        with self._requesting:
             self._channel.close()
             self._start(_continued(self._first, self.restarts + 1))
 
@@ -144,19 +144,19 @@ class Supervisor:
             self._backoff.reset()
         return self._backoff.next_s()
 
-    def _last_word(self) -> bool:
+    def _has_final_status(self) -> bool:
         """Whether it said why it ended."""
-        self._ask(STATUS)
-        return self._said_goodbye
+        self._request(STATUS)
+        return self._final_status_came
 
     def _why(self) -> str:
-        if self._last_word() and self._last["problems"]:
+        if self._has_final_status() and self._last["problems"]:
             return str(self._last["problems"][-1][1])
         return f"its process ended with code {self.exit_code}"
 
-    def _ask(self, what: bytes) -> bytes | None:
+    def _request(self, what: bytes) -> bytes | None:
         """The answer; None if there is none in time, or never will be."""
-        with self._asking:
+        with self._requesting:
             self._number += 1
             number = b"%d" % self._number
             with suppress(OSError):  # it may have ended just now, and what it said before is still to be read
@@ -168,7 +168,7 @@ class Supervisor:
                     self._begun |= tag == BEGUN
                     if tag == END:
                         self._last = json.loads(content)
-                        self._said_goodbye = True
+                        self._final_status_came = True
                     elif tag == number:  # others came too late for those who asked
                         return content
             except (EOFError, OSError):

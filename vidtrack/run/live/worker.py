@@ -42,14 +42,14 @@ class Job:
     prepare: Callable[[str], None]
 
 
-class _Told(BaseException):
+class _Terminated(BaseException):
     """SIGTERM, before there is a run to stop."""
 
 
 def work(job: Job, channel: Connection) -> None:
     """Track a camera until SIGTERM, or until the parent is gone; the exit code is that of a single live run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes, and the parent passes it on
-    signal.signal(signal.SIGTERM, _tell)
+    signal.signal(signal.SIGTERM, _terminate)
     job.prepare(job.name)
     answers = _Answers(job, channel)
     try:
@@ -58,7 +58,7 @@ def work(job: Job, channel: Connection) -> None:
             answers.begin(run.board)
             for _ in run:
                 pass
-    except _Told:
+    except _Terminated:
         answers.end()
     except Error as error:
         log.error("%s", error)
@@ -68,8 +68,8 @@ def work(job: Job, channel: Connection) -> None:
         answers.end()
 
 
-def _tell(number: int, frame: FrameType | None) -> None:
-    raise _Told
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
 
 
 class _Answers:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import av
 
-from vidtrack.output.disk import Disk
+from vidtrack.output.ffmpeg_file import FFmpegFile
 from vidtrack.video.live.connection import Connection
 
 _CLOCK = Fraction(1, 1000)
 _OPTIONS = {"cluster_time_limit": "1000", "flush_packets": "1"}  # a kill costs at most a cluster
 
 
-class Film:
+class Muxer:
     """A Matroska file with the packets of one connection, in the order and at the time of their arrival.
 
     packets  so many are in it
@@ -24,8 +24,8 @@ class Film:
 
     def __init__(self, path: Path, connection: Connection) -> None:
         self.packets = 0
-        self._disk = Disk(path)
-        self._container = av.open(self._disk, "w", format="matroska", options=_OPTIONS)
+        self._file = FFmpegFile(path)
+        self._container = av.open(self._file, "w", format="matroska", options=_OPTIONS)
         self._is_raw = connection.is_raw
         self._stream: av.VideoStream | None = None
         if not self._is_raw:
@@ -36,12 +36,12 @@ class Film:
     @property
     def error(self) -> OSError | None:
         """What the disk said; nothing is written after it."""
-        return self._disk.error
+        return self._file.error
 
     @property
     def size(self) -> int:
         """Bytes written."""
-        return self._disk.size
+        return self._file.size
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
         """Append a packet that arrived at a monotonic time, or for a raw camera its pictures."""
@@ -66,7 +66,7 @@ class Film:
         try:
             self._container.close()
         finally:
-            self._disk.close()
+            self._file.close()
 
     def _encode(self, picture: av.VideoFrame) -> None:
         stream = self._stream = self._stream or self._lossless(picture)

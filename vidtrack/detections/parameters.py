@@ -41,7 +41,7 @@ TINY = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Habits:
+class Parameters:
     """Of a detector and its scene. Object size is the longer side of a box.
 
     sure_score  least trusted score, as the share of detections that do not score higher
@@ -107,8 +107,8 @@ def natural_rate(chains: Chains) -> float | None:
     return None if step is None else float(np.clip(PACE / max(step, TINY), SLOWEST, FASTEST))
 
 
-def habits(chains: Chains, fps: float, hold_s: float) -> Habits:
-    """Habits of the detector that gave these boxes, fps frames a second.
+def estimate_parameters(chains: Chains, fps: float, hold_s: float) -> Parameters:
+    """Parameters of the detector that gave these boxes, fps frames a second.
 
     hold_s  s; correlation time of the acceleration
     """
@@ -116,7 +116,7 @@ def habits(chains: Chains, fps: float, hold_s: float) -> Habits:
     sure = _sure_score(chains.rank, chains.found)
     if np.count_nonzero(chains.mover) >= ENOUGH:
         sure = max(sure, float(np.quantile(chains.rank[chains.mover], SELDOM, method="higher")))
-    return Habits(sure, jitter, accel)
+    return Parameters(sure, jitter, accel)
 
 
 def _sure_score(rank: Floats, found: Floats) -> float:

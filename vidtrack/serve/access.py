@@ -21,16 +21,16 @@ _ON_EVERY_ANSWER = {
 }
 
 
-def guarded(app: ASGIApp, token: str | None) -> ASGIApp:
+def protected(app: ASGIApp, token: str | None) -> ASGIApp:
     """The application behind a token, or without one for requests that name this machine.
 
     The name matters: a foreign page could let its own name point to the loopback address and read along.
     """
-    inner = _TokenGuard(app, token) if token else TrustedHostMiddleware(app, [*_OWN_NAMES], www_redirect=False)
+    inner = _TokenAuthentication(app, token) if token else TrustedHostMiddleware(app, [*_OWN_NAMES], www_redirect=False)
     return _Headers(inner)
 
 
-class _TokenGuard:
+class _TokenAuthentication:
     """Lets in who brings the token, as bearer or as password of any user."""
 
     def __init__(self, app: ASGIApp, token: str) -> None:

@@ -14,10 +14,10 @@ from vidtrack.output.sink import Sink, Step
 log = logging.getLogger(__name__)
 
 _DEPTH = 8  # steps that may wait with their pictures
-_TELL_S = 60.0  # a loss that lasts is told so often
+_WARN_S = 60.0  # a loss that lasts is told so often
 
 
-class Beside:
+class BackgroundWriter:
     """Sink in a thread of its own that hands its steps on in batches.
 
     name     of the output, for messages
@@ -47,12 +47,12 @@ class Beside:
         self._changed = Condition()
         self._ending = Event()
         self._failing = False
-        self._told_s = -_TELL_S
+        self._warned_s = -_WARN_S
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     @classmethod
-    def of(cls, name: str, sink: Sink) -> Beside:
+    def of(cls, name: str, sink: Sink) -> BackgroundWriter:
         """Any sink; once it failed, it may fail for ever."""
 
         def write(steps: list[Step]) -> None:
@@ -114,6 +114,6 @@ class Beside:
 
     def _lose(self, steps: int, why: str) -> None:
         self.lost += steps
-        if monotonic() - self._told_s > _TELL_S:
-            self._told_s = monotonic()
+        if monotonic() - self._warned_s > _WARN_S:
+            self._warned_s = monotonic()
             log.warning("%s; tracking goes on", why)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidtrack.detections.habits import LEAST_ACCEL, MARGIN, PACE, SELDOM, Chains, habits, natural_rate
+from vidtrack.detections.parameters import LEAST_ACCEL, MARGIN, PACE, SELDOM, Chains, estimate_parameters, natural_rate
 
 FPS, HOLD_S = 10.0, 0.5
 FINE = 10  # steps of the simulated motion in a frame
@@ -32,7 +32,7 @@ def sorted_by_frame(frame, *columns):
 
 def told(frame, box, ranks):
     """The habits of the boxes."""
-    return habits(Chains.of(frame, box, ranks), FPS, HOLD_S)
+    return estimate_parameters(Chains.of(frame, box, ranks), FPS, HOLD_S)
 
 
 def rank(score):

@@ -7,7 +7,7 @@ from pathlib import Path
 from vidtrack.output.folder import append
 
 
-class Disk:
+class FFmpegFile:
     """A file object for PyAV. It keeps an error for later: FFmpeg crashes on a header that it could not write.
 
     Nothing can be sought in it, so that what is written never has to be changed. Raises OSError when it cannot
