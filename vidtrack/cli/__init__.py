@@ -1,4 +1,4 @@
-"""What the user types. Each command is a module of its own, imported when it is called."""
+"""The command line. Each command is a module, imported when it is called."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COMMANDS = {
 
 
 class _Commands(click.Group):
-    """Imports only the command that is called, so that help answers at once."""
+    """Imports only the called command, so that --help is fast."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -78,7 +78,7 @@ def main() -> None:
         code = _report_error("interrupted", 130)
     except Terminated:
         code = _report_error("terminated", 143)
-    except OSError as error:  # a full disk or a read-only folder where no module gave a better message
+    except OSError as error:  # for example a full disk or a read-only folder, without a more specific error
         place = f" {error.filename}" if error.filename else ""
         code = _report_error(f"cannot read or write{place}: {error.strerror or error}", 1)
     sys.exit(code)

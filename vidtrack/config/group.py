@@ -1,4 +1,4 @@
-"""What all groups of settings have in common."""
+"""The base of all configuration: frozen groups of values, and the TOML files that contain them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from vidtrack.errors import ConfigError
 
 
 class Group(BaseModel):
-    """Frozen; an unknown name is an error."""
+    """A group of settings: frozen, unknown names and non-finite numbers are errors."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The tables of a file; `what` it holds, for the message. Raises ConfigError if it cannot be read or is no TOML."""
+    """Read a TOML file; `what` names its content in messages. Raises ConfigError if it cannot be read."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The annotated video: H.264 in fragmented MP4, which browsers play and a kill does not spoil."""
+"""The annotated video: H.264 in fragmented MP4, playable in browsers and after a kill."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _FRAGMENT_S = 1
 
 
 class AnnotatedVideo:
-    """Sink that draws tracks on the pictures and encodes them with the times of the source.
+    """Sink that draws tracks on the pictures and encodes them with the source's times.
 
-    fps   nominal rate, a hint for the encoder; the pictures keep their own times
+    fps   nominal rate, a hint for the encoder
 
-    Raises OutputError when the file cannot be opened, ConfigError for steps without pictures.
+    Raises OutputError if the file cannot be opened, ConfigError for steps without pictures.
     """
 
     def __init__(self, path: Path, fps: float, settings: OutputSettings, lines: Sequence[Line] = ()) -> None:
@@ -70,7 +70,7 @@ class AnnotatedVideo:
         self._container.close()
         self._file.close()
         if self._stream is None and self._path.is_file():
-            self._path.unlink()  # nothing plays a video without a picture
+            self._path.unlink()  # players reject a video without pictures
         self._check_disk()
 
     def _draw(self, step: Step, picture: Image) -> Image:
@@ -105,6 +105,6 @@ class AnnotatedVideo:
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         stream.time_base = stream.codec_context.time_base = _CLOCK
         stream.codec_context.gop_size = max(1, round(2 * self._fps))
-        # No B-frames: they would delay all times, for a fragmented file has no edit list to take that back.
+        # No B-frames: they delay all times, and a fragmented file has no edit list to correct that.
         stream.options = {"crf": str(self._settings.video_crf), "preset": "superfast", "bf": "0"}
         return stream

@@ -1,4 +1,4 @@
-"""Stored detections become tracks: each box of the file is one whole object."""
+"""Tracks stored detections: each box in the file is one whole object."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vidtrack.run.trackers import build_box_tracker
 
 @contextmanager
 def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipeline]:
-    """A MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
+    """The pipeline of a MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
     boxes = open_detections(path, settings)
     refuse_overwriting(boxes.place, extras.masks, extras.video)
     tracker = build_box_tracker(

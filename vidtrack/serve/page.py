@@ -1,4 +1,4 @@
-"""Serves the live page in a thread of its own."""
+"""Serves the live page in a thread."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from vidtrack.serve.app import Answers
 from vidtrack.serve.camera import Camera
 from vidtrack.serve.listener import listen, url_of
 
-_MOST = 100  # connections at a time; a camera that is opened again needs file handles too
-_ASK_S = 5.0  # in which a client has to say something
+_MOST = 100  # connections at a time; leaves file handles for reopening cameras
+_ASK_S = 5.0  # time in which a client must send a request
 _END_S = 0.5
 
 
 class Page:
-    """A page at "[HOST:]PORT"; use it with `with`.
+    """Context manager that serves the page at "[HOST:]PORT".
 
-    place  on this machine only if no host is given; port 0 is any free one
-    token  that a client must bring; without one no other machine may see the page
+    place  without a host, on loopback; port 0 is any free port
+    token  required of clients; without one only this machine has access
 
-    url    where it is
+    url    of the page
 
-    The tracker is never asked to wait: the page looks at the cameras when a client asks, and a client that is slow
-    or gone only keeps its own connection waiting. Raises ConfigError when the port cannot be used.
+    The tracker never waits for the page: cameras are read on request, and a slow client delays only its own
+    connection. Raises ConfigError if the port cannot be used.
     """
 
     def __init__(self, place: str, token: str | None = None) -> None:
@@ -39,7 +39,7 @@ class Page:
         self.url = url_of(self._listener)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
-        """Begin to answer; until then clients wait."""
+        """Start to respond; until then clients wait."""
         self._server = uvicorn.Server(
             uvicorn.Config(
                 protected(Answers(cameras).app(), self._token),
@@ -48,7 +48,7 @@ class Page:
                 ws="none",
                 lifespan="off",
                 log_config=None,
-                log_level="critical",  # clients' mistakes are no news, and ours are told by the application
+                log_level="critical",  # clients' errors are not logged; the application logs its own
                 access_log=False,
                 server_header=False,
                 proxy_headers=False,
@@ -59,7 +59,7 @@ class Page:
         self._thread.start()
 
     def close(self) -> None:
-        """Hang up on everybody."""
+        """Close all connections and the port."""
         if self._server is not None:
             self._server.force_exit = self._server.should_exit = True
             self._thread.join(_END_S)
@@ -75,7 +75,7 @@ class Page:
 
 
 class _Connection(H11Protocol):
-    """One of not too many connections; who connects has to ask soon."""
+    """A connection, refused beyond _MOST and closed without a request within _ASK_S."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)

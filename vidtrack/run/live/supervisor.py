@@ -1,4 +1,4 @@
-"""A camera's process as the parent sees it: asked how it is, told to end, started again when it crashes."""
+"""Supervises a camera's process from the parent: requests its status, stops it, restarts it after a crash."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from vidtrack.video.live.backoff import Backoff
 log = logging.getLogger(__name__)
 
 _ANSWER_S = 1.0
-_SPAWN = multiprocessing.get_context("spawn")  # a fork would copy locks that threads hold
+_SPAWN = multiprocessing.get_context("spawn")  # fork would copy locks held by threads
 
 
 class Supervisor:
-    """A camera's process. It is started again, after growing pauses, when it ends without a last word.
+    """Supervises a camera's process, and restarts it, after growing pauses, when it ends without a final status.
 
     All methods but `restart_if_due` may be called from any thread.
 
-    job        of the process that runs, or ran last
-    restarts   so many took the place of one before
-    summaries  what the ones before wrote
+    job        of the current or last process
+    restarts   number of restarts
+    summaries  of the earlier processes
     """
 
     def __init__(self, job: Job) -> None:
@@ -53,21 +53,21 @@ class Supervisor:
 
     @property
     def exit_code(self) -> int | None:
-        """None while it runs; negative if a signal ended it."""
+        """None while the process runs; negative if a signal ended it."""
         return self._process.exitcode
 
     @property
     def sentinel(self) -> int:
-        """Becomes ready when the process ends."""
+        """A handle that becomes ready when the process ends; see multiprocessing.connection.wait."""
         return self._process.sentinel
 
     @property
     def ended(self) -> bool:
-        """Whether it does not run, and will not be started again."""
+        """Whether the process has ended and will not be restarted."""
         return self.exit_code is not None and self._restart_s is None
 
     def restart_if_due(self) -> None:
-        """Start it again if it crashed, and the pause is over."""
+        """Restart the process if it crashed and the pause is over."""
         code = self.exit_code
         if code is None or self._stopped:
             return
@@ -81,7 +81,7 @@ class Supervisor:
             log.warning("%s: %s; it is started again in %.1f s", self._first.name, self._why(), pause_s)
 
     def status(self) -> Mapping[str, Any]:
-        """As `LiveStatus` has it, plain, with `restarts`; what is not known yet is left out. Later the last one."""
+        """The fields of `LiveStatus` known so far, and `restarts`; the last known ones when the process is gone."""
         answer = self._request(STATUS)
         if answer is not None:
             self._last = json.loads(answer)
@@ -95,28 +95,28 @@ class Supervisor:
 
     @property
     def error(self) -> str | None:
-        """Why it ended, if it was not told to and did not reach its end."""
+        """Why the process failed; None if it runs, was stopped or succeeded."""
         code = self.exit_code
         if not self.ended or not code or (self._stopped and code < 0):
             return None
         return self._why()
 
     def stop(self) -> None:
-        """Tell it to end; without waiting."""
+        """Stop the process. Does not wait."""
         self._restart_s = None
         if self.exit_code is None:
             self._stopped = True
             self._process.terminate()
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the process."""
         self._process.kill()
 
     def summary(self) -> dict[str, Any]:
-        """What the run of the process that runs, or ran last, wrote."""
+        """summary.json of the current or last process."""
         content: dict[str, Any] = {"source": self._shown}
         self._request(STATUS)
-        if self._begun:  # otherwise what lies there is of another run
+        if self._begun:  # otherwise the file belongs to another run
             with suppress(OSError, ValueError):
                 content = json.loads((self.job.folder / "summary.json").read_text(encoding="utf-8"))
         return content
@@ -145,7 +145,7 @@ class Supervisor:
         return self._backoff.next_s()
 
     def _has_final_status(self) -> bool:
-        """Whether it said why it ended."""
+        """Whether the process sent a final status."""
         self._request(STATUS)
         return self._final_status_came
 
@@ -155,11 +155,11 @@ class Supervisor:
         return f"its process ended with code {self.exit_code}"
 
     def _request(self, what: bytes) -> bytes | None:
-        """The answer; None if there is none in time, or never will be."""
+        """The answer of the process; None if none comes within the time-out."""
         with self._requesting:
             self._number += 1
             number = b"%d" % self._number
-            with suppress(OSError):  # it may have ended just now, and what it said before is still to be read
+            with suppress(OSError):  # if the process has just ended, its earlier messages can still be read
                 self._channel.send_bytes(number + b" " + what)
             try:
                 until_s = monotonic() + _ANSWER_S
@@ -169,7 +169,7 @@ class Supervisor:
                     if tag == END:
                         self._last = json.loads(content)
                         self._final_status_came = True
-                    elif tag == number:  # others came too late for those who asked
+                    elif tag == number:  # other numbers answer requests that timed out
                         return content
             except (EOFError, OSError):
                 self._channel.close()
@@ -177,7 +177,7 @@ class Supervisor:
 
 
 def _continued(job: Job, start: int) -> Job:
-    """The same job for process number `start`: parts and recordings go on, nothing else is written over."""
+    """The job for process number `start`: parts and recordings continue, other outputs get new names."""
     extras = job.extras
     return replace(
         job,
