@@ -39,8 +39,8 @@ class _TokenAuthentication:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         given = _given_token(Headers(scope=scope).get("authorization", ""))
-        knows = hmac.compare_digest(given, self._token)  # takes constant time
-        app = self._app if knows else PlainTextResponse("the token is missing or wrong\n", 401, _ASK)
+        granted = hmac.compare_digest(given, self._token)  # takes constant time
+        app = self._app if granted else PlainTextResponse("the token is missing or wrong\n", 401, _ASK)
         await app(scope, receive, send)
 
 

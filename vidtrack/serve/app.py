@@ -28,7 +28,7 @@ _PICTURE_S = 0.2  # least time between two pictures of a camera
 class Answers:
     """The page over `cameras` by name, and the same for other programs.
 
-    Status and pictures are made when somebody asks, once for all who do.
+    Status and pictures are computed on request, and shared by simultaneous requests.
     """
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
