@@ -79,7 +79,7 @@ class Chains:
         order = np.lexsort((centre[:, 0], frame))
         frame, centre, size, rank = frame[order], centre[order], box[order, 2:], rank[order]
         start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
-        after, before = _likes(start, centre, size, 1), _likes(start, centre, size, -1)
+        after, before = _matches(start, centre, size, 1), _matches(start, centre, size, -1)
         neighbours = (frame > frame[0]).astype(float) + (frame < frame[-1])
         found = ((after >= 0).astype(float) + (before >= 0)) / np.maximum(neighbours, 1)
         follower = np.where((after >= 0) & (before[after] == np.arange(len(after))), after, -1)
@@ -154,12 +154,12 @@ def _motion(
 
 
 @kernel
-def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
+def _matches(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
     """(N,) nearest match of each box in the frame `step` away, -1 for none.
 
     Boxes start[k]..start[k + 1] are those of frame k, sorted by the x of their centres.
     """
-    like = np.full(len(centre), -1)
+    matched = np.full(len(centre), -1)
     frames = len(start) - 1
     for k in range(max(0, -step), min(frames, frames - step)):
         others = centre[start[k + step] : start[k + step + 1], 0]
@@ -175,8 +175,8 @@ def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
                 for axis in range(2):
                     alike &= size[i, axis] < ALIKE * size[j, axis] and size[j, axis] < ALIKE * size[i, axis]
                 if alike and dx * dx + dy * dy < nearest:
-                    nearest, like[i] = dx * dx + dy * dy, j
-    return like
+                    nearest, matched[i] = dx * dx + dy * dy, j
+    return matched
 
 
 @kernel

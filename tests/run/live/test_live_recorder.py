@@ -66,7 +66,7 @@ def test_a_part_that_ends_before_its_first_frame_is_tracked_ends_no_other(tape, 
 
 
 @pytest.mark.parametrize("in_time", [True, False])
-def test_a_film_is_never_closed_while_a_packet_is_written(tape, monkeypatch, caplog, in_time):
+def test_a_file_is_never_closed_while_a_packet_is_written(tape, monkeypatch, caplog, in_time):
     entered, answer, did = Event(), Event(), []
 
     def take(*_):
