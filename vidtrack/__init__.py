@@ -1,7 +1,7 @@
 """Vehicle tracks from traffic video and radar plots, on a plain CPU, without a neural network.
 
-Names are imported when they are first used: `vidtrack --help` needs none of them. The block below is for type checkers
-and editors, `_HOME` for the interpreter.
+Names are imported on first use, so that `vidtrack --help` loads none of them. The block below serves type checkers and
+editors, `_HOME` the interpreter.
 """
 
 from importlib import import_module

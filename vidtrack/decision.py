@@ -1,4 +1,4 @@
-"""What an associator decides, and the reasons that are kept of it."""
+"""The decision of an associator, and its reasons."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What an associator decided: how K successor rows come from T rows and M measurements.
+    """The association of one scan: how K successor rows follow from T rows and M measurements.
 
     parent     (K,) the row each successor continues; 0..T-1 for one-scan methods
     row, measurement, beta   (B,) sparse weights over (successor, measurement), sorted by row
     beta0      (K,) weight of "not detected"; with the betas of its row it sums to one
-    inflation  (K,) how much a miss widens the row: the missed branch has P + inflation K S K' (PDA, PSNF); None: zero
-    spread     whether the scatter of the weighted measurements widens the row; generalized nearest neighbour uses
-               their mean as if it were one measurement
-    approximate  (K,) rows with approximate weights, because their cluster is too large for exact ones; None: no row
+    inflation  (K,) factor by which a miss inflates P: the missed branch has P + inflation K S K' (PDA, PSNF); None: 0
+    spread     whether the spread of the weighted measurements is added to P; generalized nearest neighbour uses
+               their mean as one measurement
+    approximate  (K,) rows with approximate weights, in clusters too large for exact ones; None: no row
     """
 
     parent: Ints
@@ -44,7 +44,7 @@ class Decision:
         return Decision(self.parent, row, measurement, beta, beta0, inflation, self.spread, self.approximate)
 
     def joined(self, other: Decision) -> Decision:
-        """Both decisions about disjoint sets of rows as one."""
+        """The union of two decisions about disjoint sets of rows."""
         row = np.concatenate([self.row, other.row])
         order = np.argsort(row, kind="stable")
         return Decision(
@@ -60,7 +60,7 @@ class Decision:
 
 
 def _chosen(theirs: Ints, other: Any, own: Any) -> Any:
-    """`own` with the values of `other` in the rows `theirs` (B,); None if the method has no such values."""
+    """`own` with the values of `other` in the rows `theirs` (B,); None if `own` is None."""
     if own is None:
         return None
     chosen = own.copy()
@@ -69,7 +69,7 @@ def _chosen(theirs: Ints, other: Any, own: Any) -> Any:
 
 
 class Event(NamedTuple):
-    """A change in a track's life, with its reason in words."""
+    """A change of a track's status, with its reason in words."""
 
     t: float
     track_id: int
@@ -84,10 +84,10 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What was decided for each track of a scan, for `--decisions`. -1 and NaN where there is none.
+    """The choice made for each track of a scan, for `--decisions`. -1 and NaN: none.
 
     track_id, measurement, weight, d2, gate, runner_up, runner_up_d2   (T,)
-    candidates, candidates_weight, candidates_d2   (T, C) what the gate admits, the C heaviest
+    candidates, candidates_weight, candidates_d2   (T, C) the C measurements of largest weight in the gate
     """
 
     track_id: Ints
@@ -102,5 +102,5 @@ class Choices:
     candidates_d2: Floats
 
     def only(self, rows: NDArray[Any]) -> Choices:
-        """The rows of a mask or of indices."""
+        """The rows selected by a mask or by indices."""
         return Choices(*(getattr(self, column.name)[rows] for column in fields(self)))

@@ -1,4 +1,4 @@
-"""What a sensor hands to the tracker."""
+"""The input of the tracker: the measurements of one time."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What a sensor saw at one time.
+    """The measurements of a sensor at one time.
 
     t          time [s]
     z          (M, m) measurements, pixels or metres (radians for angles)
-    R          (M, m, m) their covariances; (m, m) is taken for all of them
-    sensor     the measurement model; None is "z is the position"
-    noise      (m, m) covariance that a missed measurement would have had; some updates after a miss depend on it.
-               None: R where one is given for all, else the mean of R, and nothing in an empty scan
+    R          (M, m, m) their covariances; (m, m) applies to all
+    sensor     the measurement model; None: z is the position
+    noise      (m, m) covariance of a missed measurement, which some updates after a miss need.
+               None: R if one is given for all, else the mean of R; in an empty scan none
     box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre); see `box_scan`
     amplitude  (M,) signal strength in units of the noise
     score      (M,) detector confidence
-    label      (M,) class, -1 unknown; a track whose class is known takes no measurement of another
+    label      (M,) class, -1 unknown; a track of known class takes no measurement of another class
     lasting    (M, m, m) the part of R due to errors that persist from scan to scan; None: all are independent
-    run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form within equal runs only
-    surveyed   (4,) left, top, right, bottom of what the sensor could see; None: the tracker's own bounds
-    pixel      size of the sensor's pixel in the units of z, where there is one
+    run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form only within a run
+    surveyed   (4,) left, top, right, bottom of the sensor's field of view; None: the tracker's bounds
+    pixel      size of the sensor's pixel in units of z
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
     definite, boxes of negative size, and runs below 0.
@@ -54,10 +54,10 @@ class Scan:
     pixel: float = 1.0
 
     def __post_init__(self) -> None:
-        from vidtrack.arrays.checks import check_covariances, check_measurements  # loads the compiler; types do without
+        from vidtrack.arrays.checks import check_covariances, check_measurements  # loads the compiler
 
         z, R = np.asarray(self.z, dtype=float, order="C"), np.asarray(self.R, dtype=float, order="C")
-        if z.shape == (0,):  # an empty list does not say how many components its measurements have
+        if z.shape == (0,):  # an empty list has no number of components
             z = z.reshape(0, *R.shape[-1:])
         if z.ndim != 2:
             raise ScanError(f"z must be (M, m), not {z.shape}; a single measurement is z[None]")
@@ -75,7 +75,7 @@ class Scan:
             noise = R.sum(axis=0) / count
         if noise is not None and noise.shape != (dim, dim):
             raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
-        if noise is not None and (self.noise is not None or not count):  # not checked as part of R
+        if noise is not None and (self.noise is not None or not count):  # otherwise checked as part of R
             check_covariances(noise[None], "R" if self.noise is None else "noise")
         object.__setattr__(self, "noise", noise)
         object.__setattr__(self, "t", float(self.t))
@@ -114,7 +114,7 @@ class Scan:
         return len(self.z)
 
     def weakened(self, inflation: float) -> Scan:
-        """The scan with the lasting part of R multiplied by `inflation`, as a filter's update needs it."""
+        """The scan with the lasting part of R multiplied by `inflation`, for a filter's update."""
         if self.lasting is None:
             return self
         weak = copy(self)  # without validating it again

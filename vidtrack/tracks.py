@@ -1,4 +1,4 @@
-"""Tracks as the tracker shows them after each scan: a snapshot in arrays."""
+"""The output of the tracker: a snapshot of all tracks after each scan, in arrays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vidtrack.decision import Choices, Event
 
 
 class Status(IntEnum):
-    """Where a track is in its life."""
+    """Status of a track in its life cycle."""
 
     TENTATIVE = 0
     CONFIRMED = 1
@@ -23,7 +23,7 @@ class Status(IntEnum):
 
 
 TENTATIVE, CONFIRMED, COASTING, MERGED = (int(status) for status in Status)
-"""The statuses as plain integers, with which NumPy compares ten times as fast as with members of an enumeration."""
+"""The statuses as plain integers: NumPy compares these ten times as fast as members of an enumeration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,20 +34,20 @@ class Tracks:
     id             (T,) never reused
     status         (T,) values of Status
     x, P           (T, n), (T, n, n) state mean and covariance
-    box            (T, 4) left, top, width, height, absolute; NaN where the sensor has no boxes
-    group          (T,) tracks that share one blob have the same number >= 0; -1 alone
-    group_since_s  (T,) time the group was formed; NaN alone
+    box            (T, 4) left, top, width, height, absolute; NaN if the sensor has no boxes
+    group          (T,) number >= 0 common to tracks that share one blob; -1: not shared
+    group_since_s  (T,) time the group was formed; NaN: not shared
     age_s          (T,) seconds since the track's first measurement
-    travel         (T,) distance from where the track began
+    travel         (T,) distance from the track's first position
     existence      (T,) probability that the track is a target
-    measurement    (T,) index of the heaviest measurement of this scan; -1 for none
+    measurement    (T,) index of this scan's measurement of largest weight; -1 for none
     nis            (T,) normalised innovation squared of this update; NaN for none
     position, velocity   columns of x, one per axis
     run            (T,) Monte Carlo run
     events         births, confirmations, merges, splits and deletions of this scan
-    choices        why each track took its measurement; None unless the tracker was told to explain
+    choices        reasons of the association; None unless the tracker has `explain`
     prior_x, prior_P, gain   (T, n), (T, n, n), (T, n, n) for smoothing, else None: the prediction for this scan, and
-                   the smoother's gain P F' prior_P^-1 from the snapshot before; NaN for tracks that are new in this one
+                   the smoother's gain P F' prior_P^-1 from the previous snapshot; NaN for new tracks
     """
 
     t: float
@@ -76,13 +76,13 @@ class Tracks:
         return len(self.id)
 
     def only(self, rows: NDArray[Any]) -> Tracks:
-        """The tracks of a mask or of indices."""
+        """The tracks selected by a mask or by indices."""
         columns = {column.name: getattr(self, column.name) for column in fields(self)}
         return replace(self, **{name: value[rows] for name, value in columns.items() if isinstance(value, np.ndarray)})
 
     @property
     def seen(self) -> Mask:
-        """(T,) whether this scan shows the track, alone or in a blob it shares."""
+        """(T,) whether the track has a measurement in this scan, its own or a shared one."""
         return np.asarray((self.measurement >= 0) | (self.status == MERGED))
 
     @property

@@ -1,1 +1,1 @@
-"""What arrays are in all parts: their types, maps of the plane, rows, and the checks of what users give."""
+"""Arrays: their types, affine maps, sorted rows, and checks of user input."""

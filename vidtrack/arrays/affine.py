@@ -1,4 +1,4 @@
-"""Maps of the plane, (2, 3) matrices: how the scene, the picture and a detector's canvas lie on each other."""
+"""Affine maps of the plane, (2, 3) matrices, between the scene, the picture and a detector's canvas."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ IDENTITY: Floats = np.eye(2, 3)
 
 @kernel
 def after(second: Floats, first: Floats) -> Floats:
-    """The map that does `first`, then `second`."""
+    """The composition: `first`, then `second`."""
     both = np.empty((2, 3))
     for i in range(2):
         for j in range(3):
@@ -25,7 +25,7 @@ def after(second: Floats, first: Floats) -> Floats:
 
 @kernel
 def inverse(plane: Floats) -> Floats:
-    """The map back."""
+    """The inverse map."""
     (a, b, x), (c, d, y) = plane
     determinant = a * d - b * c
     back = np.empty((2, 3))
@@ -35,13 +35,13 @@ def inverse(plane: Floats) -> Floats:
 
 
 def shift(x: float, y: float) -> Floats:
-    """A displacement."""
+    """The translation by (x, y)."""
     return np.array([[1.0, 0.0, x], [0.0, 1.0, y]])
 
 
 @kernel
 def rescaled(plane: Floats, factor: float) -> Floats:
-    """The same map where each pixel is replaced by factor x factor smaller ones; pixels are unit squares."""
+    """The same map for pixels divided into factor x factor smaller ones; pixels are unit squares."""
     offset = (factor - 1) / 2
     fine = plane.copy()
     for i in range(2):
@@ -50,19 +50,19 @@ def rescaled(plane: Floats, factor: float) -> Floats:
 
 
 def points(plane: Floats, xy: Floats) -> Floats:
-    """(N, 2) where points go."""
+    """(N, 2) images of points (N, 2)."""
     return xy @ plane[:, :2].T + plane[:, 2]
 
 
 def boxes(plane: Floats, box: Floats) -> Floats:
-    """(N, 4) boxes left, top, width, height: their centres are moved, their sides scaled and never turned."""
+    """(N, 4) boxes left, top, width, height: centres are mapped, sides are scaled and stay axis-parallel."""
     size = box[:, 2:] * scale(plane)
     centre = points(plane, box[:, :2] + (box[:, 2:] - 1) / 2)  # a box covers whole pixels around their centres
     return np.hstack([centre - (size - 1) / 2, size])
 
 
 def scale(plane: Floats) -> float:
-    """By how much lengths grow."""
+    """The scale factor of lengths."""
     return math.sqrt(abs(plane[0, 0] * plane[1, 1] - plane[0, 1] * plane[1, 0]))
 
 
@@ -73,7 +73,7 @@ def corners(width: float, height: float) -> Floats:
 
 @kernel
 def displacement(plane: Floats, width: float, height: float, since: Floats = IDENTITY) -> float:
-    """px; how far the map moves that corner of a picture which it moves most, compared with another map."""
+    """px; largest displacement of a picture's corner between this map and `since`."""
     off = plane - since
     most = 0.0
     for i in range(2):

@@ -1,4 +1,4 @@
-"""What filters can work with: numbers that are finite, covariances that are positive definite."""
+"""Checks of measurements and states: finite numbers, positive definite covariances."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @kernel
 def _surely_usable(z: Floats, R: Floats) -> bool:
-    """Whether all measurements in the plane are finite and their covariances clearly positive definite."""
+    """Fast sufficient check: all measurements in the plane are finite and their covariances positive definite."""
     for i in range(len(z)):
         xx, yy, xy = R[i, 0, 0], R[i, 1, 1], R[i, 0, 1]
         finite = np.isfinite(z[i, 0]) and np.isfinite(z[i, 1]) and np.isfinite(xx + yy + xy)
@@ -25,7 +25,7 @@ def _surely_usable(z: Floats, R: Floats) -> bool:
 
 
 def check_measurements(z: Floats, R: Floats) -> None:
-    """Raise ScanError naming the first measurement that is not finite or has no valid covariance."""
+    """Raise ScanError naming the first measurement that is not finite or has an invalid covariance."""
     if z.shape[1] == 2 and _surely_usable(z, R):
         return
     finite = np.isfinite(z).all(axis=1) & np.isfinite(R).all(axis=(1, 2))
@@ -36,18 +36,18 @@ def check_measurements(z: Floats, R: Floats) -> None:
 
 
 def check_states(x: Floats, P: Floats) -> None:
-    """Raise ScanError naming the first of the states x (B, n), P (B, n, n) that no filter could go on from."""
+    """Raise ScanError naming the first invalid state of x (B, n), P (B, n, n)."""
     finite = np.isfinite(x).all(axis=1)
     if not finite.all():
         i = int(np.argmin(finite))
         raise ScanError(f"state {i} is not finite: {x[i]}")
-    check_covariances(P, "P of state {}", least=-1e-9)  # a part of a state may be known exactly
+    check_covariances(P, "P of state {}", least=-1e-9)  # a component may be known exactly
 
 
 def check_covariances(R: Floats, name: str, least: float = 1e-14) -> None:
     """Raise ScanError for the first of R (B, m, m) that is not a covariance; {} in `name` becomes its index.
 
-    least  share of the largest element that every eigenvalue must exceed
+    least  every eigenvalue must exceed this share of the largest element
     """
     finite = np.isfinite(R).all(axis=(1, 2))
     if not finite.all():
@@ -58,7 +58,7 @@ def check_covariances(R: Floats, name: str, least: float = 1e-14) -> None:
     if not symmetric.all():
         i = int(np.argmin(symmetric))
         raise ScanError(f"{name.format(i)} is not symmetric: {R[i].tolist()}")
-    if R.shape[1] == 2:  # the common case without a decomposition
+    if R.shape[1] == 2:  # the common case, in closed form
         determinant = R[:, 0, 0] * R[:, 1, 1] - R[:, 0, 1] * R[:, 1, 0]
         positive = (R[:, 0, 0] > least * scale) & (determinant > least * scale**2)
     else:

@@ -1,4 +1,4 @@
-"""Entries that are sorted by row."""
+"""Sparse entries sorted by row."""
 
 from __future__ import annotations
 

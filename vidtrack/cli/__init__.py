@@ -1,4 +1,4 @@
-"""What the user types. Each command is a module of its own, imported when it is called."""
+"""The command line. Each command is a module, imported when it is called."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ COMMANDS = {
 
 
 class _Commands(click.Group):
-    """Imports only the command that is called, so that help answers at once."""
+    """Imports only the called command, so that --help is fast."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -73,20 +73,20 @@ def main() -> None:
     try:
         code = cli.main(prog_name="vidtrack", standalone_mode=False)
     except Error as error:
-        code = _complain(str(error), error.exit_code)
+        code = _report_error(str(error), error.exit_code)
     except click.ClickException as error:
         error.show()
         code = 2
     except (KeyboardInterrupt, click.Abort):
-        code = _complain("interrupted", 130)
+        code = _report_error("interrupted", 130)
     except Terminated:
-        code = _complain("terminated", 143)
-    except OSError as error:  # a full disk or a read-only folder where no module gave a better message
+        code = _report_error("terminated", 143)
+    except OSError as error:  # for example a full disk or a read-only folder, without a more specific error
         place = f" {error.filename}" if error.filename else ""
-        code = _complain(f"cannot read or write{place}: {error.strerror or error}", 1)
+        code = _report_error(f"cannot read or write{place}: {error.strerror or error}", 1)
     sys.exit(code)
 
 
-def _complain(message: str, code: int) -> int:
+def _report_error(message: str, code: int) -> int:
     click.echo(f"vidtrack: {message}", err=True)
     return code

@@ -1,4 +1,4 @@
-"""`vidtrack calibrate`: what the calibration of a site is worth."""
+"""`vidtrack calibrate`: the accuracy of a site's calibration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateOptions(Options):
-    """What `vidtrack calibrate` is told."""
+    """Options of `vidtrack calibrate`."""
 
     site: Path
     picture: str | None
@@ -72,7 +72,7 @@ def command(options: CalibrateOptions) -> int:
 
 
 def _first_picture(source: str) -> Image:
-    """(H, W, 3) of an image, or the first of a video."""
+    """(H, W, 3) an image, or the first frame of a video."""
     from vidtrack.config.settings import SourceSettings
     from vidtrack.video.source import open_source
 

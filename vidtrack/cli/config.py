@@ -11,7 +11,7 @@ from vidtrack.cli.options import WithSettings, common, receives, settings_option
 
 @dataclass(frozen=True, kw_only=True)
 class ConfigOptions(WithSettings):
-    """What `vidtrack config` is told."""
+    """Options of `vidtrack config`."""
 
     explain: bool
 

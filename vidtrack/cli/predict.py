@@ -1,4 +1,4 @@
-"""`vidtrack predict`: how good a radar track will be in clutter."""
+"""`vidtrack predict`: the expected error of a radar track in clutter."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NAMES = {
 
 @dataclass(frozen=True, kw_only=True)
 class PredictOptions(ProblemOptions):
-    """What `vidtrack predict` is told."""
+    """Options of `vidtrack predict`."""
 
     kind: Literal["psn", "pda"]
     pfa: float
@@ -98,7 +98,7 @@ def _content(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
 
 
 def _columns(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
-    """Name and numbers of each curve there is."""
+    """Name and values of each curve."""
     columns = {name: error for name, error in outlook.error.items() if error is not None}
     if tried is not None:
         columns["actual_all"] = tried.actual_all

@@ -1,4 +1,4 @@
-"""`vidtrack radar`: a table of radar plots becomes tracks."""
+"""`vidtrack radar`: tracks a table of radar plots."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vidtrack.config import names
 
 @dataclass(frozen=True, kw_only=True)
 class RadarOptions(TrackingOptions):
-    """What `vidtrack radar` is told."""
+    """Options of `vidtrack radar`."""
 
     plots: str
     seed: int

@@ -1,4 +1,4 @@
-"""Options that state a radar problem: the target, its surroundings, and how clutter is distributed."""
+"""Options that define a radar problem: the target, its noise and gate, and the distribution of clutter."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ProblemOptions(Options):
     weibull: Weibull | None
 
     def snr(self) -> float:
-        """The linear SNR. Raises ConfigError for one that is no number, or too high to mean anything."""
+        """The linear SNR. Raises ConfigError if it is not a number or is too high."""
         from math import isfinite
 
         from vidtrack.amplitude.densities import linear
@@ -61,7 +61,7 @@ class ProblemOptions(Options):
 
 
 def problem_options(function: Function) -> Function:
-    """--q, --gate, --cell, --weibull: what both radar commands ask about the target and its surroundings."""
+    """--q, --gate, --cell, --weibull, common to both radar commands."""
     for option in (
         weibull_option,
         click.option("--cell", default=0.1, show_default=True, help="Volume of a resolution cell, units of r."),

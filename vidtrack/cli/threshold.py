@@ -1,4 +1,4 @@
-"""`vidtrack threshold`: where to set a radar's detection threshold."""
+"""`vidtrack threshold`: the best detection threshold of a radar."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MEANING = {
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdOptions(ProblemOptions):
-    """What `vidtrack threshold` is told."""
+    """Options of `vidtrack threshold`."""
 
     kind: str
     cells: float | None

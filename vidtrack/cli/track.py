@@ -1,4 +1,4 @@
-"""`vidtrack track`: a video, an image folder or stored detections become tracks."""
+"""`vidtrack track`: tracks a video, an image folder or stored detections."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.cli.tracking import PictureOptions, finish, picture_options, smoot
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions(PictureOptions):
-    """What `vidtrack track` is told."""
+    """Options of `vidtrack track`."""
 
     source: str
     smooth: bool | None

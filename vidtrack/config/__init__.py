@@ -1,1 +1,1 @@
-"""All settings: their groups and defaults (`settings.py` first), and how they are read (`load.py`)."""
+"""All settings: groups and defaults (read `settings.py` first), and their reader (`load.py`)."""

@@ -1,4 +1,4 @@
-"""The settings as a TOML file, each with its meaning, unit and range."""
+"""Writes the settings as a TOML file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _toml_group(group: BaseModel, path: str, explain: bool) -> list[str]:
 def _toml_value(value: Any) -> str:
     if isinstance(value, Path):
         value = str(value)
-    return json.dumps(value, ensure_ascii=False)  # TOML spells booleans, numbers, strings and lists as JSON does
+    return json.dumps(value, ensure_ascii=False)  # booleans, numbers, strings and lists are equal in TOML and JSON
 
 
 def _range(info: FieldInfo) -> str:

@@ -1,4 +1,4 @@
-"""Which settings have an effect on which kind of input."""
+"""The settings that have an effect on each kind of input."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Input(StrEnum):
-    """What is tracked, as messages name it."""
+    """Kinds of input; the values are their names in messages."""
 
     VIDEO = "a video"
     CAMERA = "a camera"
@@ -22,7 +22,7 @@ _OWN = {
     Input.DETECTIONS: ("detections",),
     Input.RADAR: ("radar",),
 }
-"""The groups that are for one kind of input alone; `source`, `tracker` and `output` are shared."""
+"""Groups for one kind of input only; `source`, `tracker` and `output` are common."""
 
 _OF_PICTURES = (
     *("tracker.box_s", "tracker.confirm_s", "tracker.confirm_travel", "tracker.detection_probability"),
@@ -46,7 +46,7 @@ _UNREAD = {
         *("output.lines", "output.site", "output.link", "output.link_s", "output.trail_s", "output.rerun_picture_s"),
     ),
 }
-"""Groups and settings that an input does not read."""
+"""Groups and settings without effect on an input."""
 
 _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "detector.disturbance": ("detector.kind", ("disturbance",)),
@@ -77,18 +77,18 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
     "output.smooth_lag_s": ("output.smooth", (True,)),
 }
-"""Groups and settings that have an effect only where another setting has one of these values."""
+"""Groups and settings that have an effect only if another setting has one of these values."""
 _OTHER_LIFE = {Input.RADAR: "radar.life"}
 
 
 def reads(kind: Input, name: str) -> bool:
-    """Whether an input of that kind reads the setting."""
+    """Whether the setting has an effect on this kind of input."""
     return not any(_is_within(name, unread) for unread in _UNREAD[kind])
 
 
 def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Other settings without which this one has no effect, each with the values that it must have."""
-    if name == "output.link_s":  # stored detections are linked unless told otherwise
+    """Settings on which the effect of this one depends, each with its required values."""
+    if name == "output.link_s":  # stored detections are linked by default
         yield "output.link", (True, None) if kind is Input.DETECTIONS else (True,)
     for part, (other, values) in _NEEDS.items():
         if _is_within(name, part):
@@ -96,7 +96,7 @@ def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def is_own(kind: Input, name: str) -> bool:
-    """Whether the setting is in a group that is for that kind of input alone."""
+    """Whether the setting is in a group for this kind of input only."""
     return any(_is_within(name, group) for group in _OWN[kind])
 
 

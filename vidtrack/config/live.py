@@ -11,21 +11,21 @@ class LiveSettings(Group):
     """Cameras and streams."""
 
     timeout_s: float = Field(5.0, gt=0, le=300)
-    """s; opening or reading that takes longer is given up and begun anew"""
+    """s; longest time to open or read, then the connection is opened again"""
     backoff_s: float = Field(1.0, gt=0)
-    """s; pause before the second attempt to connect, doubled with every further one"""
+    """s; pause before the second attempt to connect, doubled at each further attempt"""
     backoff_longest_s: float = Field(30.0, gt=0)
     """s; longest pause between two attempts"""
     roll_s: float | None = Field(None, gt=0)
-    """s; by the clock, after which results go on in a new sub-folder; None: never, or hourly if live.keep_* is set"""
+    """s; length of a sub-folder of results, aligned to the clock; None: one folder, or hourly if live.keep_* is set"""
     keep_s: float | None = Field(None, gt=0)
-    """s; sub-folders that are older are deleted; None: none are"""
+    """s; older sub-folders are deleted; None: no limit"""
     keep_bytes: float | None = Field(None, ge=1e6)
-    """bytes that results and recordings may take together; the oldest are deleted; None: no limit"""
+    """bytes; limit of results and recordings together, beyond which the oldest are deleted; None: no limit"""
     every_frame: bool = False
-    """every frame is tracked, and a tracker that is too slow falls behind; false: the newest one, others are dropped"""
+    """track every frame, and fall behind if the machine is too slow; false: track the newest and drop others"""
     ffmpeg: tuple[str, ...] = ()
-    """NAME=VALUE options for opening, such as rtsp_transport=udp, video_size=1280x720 or input_format=mjpeg"""
+    """NAME=VALUE options of FFmpeg, such as rtsp_transport=udp, video_size=1280x720 or input_format=mjpeg"""
 
     @field_validator("ffmpeg")
     @classmethod

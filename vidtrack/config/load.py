@@ -1,6 +1,6 @@
-"""Reads settings: from defaults, then a TOML file, then `--set a.b=value`.
+"""Reads settings from defaults, then a TOML file, then `--set a.b=value`.
 
-A wrong key or value fails at once with the nearest name or the allowed range.
+The error for a wrong key or value contains the nearest name or the allowed range.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from vidtrack.config.group import read_toml
 from vidtrack.config.inputs import Input, is_own, needs, reads
 from vidtrack.config.settings import Settings
-from vidtrack.config.toml_file import read_toml
 from vidtrack.errors import ConfigError
 
 
@@ -25,13 +25,13 @@ def load(
     base: Mapping[str, Any] | None = None,
     kind: Input | None = None,
 ) -> Settings:
-    """Settings from defaults, a TOML file and assignments ("a.b=value" or a name with its value), later ones winning.
+    """Settings from defaults, a TOML file and assignments ("a.b=value" or (name, value)); later ones take precedence.
 
     base  nested settings between the defaults and the file
-    kind  of the input: settings that have no effect on it are refused; None: not known, and nothing is refused
+    kind  of the input: settings without effect on it are refused; None: unknown, nothing is refused
 
-    A file may hold groups for other kinds of input, and settings at their defaults.
-    Raises ConfigError for an unreadable file, an unknown key (naming the nearest), a bad value, or one without effect.
+    A file may contain groups for other kinds of input, and settings at their defaults.
+    Raises ConfigError for an unreadable file, an unknown key, a bad value, or a setting without effect.
     """
     filed = {} if path is None else read_toml(Path(path), "settings")
     assigned = [_split(one) if isinstance(one, str) else one for one in assignments]
@@ -57,14 +57,14 @@ def parse(tree: Mapping[str, Any]) -> Settings:
 
 
 def merged(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested settings: `tree` where it says something, `base` elsewhere."""
+    """Nested settings: `base` overridden by `tree`."""
     both = dict(base) | dict(tree)
     groups = (name for name in tree if isinstance(base.get(name), dict) and isinstance(tree[name], dict))
     return both | {name: merged(base[name], tree[name]) for name in groups}
 
 
 def value_of(settings: BaseModel, name: str) -> Any:
-    """The setting with that dotted name."""
+    """The value of a setting by its dotted name."""
     value: Any = settings
     for part in name.split("."):
         value = getattr(value, part)
@@ -72,7 +72,7 @@ def value_of(settings: BaseModel, name: str) -> Any:
 
 
 def _refuse_idle(kind: Input, settings: Settings, asked: Iterable[str]) -> None:
-    """Raise ConfigError for settings that were asked for and have no effect on that kind of input."""
+    """Raise ConfigError for given settings that have no effect on this kind of input."""
     complaints = []
     for name in asked:
         missing = [(other, values) for other, values in needs(kind, name) if value_of(settings, other) not in values]
@@ -89,7 +89,7 @@ def _refuse_idle(kind: Input, settings: Settings, asked: Iterable[str]) -> None:
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:
-    """What to suggest instead: the setting of the same name in another group, or of a similar one."""
+    """The name to suggest: the same name in another group, or a similar name."""
     of_last: dict[str, str] = {}
     for other in known:
         of_last.setdefault(other.rpartition(".")[2], other)
@@ -118,7 +118,7 @@ def _split(assignment: str) -> tuple[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """A TOML value, or the bare text: `--set tracker.method=nn` needs no quotes."""
+    """A TOML value, else the text itself: `--set tracker.method=nn` needs no quotes."""
     if text.lower() in ("none", "null"):
         return None
     try:
@@ -137,7 +137,7 @@ def _assign(tree: dict[str, Any], keys: list[str], value: Any) -> None:
 
 
 def _complaint(detail: Any) -> str:
-    """One line for one mistake: the setting, what was given, what is allowed."""
+    """One line per error: the setting, its value, and the allowed values."""
     path = [str(part) for part in detail["loc"]]
     name = ".".join(path)
     if detail["type"] == "extra_forbidden":

@@ -1,4 +1,4 @@
-"""What users choose by name: each list once, for the settings, the command line, and what makes the thing named."""
+"""Names of the available methods, filters and detectors, for settings, command line and factories."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ class RadarSettings(Group):
     """Radar plots: metres, seconds, degrees; x east, y north, z up, azimuth clockwise from north."""
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """m; x, y, z of the radar, added to what it measures in range and azimuth"""
+    """m; x, y, z of the radar, the origin of range and azimuth"""
     sigma_range_m: float = Field(50.0, gt=0)
     """m; standard deviation of a range where the file has no column sigma_range_m"""
     sigma_azimuth_deg: float = Field(0.3, gt=0, le=45)
@@ -24,7 +24,7 @@ class RadarSettings(Group):
     sigma_doppler_m_s: float = Field(2.0, gt=0)
     """m/s; the same of a range rate"""
     skip_bad_rows: bool = False
-    """rows that cannot be right are left out and counted; false: they end the run"""
+    """invalid rows are left out and counted; false: they end the run"""
     estimator: Estimator = "kalman"
     """kalman, converted: plots become unbiased positions; ekf, ukf, particle: range and angles stay; imm: two models"""
     model: Model = "cv"
@@ -32,7 +32,7 @@ class RadarSettings(Group):
     detection_probability: float | None = Field(0.9, gt=0, lt=1)
     """probability that a scan shows a target; None: from the tracks so far"""
     clutter_density: float | None = Field(None, gt=0)
-    """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from what the tracks leave"""
+    """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from unassociated plots"""
     max_speed: float = Field(400.0, gt=0)
     """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
     accel: float = Field(8.0, gt=0)
@@ -56,6 +56,6 @@ class RadarSettings(Group):
     life: Life = "llr"
     """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
     coast_scans: int = Field(5, ge=1, le=62)
-    """a track is given up after this many scans without a plot"""
+    """a track ends after this many scans without a plot"""
     trail_s: float = Field(60.0, ge=0)
-    """s; how far back the trail behind a target reaches in rerun"""
+    """s; length of a target's trail in rerun"""

@@ -1,6 +1,6 @@
-"""Settings: frozen, typed, in seconds, pixels and probabilities; `None` means "take it from the data".
+"""Settings: frozen, typed, in seconds, pixels and probabilities; None: estimated from the data.
 
-`load.py` reads them. `vidtrack config --explain` prints the descriptions in this folder.
+`load.py` reads them. `vidtrack config --explain` prints their docstrings.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ class SourceSettings(Group):
     end_s: float | None = Field(None, ge=0)
     """s; frames after this media time are skipped; None: to the end"""
     fps: float | None = Field(None, gt=0, le=1000)
-    """frames/s where the input carries no times or wrong ones; None: the video's own, seqinfo.ini's, else 25"""
+    """frames/s if the input has no times or wrong ones; None: from the video or seqinfo.ini, else 25"""
     scale: float | None = Field(None, gt=0, le=1)
     """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 580 rows"""
     mask: Path | None = None
-    """picture whose white part is kept; None: everything"""
+    """picture whose white part is tracked; None: everything"""
 
     @field_validator("end_s")
     @classmethod
@@ -45,13 +45,13 @@ class DetectionSettings(Group):
     jitter: float | None = Field(None, gt=0)
     """object sizes; standard deviation of a box's centre; None: from the file (differences along chains of boxes)"""
     accel: float | None = Field(None, gt=0)
-    """object sizes/s^2; tracker.accel for them, and in proportion tracker.cross; None: as for jitter"""
+    """object sizes/s^2; replaces tracker.accel, and tracker.cross in proportion; None: from the file"""
     confirm_hits: int = Field(4, ge=1, le=63)
-    """M: hits within the window that confirm a track, the first one counted; confirm_s, confirm_travel do not apply"""
+    """M: hits within the window that confirm a track, with the first; confirm_s, confirm_travel do not apply"""
     confirm_window: int = Field(6, ge=1, le=63)
     """N: scans of the window"""
     detection_probability: float | None = Field(0.8, ge=0, le=1)
-    """probability that a frame shows an object, tracker.detection_probability for them; None: from the tracks so far"""
+    """probability that a frame shows an object, replaces tracker.detection_probability; None: from earlier tracks"""
     box_s: float = Field(0.05, gt=0)
     """s; time constant with which a track's box follows its detections' boxes"""
 
@@ -78,9 +78,9 @@ class TrackerSettings(Group):
     speed: float = Field(4.0, gt=0)
     """object sizes/s; standard deviation of a new vehicle's unknown velocity"""
     life: Life = "m-of-n"
-    """what confirms a track: M hits within N scans, or its log-likelihood ratio (llr), which also ends it"""
+    """confirmation of a track: M hits within N scans, or its log-likelihood ratio (llr), which also ends it"""
     confirm_hits: int = Field(3, ge=1, le=63)
-    """M: hits within the window that confirm a track, the first one counted"""
+    """M: hits within the window that confirm a track, with the first"""
     confirm_window: int = Field(4, ge=1, le=63)
     """N: scans of the window"""
     false_track: float = Field(1e-3, ge=1e-8, lt=0.5)
@@ -88,31 +88,31 @@ class TrackerSettings(Group):
     missed_track: float = Field(1e-4, ge=1e-8, lt=0.5)
     """llr: probability that the track of a real object is deleted"""
     detection_probability: float | None = Field(0.9, ge=0, le=1)
-    """probability that a frame shows a vehicle; None: from the tracks so far. Radar has its own"""
+    """probability that a frame shows a vehicle; None: from earlier tracks. Radar has its own"""
     clutter_density: float | None = Field(1e-5, ge=0)
-    """false measurements per frame and px^2; None: from what the tracks leave. Radar has its own"""
+    """false measurements per frame and px^2; None: from unassociated measurements. Radar has its own"""
     redundant: float | None = Field(None, gt=0, lt=1)
     """probability with which two measurements of one target in a scan are combined before association; None: never"""
     confirm_s: float = Field(0.4, ge=0)
-    """s; no track of a video is confirmed before this age; most ghosts of the first frame's vehicles are gone then"""
+    """s; least age of a confirmed track of a video; most ghosts of the first frame's vehicles end before"""
     confirm_travel: float = Field(0.5, ge=0)
-    """object sizes, at least 1/30 of the picture's; nor before it has moved this far from its start"""
+    """object sizes, at least 1/30 of the picture's; least distance of a confirmed track from its start"""
     coast_s: float = Field(0.6, ge=0)
-    """s; a track is given up this long after its last evidence"""
+    """s; a track ends this long after its last measurement"""
     hidden_s: float = Field(2.0, ge=0)
-    """s; the same for a vehicle inside a blob that it shares, where nothing could be seen of it"""
+    """s; the same for a vehicle hidden in a shared blob"""
     idle_s: float | None = Field(4.0, gt=0)
-    """s; m-of-n: a track of a video that stands still for so long and has never travelled ends; None: it stays"""
+    """s; m-of-n: a track of a video that has stood still for this time and never travelled ends; None: it stays"""
     idle_travel: float = Field(1.2, ge=0)
-    """object sizes; what has been this far from its start has travelled, and may stand as long as it likes"""
+    """object sizes; a track that was this far from its start has travelled, and may then stand without limit"""
     restless: bool = True
-    """where tracks began in vain lately, as under a tree, others must travel three times as far to be confirmed"""
+    """where tracks recently failed, as under a tree, new tracks must travel three times as far to be confirmed"""
     blob_overlap: float = Field(0.3, gt=0, le=1)
     """intersection over union with a blob outside the gate that keeps a track on it; 1: never"""
     merged_blobs: bool = True
-    """vehicles that share one blob stay several tracks"""
+    """vehicles that share one blob stay separate tracks"""
     group_cover: float = Field(0.5, gt=0, le=1)
-    """share of a vehicle's predicted box that a blob must cover to carry it"""
+    """share of a vehicle's predicted box that a shared blob must cover"""
     box_s: float = Field(0.3, gt=0)
     """s; time constant with which a track's box follows the blobs' boxes"""
 
@@ -129,17 +129,17 @@ class OutputSettings(Group):
     smooth: bool = False
     """tracks are smoothed: each row uses the measurements after it too; not in live runs"""
     smooth_lag_s: float | None = Field(None, gt=0)
-    """s; how far ahead smoothing looks, rows appearing one to two times as late; None: to the end, when all appear"""
+    """s; smoothing lag: rows are written after one to two times this; None: smoothed over all, written at the end"""
     link: bool | None = None
-    """broken tracks are joined and gaps filled, at the end; not in live and radar runs; None: of stored detections"""
+    """broken tracks are joined and gaps filled, at the end; not in live and radar runs; None: for stored detections"""
     link_s: float = Field(3.0, gt=0)
-    """s; longest gap between the last measurement of a track and the first of the one that goes on with it"""
+    """s; longest gap between the last measurement of a track and the first of its continuation"""
     lines: tuple[str, ...] = ()
     """counting lines, each NAME:x1,y1,x2,y2 in source pixels"""
     site: Path | None = None
-    """site.toml with a calibration: positions in metres and speeds are written; None: pixels only"""
+    """site.toml with a calibration, for positions in metres and speeds; None: pixels only"""
     trail_s: float = Field(2.0, ge=0, le=60)
-    """s; how far back the trail behind a vehicle reaches in the annotated video and in rerun"""
+    """s; length of a vehicle's trail in the annotated video and in rerun"""
     video_crf: int = Field(23, ge=0, le=51)
     """constant rate factor of the annotated H.264 video; smaller is sharper and larger"""
     jpeg_quality: int = Field(75, ge=1, le=100)
@@ -149,7 +149,7 @@ class OutputSettings(Group):
 
 
 class Settings(Group):
-    """Everything that a run can be told."""
+    """All settings of a run."""
 
     source: SourceSettings = SourceSettings()
     detector: DetectorSettings = DetectorSettings()

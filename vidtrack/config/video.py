@@ -1,4 +1,4 @@
-"""Settings of what looks at pictures: detectors, and blobs."""
+"""Settings of the detectors and of blobs."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ class DisturbanceSettings(Group):
     luma_threshold: float = Field(15.0, gt=0, le=255)
     """grey levels; a smaller difference of luminance alone is never a disturbance"""
     noise_factor: float = Field(4.0, ge=0, le=20)
-    """the threshold is at least this many times the pixel's measured mean deviation; 0: noise is not used"""
+    """least threshold, as a multiple of the pixel's measured mean deviation; 0: noise is not used"""
     chroma: bool = True
     """use colour where the source has it"""
     chroma_threshold: float = Field(10.0, gt=0, le=255)
     """grey levels; a difference of Cb or Cr alone that is a disturbance"""
     weak: float = Field(0.5, gt=0, le=1)
-    """share of the thresholds that is enough to link pieces of one vehicle; 1: such links say nothing new"""
+    """share of the thresholds that suffices to link pieces of one vehicle; 1: no additional links"""
     majority_px: int = Field(7, ge=1, le=15)
-    """odd; a pixel is foreground if most of the window of this width is disturbed; 1: each pixel by itself"""
+    """odd; a pixel is foreground if most of the window of this width is disturbed; 1: no majority filter"""
     shadow: bool = True
-    """what is the scene darkened by one factor, in luminance, colour and texture, is shadow, not foreground"""
+    """pixels that equal the scene darkened by one factor, in luminance, colour and texture, are shadow"""
     amid: bool = False
-    """what passes for shadow amid a vehicle is vehicle: dark paint does; soft shadow then widens boxes"""
+    """shadow inside a vehicle counts as vehicle, such as dark paint; soft shadow then widens boxes"""
     contrast: bool = True
-    """luma_threshold falls with the contrast that haze or dusk leave to the scene, to half of it at least"""
+    """luma_threshold decreases with the scene's contrast in haze or dusk, to half at least"""
     exposure: bool = True
     """changes of the camera's gain are compensated at once"""
     learn_s: float = Field(2.0, gt=0)
@@ -36,27 +36,27 @@ class DisturbanceSettings(Group):
     noise_s: float = Field(4.0, gt=0)
     """s; time constant of the noise's average"""
     registration: bool = True
-    """pictures are laid on the scene where the camera sways, drifts or is knocked; false: it is taken to stand still"""
+    """pictures are registered to the scene if the camera sways, drifts or is knocked; false: it is assumed still"""
     still_s: float = Field(10.0, gt=0)
-    """s; a camera that has stood still for so long is only watched again, which costs next to nothing"""
+    """s; after this time without motion the camera is only checked for motion, which costs little"""
     selective: bool = True
-    """foreground is not learnt; false: it is, and leaves a tail"""
+    """foreground is not learnt; false: it is learnt, and leaves a tail"""
     guard_px: int = Field(3, ge=0, le=30)
-    """pixels of the processed picture; what is this close to foreground is not learnt either"""
+    """pixels of the processed picture; pixels this close to foreground are not learnt either"""
     holes: bool = True
-    """foreground that encloses background is filled"""
+    """holes in the foreground are filled"""
     ghosts: bool = True
-    """marks left in the scene by what was there in the first frames, or stood long, are found by their edges"""
+    """ghosts, marks of departed vehicles in the scene, are detected by their edges and removed"""
     ghost_s: float = Field(1.0, ge=0)
-    """s; time that a region must be covered before it can be such a mark (ghost)"""
+    """s; least time that a region is foreground before it can be a ghost"""
     absorb_s: float = Field(20.0, gt=0)
-    """s; what stands longer and is no tracked vehicle becomes scene; its departure is recognised all the same"""
+    """s; foreground that stands longer and is no tracked vehicle becomes scene; its departure is still detected"""
     steady_s: float = Field(4.0, gt=0)
-    """s; the same for what does not change while it stands"""
+    """s; the same for foreground that does not change while it stands"""
     relearn_share: float = Field(0.6, gt=0, le=1)
-    """share of the picture; more foreground than that is no traffic but a change of light or view"""
+    """share of the picture; a larger foreground is a change of light or view, not traffic"""
     relearn_s: float = Field(1.0, ge=0)
-    """s; a change of the whole picture that lasts longer starts the scene anew; until then nothing is reported"""
+    """s; after a longer change of the whole picture the scene is learnt anew; meanwhile nothing is reported"""
 
     @field_validator("majority_px")
     @classmethod
@@ -67,7 +67,7 @@ class DisturbanceSettings(Group):
 
 
 class PaperSettings(Group):
-    """The map exactly as paper 004 has it."""
+    """The disturbance map of paper 004."""
 
     weight: float = Field(0.1, gt=0, le=1)
     """share of the new frame in the average, per frame"""
@@ -79,7 +79,7 @@ class PaperSettings(Group):
 
 class DetectorSettings(Group):
     kind: Detector = "disturbance"
-    """how the foreground is found"""
+    """the method that finds the foreground"""
     disturbance: DisturbanceSettings = DisturbanceSettings()
     paper: PaperSettings = PaperSettings()
 
@@ -94,7 +94,7 @@ class BlobSettings(Group):
     divide: bool = True
     """regions too large for one vehicle are divided among the vehicles predicted there"""
     pieces: bool = True
-    """small regions that nobody predicted are joined with their neighbours up to the typical size of a vehicle"""
+    """small regions outside predicted boxes are joined with their neighbours up to the typical size of a vehicle"""
     join_overlap: float = Field(0.7, gt=0, le=1)
     """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
     join_gap: float = Field(0.05, ge=0, le=1)
@@ -102,4 +102,4 @@ class BlobSettings(Group):
     jitter_px: float = Field(0.5, gt=0)
     """pixels of the processed picture; standard deviation of a small blob's centroid"""
     jitter_share: float = Field(0.05, ge=0, le=1)
-    """standard deviation of the centroid per standard deviation of the blob's extent, in its direction; it lasts"""
+    """standard deviation of the centroid per standard deviation of the blob's extent, in its direction; persistent"""

@@ -1,1 +1,1 @@
-"""The boxes of a detector, stored in a file, become scans."""
+"""Stored detections: scans from a file of a detector's boxes, and the parameters of that detector."""

@@ -1,4 +1,4 @@
-"""Stored detections (MOTChallenge det.txt) as scans: tracks without pixels."""
+"""Stored detections (MOTChallenge det.txt) as scans."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config.settings import DetectionSettings, Settings
-from vidtrack.detections.habits import Chains, Habits, habits, natural_rate
+from vidtrack.detections.parameters import Chains, Parameters, estimate_parameters, natural_rate
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.estimate.noise import BOX_JITTER
 from vidtrack.formats import read_mot
@@ -25,7 +25,7 @@ _LINES_LOOKED_AT = 20
 
 
 def is_detections(path: str) -> bool:
-    """Whether a .txt or .csv file holds detections: one of its first lines has six numbers or more."""
+    """Whether a .txt or .csv file contains detections: one of its first lines has six numbers or more."""
     place = Path(path)
     if place.suffix.lower() not in (".txt", ".csv") or not place.is_file():
         return False
@@ -36,26 +36,24 @@ def is_detections(path: str) -> bool:
 def open_detections(path: str, settings: Settings) -> Detections:
     """Read a MOT file of detections.
 
-    Raises SourceError if it cannot be read or holds no frame of the span, FormatError for a bad line, ConfigError for
-    a method that needs scores where there are none.
+    Raises SourceError if it cannot be read or has no frame in the span, FormatError for a bad line, ConfigError for a
+    method that needs scores if there are none.
     """
     return Detections(Path(path), settings)
 
 
 class Detections:
-    """Iterates over (index, time_s, Scan), one scan a frame, in order.
+    """Iterates over (index, time_s, Scan), one scan per frame, in order.
 
-    name, place, width, height, fps, frames, stats   as for Source; without seqinfo.ini the size is that of all boxes
-    settings   of detections, with what the file tells in place of None
+    name, place, width, height, fps, frames, stats   as for Source; without seqinfo.ini the size contains all boxes
+    settings   of detections, with None replaced by estimates from the file
+    pace       seconds of scan time per second of the settings. An unknown rate is estimated from the boxes, so that
+               the tracks do not depend on the assumed rate
 
-    pace       seconds of the scans' clock in a second of the settings: where nobody states the rate, the boxes tell how
-               many frames a second of theirs has, and whatever rate is assumed, their tracks are the same
-
-    Doubles, boxes of an object that another box of the frame shows as well, are left out.
-    z is the centre of a box, R as `box_noise` has it. The score is the share
-    of the file's detections that do not score higher: scales differ between detectors, only the order
-    counts. Where all score the same, or nothing, scans have no scores. Frames without a line are empty scans, up to
-    the sequence's length.
+    Duplicate boxes of an object in a frame are left out. z is the centre of a box, R is from `box_noise`. The score is
+    the share of the file's detections with at most this score, because only the order is comparable between detectors.
+    If all scores are equal or missing, scans have none. Frames without a line are empty scans, up to the sequence's
+    length.
     """
 
     def __init__(self, path: Path, settings: Settings) -> None:
@@ -84,7 +82,7 @@ class Detections:
         chains = Chains.of(self._frame, self._box, self._score)
         rate = (natural_rate(chains) if self.stats.fps_assumed else None) or self.fps
         self.pace = rate / self.fps
-        self.settings = _told(settings.detections, habits(chains, rate, settings.tracker.hold_s))
+        self.settings = _completed(settings.detections, estimate_parameters(chains, rate, settings.tracker.hold_s))
         right, bottom = np.ceil((self._box[:, :2] + self._box[:, 2:]).max(axis=0)).astype(int)
         self.width, self.height = info.width or int(right), info.height or int(bottom)
         length = max(info.length or 0, int(self._frame[-1]) + 1)
@@ -103,17 +101,17 @@ class Detections:
             yield index, time_s, box_scan(time_s, self._box[rows], score, self.settings.jitter or BOX_JITTER)
 
     def close(self) -> None:
-        """Nothing stays open: the file was read as a whole."""
+        """Do nothing: the file has been read completely."""
 
 
-def _told(settings: DetectionSettings, habits: Habits) -> DetectionSettings:
-    """The settings, what they leave open taken from the file's habits."""
-    open_ones = {name: value for name, value in asdict(habits).items() if getattr(settings, name) is None}
+def _completed(settings: DetectionSettings, parameters: Parameters) -> DetectionSettings:
+    """The settings with None replaced by the estimated parameters."""
+    open_ones = {name: value for name, value in asdict(parameters).items() if getattr(settings, name) is None}
     return settings.model_copy(update=open_ones)
 
 
 def _rank(score: Floats) -> Floats:
-    """(N,) share of all values that are not above each: 1 for the best, equal for equals."""
+    """(N,) share of all values that are at most each value: 1 for the best, equal for ties."""
     return np.searchsorted(np.sort(score), score, side="right") / len(score)
 
 

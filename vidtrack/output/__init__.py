@@ -1,1 +1,1 @@
-"""Sinks: what reads tracks and writes tables, pictures, plots and recordings. `sink.py` is their interface."""
+"""Sinks: they receive tracks and write tables, pictures, plots and recordings. `sink.py` is their interface."""

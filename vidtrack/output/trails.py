@@ -1,4 +1,4 @@
-"""Where each track was in the last seconds."""
+"""Recent positions of each track."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from vidtrack.tracks import Status, Tracks
 
 
 class Trails:
-    """The last `seconds` of all tracks that are not tentative."""
+    """Positions of all tracks but tentative ones over the last `seconds`."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
         self._scans: deque[tuple[float, Ints, Floats]] = deque()
 
     def step(self, tracks: Tracks) -> None:
-        """Add a scan, forget what is too old."""
+        """Add a scan and drop those older than `seconds`."""
         shown = tracks.status != Status.TENTATIVE
         self._scans.append((tracks.t, tracks.id[shown], tracks.xy[shown]))
         while tracks.t - self._scans[0][0] > self._seconds:
@@ -28,7 +28,7 @@ class Trails:
     def paths(self, motion: Floats | None = None) -> dict[int, Floats]:
         """(n, d) positions in order of time for each track of the last scan.
 
-        motion  (2, 3) from the scene to the picture that they are drawn on; None: the identity
+        motion  (2, 3) from the scene to the picture; None: identity
         """
         if not self._scans:
             return {}

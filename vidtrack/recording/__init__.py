@@ -1,1 +1,1 @@
-"""What a live camera sent, kept on the disk: written beside the run, read as a source, pruned by age and size."""
+"""Recordings of live cameras: writing them during the run, reading them as a source, deleting them by age and size."""

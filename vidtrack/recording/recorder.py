@@ -1,4 +1,4 @@
-"""Records what a camera sends, so that a run can be repeated bit by bit."""
+"""Records a camera's packets, the tracked frames and the tracker's state, so that a run can be repeated exactly."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vidtrack.config.settings import Settings
 from vidtrack.errors import StoppedEarly
 from vidtrack.output.folder import usable, writing
 from vidtrack.output.linefile import LineFile
-from vidtrack.recording.film import Film
+from vidtrack.recording.muxer import Muxer
 from vidtrack.recording.retention import Retention, new_part
 from vidtrack.recording.source import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VIDEO
 from vidtrack.state import State, write_state
@@ -28,36 +28,36 @@ from vidtrack.video.live.tape import NoTape, Place
 log = logging.getLogger(__name__)
 
 _RETRY_S = 5.0  # after a failed write
-_TELL_S = 60.0  # a loss that lasts is told so often
-_END_S = 0.5  # that the reader gets at the end to finish a packet
+_WARN_S = 60.0  # between two warnings of a continuing loss
+_END_S = 0.5  # for the reader to finish its packet at the end
 _NOWHERE: Place = (-1, 0)
 
 
 class NoRecorder(NoTape):
-    """Records nothing, where there is no --record."""
+    """Records nothing: a run without --record."""
 
     lost = 0
 
     def begins(self, place: Place) -> bool:
-        """Never."""
+        """False."""
         return False
 
     def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
-        """It is forgotten."""
+        """Do nothing."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing."""
 
 
 class Recorder:
-    """Tape in parts: the packets, the list of frames that were tracked, and the checkpoint before the first of them.
+    """Records packets, the list of tracked frames, and the checkpoint before the first of them, in parts.
 
-    A part begins with a connection, at a key picture after `roll_s` of the clock, or when it is large. When the
-    disk refuses, recording pauses and is tried again in a new part.
+    A new part begins with each connection, and at a key picture when `roll_s` of the clock has passed or the part is
+    large. After a write error, recording pauses and resumes in a new part.
 
     lost  packets that could not be written
 
-    `log_frame` is for the tracker's thread; everything is written in the reader's, which calls the rest.
+    The tracker's thread calls `log_frame`; the reader's thread calls the other methods and writes all files.
     Raises OutputError if nothing can be written into `root`.
     """
 
@@ -68,23 +68,23 @@ class Recorder:
         self._settings = settings.model_dump_json(indent=2)
         self._roll_s = roll_s
         self._retention = retention
-        self._writing = RLock()  # on a slow disk the reader still holds it when the run ends
-        self._film: Film | None = None
+        self._writing = RLock()  # on a slow disk the reader may still hold it when the run ends
+        self._muxer: Muxer | None = None
         self._folders: dict[int, Path] = {}
         self._part = 0
         self._period = 0
         self._retry_s = 0.0
-        self._told_s = -_TELL_S
+        self._warned_s = -_WARN_S
         self._logged = _NOWHERE[0]
         self._to_write: deque[tuple[int, State | str]] = deque()
         self._list: LineFile | None = None
         self._listed = _NOWHERE[0]
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
-        """Begin a new part with this packet if there is none, or it is time and the packet a key picture's."""
+        """Begin a new part with this packet if no part is open, or if one is due and this is a key picture."""
         with self._writing:
-            begins = self._film is None and monotonic() >= self._retry_s
-            if not begins and not (self._film is not None and packet.is_keyframe and self._due(self._film)):
+            begins = self._muxer is None and monotonic() >= self._retry_s
+            if not begins and not (self._muxer is not None and packet.is_keyframe and self._due(self._muxer)):
                 return False
             self.hang_up()
             try:
@@ -94,42 +94,42 @@ class Recorder:
             return True
 
     def place(self) -> Place:
-        """Number of the part, and of the next packet in it."""
+        """Number of the part, and number of the next packet in it."""
         with self._writing:
-            return _NOWHERE if self._film is None else (self._part, self._film.packets)
+            return _NOWHERE if self._muxer is None else (self._part, self._muxer.packets)
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
-        """Keep a packet, and what the tracker logged meanwhile."""
+        """Write a packet, and the entries that the tracker has logged since the last one."""
         with self._writing:
-            if self._film is None:
+            if self._muxer is None:
                 self.lost += 1
                 return
             try:
-                self._film.take(packet, pictures, arrived_s)
+                self._muxer.take(packet, pictures, arrived_s)
                 self._write_log()
             except (StoppedEarly, av.FFmpegError) as error:
                 self._pause(str(error))
                 return
-            if self._film.error is not None:
-                self._pause(self._film.error.strerror or str(self._film.error))
+            if self._muxer.error is not None:
+                self._pause(self._muxer.error.strerror or str(self._muxer.error))
 
     def hang_up(self) -> None:
         """End the part."""
         with self._writing:
-            film, self._film = self._film, None
-            if film is None:
+            muxer, self._muxer = self._muxer, None
+            if muxer is None:
                 return
             try:
-                film.close()
+                muxer.close()
             except (OSError, av.FFmpegError) as error:
                 log.warning("the end of a recording is lost: %s", error.strerror)
 
     def begins(self, place: Place) -> bool:
-        """Whether the frame at this place is the first of its part that is tracked."""
+        """Whether the frame at this place is the first tracked frame of its part."""
         return place[0] not in (self._logged, _NOWHERE[0])
 
     def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
-        """The frame that is tracked next; with the checkpoint before it if it `begins` a part."""
+        """Log the frame that is tracked next; `state` is the checkpoint before it if it `begins` a part."""
         part, packet = place
         if part == _NOWHERE[0]:
             return
@@ -139,13 +139,13 @@ class Recorder:
         self._to_write.append((part, f"{frame.index},{frame.time_s!r},{packet}\n"))
 
     def close(self) -> None:
-        """Write what the tracker logged last; call it when the reader was told to stop."""
+        """Write the last log entries; call it after stopping the reader."""
         if not self._writing.acquire(timeout=_END_S):
             log.warning("the end of the recording is lost: the disk does not answer")
             return
         try:
             self.hang_up()
-            self._retry_s = inf  # the reader may still have a packet in hand: it begins no part
+            self._retry_s = inf  # a packet that the reader still delivers begins no part
             self._write_log()
             self._end_list()
         except StoppedEarly as error:
@@ -153,12 +153,12 @@ class Recorder:
         finally:
             self._writing.release()
 
-    def _due(self, film: Film) -> bool:
-        large = self._retention.part_size is not None and film.size > self._retention.part_size
+    def _due(self, muxer: Muxer) -> bool:
+        large = self._retention.part_size is not None and muxer.size > self._retention.part_size
         return large or self._period != self._now()
 
     def _now(self) -> int:
-        """Which stretch of the clock this is."""
+        """Number of the current period of `roll_s` seconds."""
         return 0 if self._roll_s is None else int(time.time() // self._roll_s)
 
     def _begin(self, connection: Connection) -> None:
@@ -167,7 +167,7 @@ class Recorder:
         self._folders[self._part] = folder
         self._period = self._now()
         (folder / SETTINGS).write_text(self._settings)
-        self._film = Film(folder / VIDEO, connection)
+        self._muxer = Muxer(folder / VIDEO, connection)
         self._folders.pop(self._part - 3, None)  # its last frame was tracked long ago
 
     def _pause(self, why: str) -> None:
@@ -175,11 +175,11 @@ class Recorder:
         self._retry_s = monotonic() + _RETRY_S
         self.hang_up()
         folder = self._folders.get(self._part)
-        if folder is not None and not (folder / FRAMES).exists():  # nothing of it can be repeated
+        if folder is not None and not (folder / FRAMES).exists():  # without frames.csv a part cannot be repeated
             del self._folders[self._part]
             shutil.rmtree(folder, ignore_errors=True)
-        if monotonic() - self._told_s > _TELL_S:
-            self._told_s = monotonic()
+        if monotonic() - self._warned_s > _WARN_S:
+            self._warned_s = monotonic()
             log.warning("recording pauses: %s; tracking goes on", why)
 
     def _end_list(self) -> None:
@@ -188,7 +188,7 @@ class Recorder:
             ended.close()
 
     def _write_log(self) -> None:
-        """Bring states and lists of frames to their parts."""
+        """Write the logged states and frames to their parts."""
         while self._to_write:
             part, entry = self._to_write.popleft()
             if not isinstance(entry, str):
@@ -199,7 +199,7 @@ class Recorder:
     def _begin_list(self, part: int, state: State) -> None:
         self._end_list()
         folder = self._folders.get(part)
-        if folder is None:  # the disk refused its pictures
+        if folder is None:  # its pictures could not be written
             return
         with writing(folder):
             write_state(folder / STATE, state)

@@ -1,4 +1,4 @@
-"""Bounds what a live run leaves on the disk: the oldest parts go first."""
+"""Retention of a live run's parts: the oldest are deleted when they are too old or take too many bytes."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from vidtrack.recording.source import part_order
 
 log = logging.getLogger(__name__)
 
-SHARE = 1 / 8  # of all bytes that one part may take before the next one begins
-_FULL = 0.95  # of all bytes: parts grow between two looks
+SHARE = 1 / 8  # of the byte limit: largest size of one part
+_FULL = 0.95  # of the byte limit: parts grow between two checks
 _TIME = "%Y-%m-%dT%H-%M-%S"
 _PART = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ(-\d+)?")
 
 
 def new_part(root: Path) -> Path:
-    """A new folder in `root`, named by the time in UTC, or with a number more if that is not later than the last one.
+    """Make a folder in `root`, named by the UTC time, or by the last name and a number if that is not earlier.
 
-    So the names stay in order when the clock is set back. Raises OSError.
+    The names stay in order when the clock is set back. Raises OSError.
     """
     time_utc, number = datetime.now(UTC).strftime(_TIME), 1
     last_utc, last_number = max(map(part_order, parts_of(root)), default=("", 0))
@@ -36,14 +36,14 @@ def new_part(root: Path) -> Path:
 
 
 def parts_of(root: Path) -> list[Path]:
-    """The parts in a folder, oldest first."""
+    """Folders of the parts in `root`, oldest first."""
     if not root.is_dir():
         return []
     return sorted((entry for entry in root.iterdir() if _PART.fullmatch(entry.name)), key=part_order)
 
 
 def size_of(folder: Path) -> int:
-    """Bytes of all files below a folder; those that vanish meanwhile count nothing."""
+    """Bytes of all files below a folder; files deleted meanwhile count as 0."""
     total = 0
     for path in folder.rglob("*"):
         with suppress(FileNotFoundError):
@@ -53,11 +53,11 @@ def size_of(folder: Path) -> int:
 
 
 class Retention:
-    """Deletes closed parts that are too old, or too many.
+    """Deletes closed parts that are too old or take too much space.
 
     roots    folders whose parts count
-    seconds  age of the newest content of a part that may stay; None: any
-    size     bytes that all roots together may take; None: any
+    seconds  largest age of a part's newest content; None: no limit
+    size     largest number of bytes in all roots together; None: no limit
     """
 
     def __init__(self, seconds: float | None, size: float | None) -> None:
@@ -67,7 +67,7 @@ class Retention:
         self.part_size = None if size is None else size * SHARE
 
     def prune(self) -> None:
-        """Delete what is beyond the bounds; the newest part of each root stays."""
+        """Delete the oldest parts beyond the limits; the newest part of each root stays."""
         if self._seconds is None and self._size is None:
             return
         closed = sorted((part for root in self.roots for part in parts_of(root)[:-1]), key=part_order)
@@ -84,7 +84,7 @@ class Retention:
 
 
 def _changed_s(part: Path) -> float:
-    """Unix time of a part's newest content; now for one that somebody else has deleted."""
+    """Unix time of a part's newest content; the present time if it has been deleted."""
     try:
         return part.stat().st_mtime
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""A recording of a live run as a source: the frames that were tracked then, at their times."""
+"""A recording as a source: the frames that the live run tracked, with their times."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ FRAMES_HEADER = "frame,time_s,packet\n"
 
 
 def is_recording(path: str) -> bool:
-    """Whether this is a folder that --record wrote, or one part of it."""
+    """Whether the path is a folder written by --record, or one part of it."""
     folder = Path(path)
     return folder.is_dir() and bool(_parts(folder))
 
 
 def recorded_settings(path: str) -> dict[str, Any]:
-    """The settings that a recording was made with. Raises FormatError."""
+    """Settings of the run that made the recording. Raises FormatError."""
     file = _parts(Path(path))[0] / SETTINGS
     try:
         settings: dict[str, Any] = json.loads(file.read_text())
@@ -38,19 +38,19 @@ def recorded_settings(path: str) -> dict[str, Any]:
 
 
 def part_order(part: Path) -> tuple[str, int]:
-    """What parts are sorted by: the time in a name, and the number of those that have the same."""
+    """Sort key of a part: the time in its name, and its number among parts of the same time."""
     time_utc, _, number = part.name.partition("Z")
     return time_utc, int(number[1:]) if number[1:].isdecimal() else 1
 
 
 class Recording:
-    """The frames of a recording that were tracked, with their numbers and times; iterate once.
+    """Iterates, once, over the tracked frames of a recording, with their numbers and times.
 
     name, place, width, height, fps, frames, stats  as for Source
-    like      a frame of the size and kind of all
-    remember  is given the memory of the live run before the first frame of each part; set it before iterating
+    like     a frame with the size and colour format of all frames
+    restore  called with the live run's state before the first frame of each part; set it before iterating
 
-    Raises SourceError if there is nothing in it, FormatError if it is damaged.
+    Raises SourceError if it holds no tracked frame, FormatError if it is damaged.
     """
 
     def __init__(self, path: str) -> None:
@@ -65,12 +65,12 @@ class Recording:
         self.fps = FALLBACK_FPS
         self.frames = sum(_row_count(part) for part in self._parts)
         self.stats = SourceStats()
-        self.remember: Callable[[State], None] = lambda state: None
+        self.restore: Callable[[State], None] = lambda state: None
 
     def __iter__(self) -> Iterator[Frame]:
         last = -1
         for part in self._parts:
-            self.remember(read_state(part / STATE))
+            self.restore(read_state(part / STATE))
             for frame in self._replayed(part):
                 if frame.index <= last:
                     self.stats.warn(f"another run begins with {part}: its frames and tracks are numbered anew")
@@ -79,10 +79,10 @@ class Recording:
                 yield matched(frame, self.like)
 
     def close(self) -> None:
-        """Nothing stays open between two frames."""
+        """Do nothing: the iteration closes its files."""
 
     def _replayed(self, part: Path) -> Iterator[Frame]:
-        """The pictures of one part that are on its list."""
+        """The frames listed in one part's frames.csv."""
         wanted = _rows(part)
         try:
             with av.open(f"file:{part / VIDEO}") as container:
@@ -100,7 +100,7 @@ class Recording:
 
 
 def _decoded(coder: av.VideoCodecContext, packet: av.Packet) -> list[av.VideoFrame]:
-    """What was not whole was not tracked: it is on no list."""
+    """The pictures of a packet; none of a damaged packet, whose frames were not tracked."""
     try:
         return list(coder.decode(packet if packet.size else None))
     except av.FFmpegError:
@@ -117,12 +117,12 @@ def _row_count(part: Path) -> int:
 
 
 def _rows(part: Path) -> dict[int, tuple[int, float]]:
-    """Number and time of each frame that was tracked, by the number of its packet."""
+    """Number and time of each tracked frame, by the number of its packet."""
     try:
         lines = (part / FRAMES).read_text().splitlines(keepends=True)
     except FileNotFoundError:
         return {}
-    rows = csv.reader(line for line in lines[1:] if line.endswith("\n"))  # a kill may have cut the last one
+    rows = csv.reader(line for line in lines[1:] if line.endswith("\n"))  # a kill may have cut the last line
     try:
         return {int(packet): (int(frame), float(time_s)) for frame, time_s, packet in rows}
     except ValueError as error:

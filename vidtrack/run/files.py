@@ -1,4 +1,4 @@
-"""A run over a file with pictures or boxes, whichever it is."""
+"""Runs over files: video, images, recordings or stored detections."""
 
 from __future__ import annotations
 

@@ -13,8 +13,7 @@ import numpy as np
 from pydantic import AfterValidator, AwareDatetime, BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic import model_validator as whole
 
-from vidtrack.config.group import Group
-from vidtrack.config.toml_file import read_toml
+from vidtrack.config.group import Group, read_toml
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.polyline import crosses_itself
 

@@ -155,7 +155,7 @@ def test_a_signal_while_the_program_loads_is_no_error_either(monkeypatch):
     def terminated(*_, **_kind):
         raise Terminated
 
-    monkeypatch.setattr("vidtrack.config.settings.load", terminated)
+    monkeypatch.setattr("vidtrack.config.load.load", terminated)
     result = CliRunner().invoke(cli, ["live", "0"], standalone_mode=False)
     assert result.exception is None
     assert result.return_value == 0

@@ -169,7 +169,7 @@ class Disk:
     def __init__(self, monkeypatch):
         self.full = False
         monkeypatch.setattr(linefile, "append", self._append)
-        monkeypatch.setattr("vidtrack.output.disk.append", self._append)
+        monkeypatch.setattr("vidtrack.output.ffmpeg_file.append", self._append)
 
     def _append(self, file, block):
         if self.full:

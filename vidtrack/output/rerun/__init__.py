@@ -1,1 +1,1 @@
-"""What the tracker sees and decides, in rerun."""
+"""Recordings of the tracker's inputs and decisions for the rerun viewer."""

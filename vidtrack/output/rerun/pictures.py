@@ -1,4 +1,4 @@
-"""What the tracker sees and decides in a video, frame by frame, in rerun."""
+"""rerun recording of a video run: pictures, masks, blobs and tracks, frame by frame."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from vidtrack.video.frame import Image
 
 
 class RerunSink(RerunRecording):
-    """Sink that records pictures, masks, blobs, tracks, gates, trails, lives, times and decisions.
+    """Sink that records pictures, masks, blobs, tracks, gates, trails, statuses, times and decisions.
 
     target  FILE.rrd, "spawn" or "serve"
     shape   (H, W) of the source
 
-    Raises OutputError when the file cannot be written or the viewer not be started.
+    Raises OutputError if the file cannot be written or the viewer cannot be started.
     """
 
     def __init__(self, target: str, shape: tuple[int, int], settings: Settings, lines: Sequence[Line] = ()) -> None:
@@ -38,7 +38,7 @@ class RerunSink(RerunRecording):
             self._static("world/lines", rr.LineStrips2D(strips, labels=names, colors=(255, 220, 0)))
 
     def background(self, picture: Image) -> None:
-        """Show one (H, W, 3) picture at all times, for steps without frames."""
+        """Record one (H, W, 3) picture for all times, for steps without frames."""
         self._static("world/frame", _jpeg(picture, self._output.jpeg_quality))
 
     def _draw(self, step: Step) -> None:
@@ -59,7 +59,7 @@ class RerunSink(RerunRecording):
         self._log("world/frame", _jpeg(step.frame.bgr(), self._output.jpeg_quality))
         if step.foreground is not None:
             mask = step.foreground.full_size(step.frame.shape)
-            # PNG: a SegmentationImage is small on disk but raw in the viewer's memory.
+            # PNG: the viewer keeps a SegmentationImage uncompressed in memory.
             png = cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_BILEVEL, 1])[1]
             self._log("mask", rr.EncodedImage(contents=png.tobytes(), media_type="image/png"))
 

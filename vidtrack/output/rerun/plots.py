@@ -1,4 +1,4 @@
-"""What the tracker sees and decides in radar plots, scan by scan, in rerun: metres, x east, y north, z up."""
+"""rerun recording of a radar run, scan by scan, in metres: x east, y north, z up."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from vidtrack.tracks import Status, Tracks
 
 
 class RadarRerun(RerunRecording):
-    """Sink that records plots, tracks, gates, trails, lives, times and decisions, with the radar in its place.
+    """Sink that records the radar, plots, tracks, gates, trails, statuses, times and decisions.
 
-    target  FILE.rrd, "spawn" or "serve"; the last two reach the own machine only
+    target  FILE.rrd, "spawn" or "serve"; the last two are for this machine only
 
-    Raises OutputError when the file cannot be written or the viewer not be started.
+    Raises OutputError if the file cannot be written or the viewer cannot be started.
     """
 
     INDEX: ClassVar[str] = "scan"
@@ -59,5 +59,5 @@ def _points(tracks: Tracks) -> rr.Points3D:
 
 
 def _in_space(position: Floats) -> Floats:
-    """(N, 3) positions (N, 2 or 3), those in the plane at height zero."""
+    """(N, 3) positions from (N, 2 or 3); positions in the plane get height 0."""
     return np.column_stack([position, np.zeros((len(position), 3 - position.shape[1]))])

@@ -1,4 +1,4 @@
-"""A recording in rerun: what the tracker decided, whatever it looked at."""
+"""The common part of rerun recordings of video and radar runs: statuses, numbers, times and decisions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _log = logging.getLogger(__name__)
 _ADDRESS = ("127.0.0.1", 9876)
 _DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
 _LANES = 200
-"""Lanes of track life: hundreds of entities make the viewer slow, so track i uses lane i modulo this."""
+"""Lanes of track status: hundreds of entities slow the viewer down, so track i uses lane i modulo this."""
 
 _CIRCLE = 33
 """Points of an ellipse."""
@@ -43,14 +43,14 @@ _GONE = "gone"
 
 
 class RerunRecording:
-    """Sink that records tracks' lives, numbers, times and decisions; what it looks like is drawn by its children.
+    """Sink that records statuses, numbers, times and decisions of tracks. Subclasses draw the scan in `_draw`.
 
-    target    FILE.rrd; "spawn": a viewer that is started here; "serve": on loopback, for viewers of this machine
-    view      what is seen, beside the plots
-    measured  what the tracker's measurements are called
-    trail_s   how far back the trails reach
+    target    FILE.rrd; "spawn" starts a viewer; "serve" serves viewers of this machine on loopback
+    view      the spatial view, shown with the time series
+    measured  name of the measurements: blobs, boxes or plots
+    trail_s   length of the trails [s]
 
-    Raises OutputError when the file cannot be written or the viewer not be started.
+    Raises OutputError if the file cannot be written or the viewer cannot be started.
     """
 
     INDEX: ClassVar[str] = "frame"
@@ -71,7 +71,7 @@ class RerunRecording:
         self._static("plots/count", rr.SeriesLines(names=[measured, "tentative", "tracks"]))
 
     def step(self, step: Step) -> None:
-        """Record one step. Batches are recorded when empty too: rerun shows the latest until there is a newer."""
+        """Record one step. Empty batches are recorded too, because rerun shows the latest one until a newer comes."""
         self._recording.set_time(self.INDEX, sequence=step.index)
         self._recording.set_time(self.TIME, duration=step.time_s)
         self._trails.step(step.tracks)
@@ -84,14 +84,14 @@ class RerunRecording:
             self._flush()
 
     def close(self) -> None:
-        """Finish the recording. Raises StoppedEarly when the disk or the viewer refused some of it."""
+        """Finish the recording. Raises StoppedEarly if part of it could not be written."""
         try:
             self._flush()
         finally:
             self._recording.disconnect()
 
     def _flush(self) -> None:
-        # rerun writes in a thread of its own; only here does it tell that the disk is full.
+        # rerun writes in its own thread and reports a full disk only here.
         try:
             self._recording.flush()
         except RuntimeError as error:
@@ -104,7 +104,7 @@ class RerunRecording:
         self._recording.log(path, what, static=True)
 
     def _draw(self, step: Step) -> None:
-        """Record what there is to see."""
+        """Record the scan and the tracks in the spatial view."""
         raise NotImplementedError
 
     def _layout(self, view: rrb.View | rrb.Container, measured: str) -> rrb.Blueprint:
@@ -122,7 +122,7 @@ class RerunRecording:
         )
 
     def _log_life(self, tracks: Tracks) -> None:
-        """A change of state on the track's lane; nothing while it stays."""
+        """Record changes of status on the tracks' lanes."""
         now = {i: Status(s).name.lower() for i, s in zip(tracks.id.tolist(), tracks.status.tolist(), strict=True)}
         ended = dict.fromkeys(self._life.keys() - now.keys(), _GONE)
         for track_id, state in sorted(ended.items()) + list(now.items()):
@@ -145,16 +145,16 @@ class RerunRecording:
 
 
 def colours(ids: Ints) -> np.ndarray:
-    """(T, 3) red, green, blue, as in the annotated video."""
+    """(T, 3) red, green, blue of track ids, as in the annotated video."""
     return np.array([colour(i) for i in ids.tolist()], np.uint8).reshape(-1, 3)[:, ::-1]
 
 
 def gates(scan: Scan, tracks: Tracks, R: Floats) -> NDArray[np.float32]:
-    """(T, 33, 2) 99 % ellipses of S = P + R after the update, R of the track's own measurement or of an average one.
+    """(T, 33, 2) 99 % ellipses of S = P + R after the update; R is of the track's measurement, else the average.
 
     R  (M, d, d) covariances of the measured positions
 
-    The gate that the next scan will see is larger by the process noise.
+    The gate of the next scan is larger by the process noise.
     """
     cov = tracks.xy_cov[:, :2, :2]
     if len(scan):
@@ -166,7 +166,7 @@ def gates(scan: Scan, tracks: Tracks, R: Floats) -> NDArray[np.float32]:
 
 
 def _refuse_without_display() -> None:
-    """Raise OutputError where no viewer runs and none could open a window: its end would be noticed late."""
+    """Raise OutputError if no viewer runs and there is no display to start one on."""
     with socket.socket() as probe:
         runs = probe.connect_ex(_ADDRESS) == 0
     if not runs and sys.platform == "linux" and not any(os.environ.get(name) for name in _DISPLAYS):
@@ -176,27 +176,27 @@ def _refuse_without_display() -> None:
 
 
 def _open(target: str, layout: rrb.Blueprint) -> rr.RecordingStream:
-    """A recording that goes to a file, to a viewer that it starts ("spawn"), or is served on loopback ("serve").
+    """A recording to a file, to a new viewer ("spawn"), or served on loopback ("serve").
 
-    Raises OutputError when the file cannot be written or the viewer not be started.
+    Raises OutputError if the file cannot be written or the viewer cannot be started.
     """
     recording = rr.RecordingStream("vidtrack")
     try:
         if target == "spawn":
             _refuse_without_display()
-            # The viewer is installed beside this Python, which need not be on the path.
+            # The viewer is installed beside this Python, which may not be on the path.
             os.environ["PATH"] += os.pathsep + sysconfig.get_path("scripts")
             recording.spawn(memory_limit="2GB", default_blueprint=layout)
         elif target == "serve":
-            socket.create_server(_ADDRESS).close()  # rerun itself only logs that the port is taken
-            # RecordingStream.serve_grpc would listen on every interface, without a password.
+            socket.create_server(_ADDRESS).close()  # rerun only logs that the port is taken
+            # RecordingStream.serve_grpc listens on every interface, without a password.
             host, port = _ADDRESS
             server = rr.GrpcServerSink(bind_ip=host, port=port, server_memory_limit="256MB", newest_first=True)
             recording.set_sinks(server, default_blueprint=layout)
             _log.info("serving on %s:%d; watch with: rerun --connect", host, port)
         else:
             recording.save(target, default_blueprint=layout)
-            recording.send_recording_name(Path(target).stem)  # to tell cameras apart in one viewer
+            recording.send_recording_name(Path(target).stem)  # distinguishes cameras in one viewer
     except (OSError, RuntimeError) as error:
         raise OutputError(f"cannot open the recording {target}: {error}; choose another place") from None
     return recording

@@ -7,7 +7,7 @@ from cameras import HANG_S, wait_for, within
 from synthetic_steps import make_step
 
 from vidtrack.errors import StoppedEarly
-from vidtrack.run.live.beside import Beside
+from vidtrack.run.live.background_writer import BackgroundWriter
 from vidtrack.video.live.mailbox import Mailbox
 
 STEPS = [make_step(k, [(1, "c", 10.0, 10.0)]) for k in range(30)]
@@ -34,26 +34,28 @@ class Sink:
 
 def test_all_steps_arrive_in_order():
     sink = Sink()
-    beside = Beside("x", lambda steps: [sink.step(step) for step in steps], sink.close, every_s=0.01, depth=100)
+    writer = BackgroundWriter(
+        "x", lambda steps: [sink.step(step) for step in steps], sink.close, every_s=0.01, depth=100
+    )
     for step in STEPS:
-        beside.step(step)
-    beside.end()
-    beside.join(HANG_S)
+        writer.step(step)
+    writer.end()
+    writer.join(HANG_S)
     assert sink.seen == [step.index for step in STEPS]
     assert sink.closed
-    assert beside.lost == 0
+    assert writer.lost == 0
 
 
 def test_a_sink_that_hangs_costs_steps_and_no_time(caplog):
     sink = Sink()
     sink.free.clear()
-    beside = Beside.of("x", sink)
+    writer = BackgroundWriter.of("x", sink)
     with within():
         for step in STEPS:
-            beside.step(step)
-        beside.end()
-        beside.join(0.1)
-    assert beside.lost >= 14
+            writer.step(step)
+        writer.end()
+        writer.join(0.1)
+    assert writer.lost >= 14
     assert "too slow" in caplog.text
     assert "could not be finished" in caplog.text
     sink.free.set()
@@ -61,15 +63,15 @@ def test_a_sink_that_hangs_costs_steps_and_no_time(caplog):
 
 def test_a_sink_that_fails_is_asked_again(caplog):
     sink = Sink()
-    beside = Beside.of("x", sink)
+    writer = BackgroundWriter.of("x", sink)
     sink.failing = True
-    beside.step(STEPS[0])
-    wait_for(lambda: beside.lost == 1)
+    writer.step(STEPS[0])
+    wait_for(lambda: writer.lost == 1)
     sink.failing = False
-    beside.step(STEPS[1])
+    writer.step(STEPS[1])
     wait_for(lambda: sink.seen == [1])
-    beside.end()
-    beside.join(HANG_S)
+    writer.end()
+    writer.join(HANG_S)
     assert "no space; tracking goes on" in caplog.text
     assert "x is written again" in caplog.text
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidtrack.detections.habits import LEAST_ACCEL, MARGIN, PACE, SELDOM, Chains, habits, natural_rate
+from vidtrack.detections.parameters import LEAST_ACCEL, MARGIN, PACE, SELDOM, Chains, estimate_parameters, natural_rate
 
 FPS, HOLD_S = 10.0, 0.5
 FINE = 10  # steps of the simulated motion in a frame
@@ -30,9 +30,9 @@ def sorted_by_frame(frame, *columns):
     return frame[order], *(column[order] for column in columns)
 
 
-def told(frame, box, ranks):
-    """The habits of the boxes."""
-    return habits(Chains.of(frame, box, ranks), FPS, HOLD_S)
+def estimated(frame, box, ranks):
+    """The parameters estimated from the boxes."""
+    return estimate_parameters(Chains.of(frame, box, ranks), FPS, HOLD_S)
 
 
 def rank(score):
@@ -47,42 +47,42 @@ def test_scores_are_trusted_from_where_boxes_are_found_again(share):
     stray_frame, stray = strays(false, 100, rng)
     score = np.concatenate([rng.uniform(0.5, 1, len(frame)), rng.uniform(0, 0.5, false)])
     mixed = sorted_by_frame(np.concatenate([frame, stray_frame]), np.concatenate([box, stray]), rank(score))
-    sure = told(*mixed).sure_score
+    sure = estimated(*mixed).sure_score
     assert share - 0.02 <= sure <= share + SELDOM * (1 - share) + 0.02, "few of those that move may score less"
 
 
 def test_all_scores_are_trusted_where_they_tell_nothing():
     rng = np.random.default_rng(2)
     frame, box = walkers(10, 100, rng)
-    assert told(frame, box, rank(rng.random(len(frame)))).sure_score < 0.2
-    assert told(frame, box, np.ones(len(frame))).sure_score == 1.0
+    assert estimated(frame, box, rank(rng.random(len(frame)))).sure_score < 0.2
+    assert estimated(frame, box, np.ones(len(frame))).sure_score == 1.0
     one_frame = frame[:10] * 0, box[:10], rank(np.arange(10.0))
-    assert told(*one_frame).sure_score == 0.1
+    assert estimated(*one_frame).sure_score == 0.1
 
 
 @pytest.mark.parametrize(("jitter", "accel"), [(0.05, 1.0), (0.02, 3.0), (0.08, 0.5)])
 def test_jitter_and_acceleration_are_told_apart(jitter, accel):
     frame, box = walkers(20, 200, np.random.default_rng(3), jitter, accel)
-    found = told(frame, box, np.ones(len(frame)))
+    found = estimated(frame, box, np.ones(len(frame)))
     assert found.jitter == pytest.approx(MARGIN * jitter, rel=0.15)
     assert found.accel == pytest.approx(MARGIN * accel, rel=0.15)
 
 
 def test_what_stands_still_is_given_a_least_acceleration():
     frame, box = walkers(5, 50, np.random.default_rng(4), jitter=0.0, accel=0.0)
-    found = told(frame, box, np.ones(len(frame)))
+    found = estimated(frame, box, np.ones(len(frame)))
     assert (found.jitter, found.accel) == (pytest.approx(0.0, abs=1e-5), LEAST_ACCEL)
 
 
 def test_a_short_file_does_not_tell():
     frame, box = walkers(2, 5, np.random.default_rng(5))
-    found = told(frame, box, np.ones(len(frame)))
+    found = estimated(frame, box, np.ones(len(frame)))
     assert (found.jitter, found.accel) == (None, None)
 
 
 def test_boxes_without_size_are_like_nothing():
     frame = np.arange(100)
-    found = told(frame, np.zeros((100, 4)), np.ones(100))
+    found = estimated(frame, np.zeros((100, 4)), np.ones(100))
     assert (found.sure_score, found.jitter, found.accel) == (1.0, None, None)
 
 
@@ -96,7 +96,7 @@ def test_what_never_moves_is_trusted_only_with_the_scores_of_what_moves():
         np.concatenate([frame, np.repeat(np.arange(100), 2)]), np.concatenate([box, posts]), rank(score)
     )
     share = len(posts) / len(score)
-    assert share <= told(*both).sure_score <= share + SELDOM + 0.02
+    assert share <= estimated(*both).sure_score <= share + SELDOM + 0.02
 
 
 @pytest.mark.parametrize("step", [0.04, 0.12, 0.2])

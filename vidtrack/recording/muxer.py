@@ -1,4 +1,4 @@
-"""One file of a recording: packets as they came, or a raw camera's pictures without loss."""
+"""Writes one file of a recording: the packets as received, or the pictures of a raw camera, losslessly coded."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from pathlib import Path
 
 import av
 
-from vidtrack.output.disk import Disk
+from vidtrack.output.ffmpeg_file import FFmpegFile
 from vidtrack.video.live.connection import Connection
 
 _CLOCK = Fraction(1, 1000)
-_OPTIONS = {"cluster_time_limit": "1000", "flush_packets": "1"}  # a kill costs at most a cluster
+_OPTIONS = {"cluster_time_limit": "1000", "flush_packets": "1"}  # a kill loses at most one cluster
 
 
-class Film:
-    """A Matroska file with the packets of one connection, in the order and at the time of their arrival.
+class Muxer:
+    """Writes the packets of one connection to a Matroska file, in their order and with their times of arrival.
 
-    packets  so many are in it
+    packets  number of packets written
 
-    Raises OSError or av.FFmpegError when it cannot be begun; after that the disk's error is in `error`.
+    The constructor raises OSError or av.FFmpegError. A later write error is kept in `error`.
     """
 
     def __init__(self, path: Path, connection: Connection) -> None:
         self.packets = 0
-        self._disk = Disk(path)
-        self._container = av.open(self._disk, "w", format="matroska", options=_OPTIONS)
+        self._file = FFmpegFile(path)
+        self._container = av.open(self._file, "w", format="matroska", options=_OPTIONS)
         self._is_raw = connection.is_raw
         self._stream: av.VideoStream | None = None
         if not self._is_raw:
@@ -35,16 +35,16 @@ class Film:
 
     @property
     def error(self) -> OSError | None:
-        """What the disk said; nothing is written after it."""
-        return self._disk.error
+        """The first write error; nothing is written after it."""
+        return self._file.error
 
     @property
     def size(self) -> int:
         """Bytes written."""
-        return self._disk.size
+        return self._file.size
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
-        """Append a packet that arrived at a monotonic time, or for a raw camera its pictures."""
+        """Append a packet, of a raw camera its pictures; `arrived_s` is a monotonic time [s]."""
         if self._began_s is None:
             self._began_s = arrived_s
         self._last_ms = max(self._last_ms + 1, round((arrived_s - self._began_s) / _CLOCK))
@@ -52,7 +52,7 @@ class Film:
             for picture in pictures:
                 self._encode(picture)
         else:
-            ahead = 0  # pictures may be coded in another order than they are shown
+            ahead = 0  # the coding order may differ from the display order
             if packet.pts is not None and packet.dts is not None and packet.time_base:
                 ahead = round((packet.pts - packet.dts) * packet.time_base / _CLOCK)
             packet.stream = self._stream
@@ -66,7 +66,7 @@ class Film:
         try:
             self._container.close()
         finally:
-            self._disk.close()
+            self._file.close()
 
     def _encode(self, picture: av.VideoFrame) -> None:
         stream = self._stream = self._stream or self._lossless(picture)
@@ -78,5 +78,5 @@ class Film:
         stream.width, stream.height, stream.pix_fmt = picture.width, picture.height, picture.format.name
         stream.codec_context.color_range = picture.color_range
         stream.time_base = stream.codec_context.time_base = _CLOCK
-        stream.thread_count = 1  # each packet at once
+        stream.thread_count = 1  # more threads would delay packets
         return stream

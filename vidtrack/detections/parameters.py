@@ -1,11 +1,11 @@
-"""What stored detections tell of their own detector: which scores to trust, how boxes shake, how objects move.
+"""Estimates a detector's parameters from its stored boxes: least score to trust, jitter of boxes, object motion.
 
-A real object is found again where it was, a false one seldom: the share of boxes of a score that have a like in
-the frames next to theirs says how often that score is right. On MOT15 and KITTI detections it rises with the score
-as the share of true boxes does.
+A real object is detected again at nearly the same place, a false one rarely: the share of boxes of a score that have
+a match in the neighbouring frames indicates how often that score is right. On MOT15 and KITTI detections it rises with
+the score as the share of true boxes does.
 
-Of a camera that stands still that is not enough: what a detector takes a lamp post for it takes it for in every frame.
-But nothing false drives. So what moved is real for certain, and the scores that movers have are those of real objects.
+With a still camera that is not sufficient: a lamp post can be a false object in every frame. But false objects do not
+move. So moving boxes are real, and their scores are those of real objects.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from vidtrack.compiled import kernel
 from vidtrack.estimate.noise import file_noise
 
 REACH, ALIKE = 0.5, 1.35
-"""A like: a box in the next frame within REACH of its longer side, its sides at most ALIKE times as long or short."""
+"""A match: a box in the next frame within REACH of the longer side, each side between 1/ALIKE and ALIKE times."""
 TRUSTED, BEST = 0.8, 0.9
-"""A score is trusted if its boxes are found again at least TRUSTED times as often as those of rank BEST and better."""
+"""A score is trusted if its boxes have matches at least TRUSTED times as often as those of rank BEST and better."""
 MOVED, STEPS = 0.5, 4
-"""A chain of at least STEPS boxes, each the next one's like, is a mover if it goes farther than MOVED of its size."""
+"""A chain of at least STEPS matched boxes is a mover if it extends farther than MOVED of its size."""
 SELDOM = 0.1
-"""Share of the boxes of movers that may score less than is trusted."""
+"""Share of the movers' boxes that may score below the trusted score."""
 PACE = 1.2
-"""Object sizes/s; speed of a typical mover (persons and cars alike), by which a rate that nobody states is told."""
+"""Object sizes/s; speed of a typical mover, person or car, from which an unknown frame rate is estimated."""
 SLOWEST, FASTEST = 5.0, 60.0
-"""Frames/s; such rates lie between these."""
+"""Frames/s; bounds of an estimated rate."""
 LONGEST_S = 1.0
-"""s; longest lag over which motion is compared."""
+"""s; longest lag of the second differences."""
 ENOUGH = 30
-"""Fewer boxes in a row tell nothing about shaking and motion."""
+"""Least number of boxes for an estimate of jitter and motion."""
 MARGIN = 1.5
-"""Neighbouring frames err alike, and chains of boxes break where motion is wild: both are larger than they look."""
+"""Factor on jitter and acceleration: errors of neighbouring frames correlate and chains break in strong motion."""
 LEAST_ACCEL = 0.2
 TINY = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Habits:
-    """Of a detector and its scene. Object size is the longer side of a box.
+class Parameters:
+    """Parameters of a detector and its scene. Object size is the longer side of a box.
 
-    sure_score  least trusted score, as the share of detections that do not score higher
+    sure_score  least trusted score, as the share of detections with at most this score
     jitter      object sizes; standard deviation of a box's centre
-    accel       object sizes/s^2; standard deviation of the acceleration of objects in the picture
+    accel       object sizes/s^2; standard deviation of the acceleration in the picture
 
-    The last two are None where the file is too short to tell.
+    The last two are None if the file is too short.
     """
 
     sure_score: float
@@ -58,10 +58,9 @@ class Habits:
 
 @dataclass(frozen=True, slots=True)
 class Chains:
-    """Boxes in the order of frame and place, and which is which object's next.
+    """Boxes sorted by frame and position, linked from frame to frame.
 
-    order  (N,) of the boxes that were given
-    centre, size, rank, found   (N, 2), (N, 2), (N,), (N,) of each; found: share of the neighbouring frames with a like
+    centre, size, rank, found   (N, 2), (N, 2), (N,), (N,); found: share of the neighbouring frames with a match
     follower  (N,) the same object's box in the next frame, -1 for none
     mover     (N,) boxes of chains that move
     """
@@ -75,12 +74,12 @@ class Chains:
 
     @classmethod
     def of(cls, frame: Ints, box: Floats, rank: Floats) -> Chains:
-        """Of boxes (N, 4) in frames (N,), sorted by frame, with ranks (N,)."""
+        """Chains of boxes (N, 4) in frames (N,), sorted by frame, with ranks (N,)."""
         centre = box[:, :2] + box[:, 2:] / 2
         order = np.lexsort((centre[:, 0], frame))
         frame, centre, size, rank = frame[order], centre[order], box[order, 2:], rank[order]
         start = np.searchsorted(frame, np.arange(frame[0], frame[-1] + 2))
-        after, before = _likes(start, centre, size, 1), _likes(start, centre, size, -1)
+        after, before = _matches(start, centre, size, 1), _matches(start, centre, size, -1)
         neighbours = (frame > frame[0]).astype(float) + (frame < frame[-1])
         found = ((after >= 0).astype(float) + (before >= 0)) / np.maximum(neighbours, 1)
         follower = np.where((after >= 0) & (before[after] == np.arange(len(after))), after, -1)
@@ -88,9 +87,9 @@ class Chains:
 
     @property
     def step(self) -> float | None:
-        """Object sizes from one frame to the next at which movers go half of their way; None where too few are seen.
+        """Object sizes per frame; the movers' median step weighted by distance. None with too few movers.
 
-        Half of the way, not of the time: who waits at the lights for a minute says nothing of how fast one drives.
+        Weighted by distance, not by time, because waiting vehicles do not show how fast vehicles drive.
         """
         goes = np.flatnonzero(self.mover & (self.follower >= 0))
         if len(goes) < ENOUGH:
@@ -102,25 +101,26 @@ class Chains:
 
 
 def natural_rate(chains: Chains) -> float | None:
-    """Frames/s at which a typical mover goes PACE; None where the boxes do not tell."""
+    """Frames/s at which a typical mover has speed PACE; None with too few movers."""
     step = chains.step
     return None if step is None else float(np.clip(PACE / max(step, TINY), SLOWEST, FASTEST))
 
 
-def habits(chains: Chains, fps: float, hold_s: float) -> Habits:
-    """Habits of the detector that gave these boxes, fps frames a second.
+def estimate_parameters(chains: Chains, fps: float, hold_s: float) -> Parameters:
+    """Parameters of the detector of these boxes.
 
+    fps     frames/s
     hold_s  s; correlation time of the acceleration
     """
     jitter, accel = _motion(chains.follower, chains.centre, chains.size.max(axis=1), fps, hold_s)
     sure = _sure_score(chains.rank, chains.found)
     if np.count_nonzero(chains.mover) >= ENOUGH:
         sure = max(sure, float(np.quantile(chains.rank[chains.mover], SELDOM, method="higher")))
-    return Habits(sure, jitter, accel)
+    return Parameters(sure, jitter, accel)
 
 
 def _sure_score(rank: Floats, found: Floats) -> float:
-    """Least rank whose boxes are found again often enough; a higher score is never taken for less (isotonic fit)."""
+    """Least rank whose boxes have matches often enough, by a monotonic (isotonic) fit."""
     from scipy.optimize import isotonic_regression
 
     levels, which, count = np.unique(rank, return_inverse=True, return_counts=True)
@@ -154,12 +154,12 @@ def _motion(
 
 
 @kernel
-def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
-    """(N,) nearest like of each box in the frame `step` away, -1 for none.
+def _matches(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
+    """(N,) nearest match of each box in the frame `step` away, -1 for none.
 
-    Boxes start[k]..start[k + 1] are those of frame k, in the order of their centres' first axis.
+    Boxes start[k]..start[k + 1] are those of frame k, sorted by the x of their centres.
     """
-    like = np.full(len(centre), -1)
+    matched = np.full(len(centre), -1)
     frames = len(start) - 1
     for k in range(max(0, -step), min(frames, frames - step)):
         others = centre[start[k + step] : start[k + step + 1], 0]
@@ -175,13 +175,13 @@ def _likes(start: Ints, centre: Floats, size: Floats, step: int) -> Ints:
                 for axis in range(2):
                     alike &= size[i, axis] < ALIKE * size[j, axis] and size[j, axis] < ALIKE * size[i, axis]
                 if alike and dx * dx + dy * dy < nearest:
-                    nearest, like[i] = dx * dx + dy * dy, j
-    return like
+                    nearest, matched[i] = dx * dx + dy * dy, j
+    return matched
 
 
 @kernel
 def _movers(follower: Ints, centre: Floats, size: Floats) -> Mask:
-    """(N,) boxes of chains of at least STEPS boxes that go farther than MOVED of their longest side."""
+    """(N,) boxes of chains of at least STEPS boxes that extend farther than MOVED of their longest side."""
     mover, begun = np.zeros(len(follower), np.bool_), np.zeros(len(follower), np.bool_)
     for i in range(len(follower)):
         if begun[i]:

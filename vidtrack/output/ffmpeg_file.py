@@ -1,4 +1,4 @@
-"""A file for FFmpeg to write to."""
+"""An output file for FFmpeg that reports write errors."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from pathlib import Path
 from vidtrack.output.folder import append
 
 
-class Disk:
-    """A file object for PyAV. It keeps an error for later: FFmpeg crashes on a header that it could not write.
+class FFmpegFile:
+    """A file object for PyAV that keeps the first write error in `error`: FFmpeg crashes if a header cannot be written.
 
-    Nothing can be sought in it, so that what is written never has to be changed. Raises OSError when it cannot
-    be opened.
+    It has no `seek`, so FFmpeg never changes bytes already written. Raises OSError if it cannot be opened.
     """
 
     def __init__(self, path: Path) -> None:
@@ -20,7 +19,7 @@ class Disk:
         self._file = open(path, "wb", buffering=0)  # noqa: SIM115
 
     def write(self, block: bytes) -> int:
-        """Append the block, or nothing at all after the first error."""
+        """Append the block; after an error, discard it."""
         if self.error is None:
             try:
                 append(self._file, block)

@@ -1,4 +1,4 @@
-"""Writes results beside the tracker: a slow or full disk can neither make it wait nor stop it."""
+"""Writes results in a thread of its own, so that a slow or full disk neither delays nor stops the tracker."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from vidtrack.output.sink import Sink, Step
 
 log = logging.getLogger(__name__)
 
-_DEPTH = 8  # steps that may wait with their pictures
-_TELL_S = 60.0  # a loss that lasts is told so often
+_DEPTH = 8  # queued steps, with their pictures
+_WARN_S = 60.0  # between two warnings of a continuing loss
 
 
-class Beside:
-    """Sink in a thread of its own that hands its steps on in batches.
+class BackgroundWriter:
+    """Sink that queues steps and writes them in batches in its own thread.
 
     name     of the output, for messages
-    write    takes a batch; raises StoppedEarly if it cannot be written, and is given the next one all the same
-    finish   is called after the last batch
-    every_s  time between two batches; 0: as they come
-    depth    steps that may wait
+    write    writes a batch; after it raises StoppedEarly it is called again with the next batch
+    finish   called after the last batch
+    every_s  time between two batches [s]; 0: no pause
+    depth    largest number of queued steps
 
-    lost     steps that were not written: `write` failed, or was too slow
+    lost     number of steps not written, because `write` failed or was too slow
     """
 
     def __init__(
@@ -47,13 +47,13 @@ class Beside:
         self._changed = Condition()
         self._ending = Event()
         self._failing = False
-        self._told_s = -_TELL_S
+        self._warned_s = -_WARN_S
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     @classmethod
-    def of(cls, name: str, sink: Sink) -> Beside:
-        """Any sink; once it failed, it may fail for ever."""
+    def of(cls, name: str, sink: Sink) -> BackgroundWriter:
+        """A background writer for any sink."""
 
         def write(steps: list[Step]) -> None:
             for step in steps:
@@ -62,7 +62,7 @@ class Beside:
         return cls(name, write, sink.close)
 
     def step(self, step: Step) -> None:
-        """Queue a step, or count it as lost."""
+        """Queue a step; count it as lost if the queue is full."""
         with self._changed:
             if len(self._waiting) >= self._depth:
                 self._lose(1, f"{self.name}: writing is too slow")
@@ -71,19 +71,19 @@ class Beside:
                 self._changed.notify()
 
     def end(self) -> None:
-        """Let the thread write what waits, and finish."""
+        """Start the end: the thread writes the queued steps and finishes. Does not wait."""
         self._ending.set()
         with self._changed:
             self._changed.notify()
 
     def join(self, timeout_s: float) -> None:
-        """Wait for the end; after the time-out the thread is left behind."""
+        """Wait for the thread to end; after the time-out it is abandoned."""
         self._thread.join(timeout_s)
         if self._thread.is_alive():
             log.warning("%s could not be finished in %g s; what is written is valid", self.name, timeout_s)
 
     def close(self) -> None:
-        """As `end`."""
+        """Same as `end`."""
         self.end()
 
     def _run(self) -> None:
@@ -92,7 +92,7 @@ class Beside:
                 self._changed.wait_for(lambda: self._waiting or self._ending.is_set())
             self._ending.wait(self._every_s)
             self._write_waiting()
-        self._write_waiting()  # what came during the last write
+        self._write_waiting()  # steps queued during the last write
         try:
             self._finish()
         except (Error, OSError) as error:
@@ -114,6 +114,6 @@ class Beside:
 
     def _lose(self, steps: int, why: str) -> None:
         self.lost += steps
-        if monotonic() - self._told_s > _TELL_S:
-            self._told_s = monotonic()
+        if monotonic() - self._warned_s > _WARN_S:
+            self._warned_s = monotonic()
             log.warning("%s; tracking goes on", why)

@@ -1,4 +1,4 @@
-"""Who may see the page, and what its answers may do in a browser."""
+"""Access control of the page, and security headers of its responses."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _ON_EVERY_ANSWER = {
 }
 
 
-def guarded(app: ASGIApp, token: str | None) -> ASGIApp:
-    """The application behind a token, or without one for requests that name this machine.
+def protected(app: ASGIApp, token: str | None) -> ASGIApp:
+    """The application behind a token; without one, for requests whose Host header names this machine.
 
-    The name matters: a foreign page could let its own name point to the loopback address and read along.
+    The Host header is checked against DNS rebinding: a foreign site could resolve its own name to loopback.
     """
-    inner = _TokenGuard(app, token) if token else TrustedHostMiddleware(app, [*_OWN_NAMES], www_redirect=False)
+    inner = _TokenAuthentication(app, token) if token else TrustedHostMiddleware(app, [*_OWN_NAMES], www_redirect=False)
     return _Headers(inner)
 
 
-class _TokenGuard:
-    """Lets in who brings the token, as bearer or as password of any user."""
+class _TokenAuthentication:
+    """Middleware that requires the token, as bearer token or as password of any user."""
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self._app = app
@@ -39,8 +39,8 @@ class _TokenGuard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         given = _given_token(Headers(scope=scope).get("authorization", ""))
-        knows = hmac.compare_digest(given, self._token)  # in constant time
-        app = self._app if knows else PlainTextResponse("the token is missing or wrong\n", 401, _ASK)
+        granted = hmac.compare_digest(given, self._token)  # takes constant time
+        app = self._app if granted else PlainTextResponse("the token is missing or wrong\n", 401, _ASK)
         await app(scope, receive, send)
 
 
@@ -51,13 +51,13 @@ def _given_token(authorization: str) -> bytes:
     if scheme.lower() == "basic":
         try:
             return base64.b64decode(value, validate=True).partition(b":")[2]
-        except ValueError:  # no base64, or not even ASCII
+        except ValueError:  # not base64 or not ASCII
             return b""
     return b""
 
 
 class _Headers:
-    """Adds headers to every answer: nothing is stored, nothing foreign is loaded."""
+    """Middleware that adds headers to every response: no caching, no content from other sites."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

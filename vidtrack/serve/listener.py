@@ -1,4 +1,4 @@
-"""Where the page is served: an open port, and who may come in."""
+"""The listening socket of the page."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ipaddress import ip_address
 from vidtrack.errors import ConfigError
 
 LOOPBACK = "127.0.0.1"
-_GONE_S = 20.0  # a client that takes nothing for so long is cut off by the system
+_GONE_S = 20.0  # the system disconnects a client that receives nothing for this time
 _PLACE = re.compile(r"(?:(?P<host>[^\[\]:]+|\[[^\[\]]+\]):)?(?P<port>\d{1,5})")
 
 
-def open_door(place: str, token: str | None) -> socket.socket:
-    """A listening socket at "[HOST:]PORT", on this machine only if no host is given; port 0 is any free one.
+def listen(place: str, token: str | None) -> socket.socket:
+    """A listening socket at "[HOST:]PORT", on loopback without a host; port 0 is any free port.
 
-    Raises ConfigError when the place is malformed, is open to other machines without a token, or is not free.
+    Raises ConfigError if the place is malformed, is open to other machines without a token, or is not free.
     """
     host, port = _host_and_port(place)
     try:
@@ -28,18 +28,18 @@ def open_door(place: str, token: str | None) -> socket.socket:
             raise ConfigError(
                 f"--http {place}: other machines could see this page; protect it by --http-token or VIDTRACK_TOKEN"
             )
-        door = socket.create_server(address, family=family)
+        listener = socket.create_server(address, family=family)
     except OSError as error:
         raise ConfigError(f"--http {place}: {_why(error)}; give another host or port") from None
-    door.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; what is accepted inherits both
-        door.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * _GONE_S))
-    return door
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; accepted sockets inherit both options
+        listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * _GONE_S))
+    return listener
 
 
-def url_of(door: socket.socket) -> str:
+def url_of(listener: socket.socket) -> str:
     """The page's address."""
-    host, port = door.getsockname()[:2]
+    host, port = listener.getsockname()[:2]
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
