@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.associate.trust import Trust
+from vidtrack.associate.two_stage import TwoStage
 from vidtrack.decision import Decision, Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
@@ -35,7 +35,7 @@ class Immediate:
 
     rule: Associator
     sharing: Sharing
-    trust: Trust
+    two_stage: TwoStage
     births: bool
 
     STATE = ()
@@ -44,14 +44,14 @@ class Immediate:
         """Confirmed tracks first, then the measurements that they share, then tentative tracks."""
         pairs, count = problem.pairs, problem.measurements
         confirmed = register.status != TENTATIVE
-        sure = self.trust.sure(problem.scan)
-        decision = self.trust.decide(self.rule, problem, confirmed, sure)
+        sure = self.two_stage.sure(problem.scan)
+        decision = self.two_stage.decide(self.rule, problem, confirmed, sure)
         shared, hides = self.sharing.claim(view, decision, confirmed, count)
         decision = decision.without(shared >= 0)
         free = hides & ~_claimed(decision, count)
         open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
         if np.count_nonzero(open_to_all):
-            second = self.trust.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
+            second = self.two_stage.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
             free &= ~_claimed(second, count)
             decision = decision.joined(second)
         shared, free = self.sharing.catch(view, decision, shared, free)

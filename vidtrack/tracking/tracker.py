@@ -14,7 +14,7 @@ from vidtrack.associate.adaptive import thresholded
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.associate.trust import EQUAL, Trust
+from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
 from vidtrack.decision import Choices, Event
 from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.bank import Estimator
@@ -95,7 +95,7 @@ class Tracker:
         life: Life | None = None,
         picture: Surroundings | None = None,
         sharing: Sharing | None = None,
-        trust: Trust | None = None,
+        two_stage: TwoStage | None = None,
         *,
         estimator: Callable[[Motion], Estimator] = KalmanBank,
         births: bool = True,
@@ -111,7 +111,7 @@ class Tracker:
         self.life: Life = life or LifeCycle()
         self.picture: Surroundings = picture or Picture()
         self.sharing: Sharing = sharing or Exclusive()
-        self.trust = trust or EQUAL
+        self.two_stage = two_stage or SINGLE_STAGE
         self.timing = self._timing(associate or GNN(), births)
         self.threshold = threshold
         self.rates = Rates(detection_probability, clutter_density, self.picture.area if surveyed is None else surveyed)
@@ -182,12 +182,12 @@ class Tracker:
         if isinstance(rule, str | type):
             raise ConfigError(f"associate is {rule!r}; give an instance, such as GNN()")
         if not isinstance(rule, ForestRule):
-            return Immediate(rule, self.sharing, self.trust, births)
+            return Immediate(rule, self.sharing, self.two_stage, births)
         if not isinstance(self.sharing, Exclusive):
             raise ConfigError(
                 f"{type(rule).__name__} decides later and knows no shared measurements; leave sharing out"
             )
-        return Deferred(rule.forest(), self.trust, births)
+        return Deferred(rule.forest(), self.two_stage, births)
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
         """Move all rows to the scan's time and delete those unseen for too long; returns the time step [s]."""
@@ -245,7 +245,7 @@ class Tracker:
         hit = found.taken >= 0
         rows = hit.nonzero()[0]
         sure = hit.copy()
-        sure[rows] = self.trust.sure(scan)[found.taken[rows]]
+        sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
         register.see(hit, sure, scan.t, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]

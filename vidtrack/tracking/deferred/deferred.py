@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.associate.trust import Trust
+from vidtrack.associate.two_stage import TwoStage
 from vidtrack.decision import Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
@@ -31,14 +31,14 @@ class Deferred:
     """
 
     forest: Forest
-    trust: Trust
+    two_stage: TwoStage
     births: bool
 
     STATE = ("forest",)
 
     def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
         """Grow the forest; the register's rows become their successors."""
-        pairs, sure = problem.pairs, self.trust.sure(problem.scan)
+        pairs, sure = problem.pairs, self.two_stage.sure(problem.scan)
         log_l = pairs.log_l + np.where(sure, 0.0, np.log(UNSURE))[pairs.measurement]
         problem = replace(problem, pairs=replace(pairs, log_l=log_l))
         starts = distinct(problem.scan, sure & self.births)

@@ -14,7 +14,7 @@ from vidtrack.scan import Scan
 
 
 @dataclass(frozen=True, slots=True)
-class Trust:
+class TwoStage:
     """Detections that score at least `least` are sure; without scores all are.
 
     Tracks choose among sure detections first and, where they get none, among the others. Only sure ones start tracks,
@@ -40,5 +40,5 @@ class Trust:
         return first.without(missed).joined(second)
 
 
-EQUAL = Trust(-np.inf)
+SINGLE_STAGE = TwoStage(-np.inf)
 """All detections are sure, whatever their scores."""
