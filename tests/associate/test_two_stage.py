@@ -16,7 +16,9 @@ R = np.eye(2)
 
 
 def tracker(associate=None, **life):
-    return Tracker(ConstantVelocity(accel=1.0, speed=5.0), associate or GNN(), life=LifeCycle(**life), two_stage=TwoStage(0.5))
+    return Tracker(
+        ConstantVelocity(accel=1.0, speed=5.0), associate or GNN(), life=LifeCycle(**life), two_stage=TwoStage(0.5)
+    )
 
 
 def fed(tracker, *scans):

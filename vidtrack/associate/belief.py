@@ -65,7 +65,7 @@ def propagate(
             total += share[k]
         share[mine] /= total
         row_share[t] /= total
-    for j in measurements:  # before convergence, without clutter, the weights of a measurement could sum to more than one
+    for j in measurements:  # before convergence the weights of a measurement can sum to more than one
         of_one = columns.pair[columns.start[j] : columns.start[j + 1]]
         total = share[of_one].sum()
         if total > 1.0:

@@ -27,10 +27,10 @@ CLAIMED = 0.1
 class Immediate:
     """Each scan is decided at once and for good.
 
-    rule     association rule
-    sharing  what happens when targets share a measurement
-    trust    which scores may start a track
-    births   whether measurements that belong to no track start one
+    rule       association rule
+    sharing    what happens when targets share a measurement
+    two_stage  two-stage association by score
+    births     whether measurements that belong to no track start one
     """
 
     rule: Associator

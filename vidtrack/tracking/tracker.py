@@ -70,7 +70,7 @@ class Tracker:
     picture    what only a picture tells: Picture(), with its bounds, or NoPicture(), where measurements are points
     sharing    what happens when targets share a measurement: Exclusive(), nothing, or Occlusion(); MHT and Split take
                the first only
-    trust      which scores may start a track; None: scores do not count
+    two_stage  association by score in two stages; None: scores do not count
     estimator  makes the bank of filters from the model
     births     whether measurements that belong to no track start one
     detection_probability, clutter_density [per px^2 or m^2]   for weights and existence probability: numbers, arrays

@@ -23,11 +23,11 @@ UNSURE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Deferred:
-    """Scans wait for what comes after them. No measurement is shared.
+    """Each scan is decided some scans later. No measurement is shared.
 
-    forest  the histories of all tracks
-    trust   which scores may start a track
-    births  whether measurements start tracks
+    forest     the histories of all tracks
+    two_stage  which scores may start a track
+    births     whether measurements start tracks
     """
 
     forest: Forest
