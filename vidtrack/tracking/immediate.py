@@ -1,4 +1,4 @@
-"""Decisions in the scan itself: a row is a track."""
+"""Immediate decisions, in the scan itself: a row is a track."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CLAIMED = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Immediate:
-    """Each scan is decided at once and for good.
+    """Each scan is decided finally in the scan itself.
 
     rule       association rule
     sharing    what happens when targets share a measurement
@@ -62,7 +62,7 @@ class Immediate:
 
     @property
     def _starter(self) -> Associator:
-        """The rule for tentative tracks: whole measurements, as weights of clutter would keep them alive for ever."""
+        """The rule for tentative tracks, always hard: with weights, clutter would keep them alive indefinitely."""
         return self.rule if isinstance(self.rule, HARD) else GNN()
 
     def shown(self, rows: int) -> Mask:

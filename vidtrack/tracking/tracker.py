@@ -42,11 +42,11 @@ from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 
 class Outcome(NamedTuple):
-    """What a scan gave each track.
+    """Result of a scan for each track.
 
     measurement  (T,) alone or shared; -1: none
     nis          (T,) normalised innovation squared; NaN: none
-    choices      of the tracks that are shown, those that end in the scan included; None: not asked for
+    choices      of the output tracks, including those that end in the scan; None without `explain`
     """
 
     measurement: Ints
@@ -54,7 +54,7 @@ class Outcome(NamedTuple):
     choices: Choices | None
 
     def after(self, kept: Mask, born: Ints) -> Outcome:
-        """That of the tracks kept (T,), then of those born from measurements (B,)."""
+        """The outcome of the tracks kept (T,), then of those born from measurements (B,)."""
         measurement = np.concatenate([self.measurement[kept], born])
         nis = np.concatenate([self.nis[kept], np.full(len(born), np.nan)])
         return Outcome(measurement, nis, self.choices)
@@ -67,9 +67,9 @@ class Tracker:
     associate  association rule: NN(), GNN(), ..., or one that decides some scans later: MHT(), Split()
     gate       Gate, or the probability of one
     life       confirmation and deletion: LifeCycle(), M of N, or LogRatio(), by the log-likelihood ratio
-    picture    what only a picture tells: Picture(), with its bounds, or NoPicture(), where measurements are points
-    sharing    what happens when targets share a measurement: Exclusive(), nothing, or Occlusion(); MHT and Split take
-               the first only
+    picture    Picture() for measurements with boxes, with its bounds, or NoPicture() for points
+    sharing    model for measurements of several targets: Exclusive() (none) or Occlusion(); MHT and Split require
+               Exclusive()
     two_stage  association by score in two stages; None: scores do not count
     estimator  makes the bank of filters from the model
     births     whether measurements that belong to no track start one
@@ -174,11 +174,11 @@ class Tracker:
 
     @property
     def road(self) -> Road | None:
-        """What traffic taught about the scene; None: nothing."""
+        """Maps learnt from traffic; None without them."""
         return self.picture.road
 
     def _timing(self, rule: Associator | ForestRule, births: bool) -> Timing:
-        """When measurements are assigned for good, as the rule has it."""
+        """Immediate or deferred decisions, by the kind of rule."""
         if isinstance(rule, str | type):
             raise ConfigError(f"associate is {rule!r}; give an instance, such as GNN()")
         if not isinstance(rule, ForestRule):

@@ -1,4 +1,4 @@
-"""Decisions some scans later: a row is one of the possible histories of a track."""
+"""Deferred decisions: a row is one of the possible histories of a track."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Deferred:
         return Association.exclusive(*self.forest.grow(problem, register, starts, events))
 
     def shown(self, rows: int) -> Mask:
-        """(rows,) one row of each track that is believed at present."""
+        """(rows,) the output row of each track."""
         shown = np.zeros(rows, bool)
         shown[self.forest.shown[self.forest.shown < rows]] = True
         return shown
@@ -60,7 +60,7 @@ class Deferred:
         self.forest.settle(register, t, events)
 
     def confirm(self, ready: Mask, register: Register) -> Mask:
-        """Confirm all rows of the tracks whose shown row is ready (T,), if hardly a history is without them."""
+        """Confirm all rows of the tracks whose shown row is ready (T,), if the track is probable enough."""
         ready = ready & self.forest.sure & self.shown(len(ready))
         register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
         return ready
