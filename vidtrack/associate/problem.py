@@ -52,8 +52,8 @@ class Problem:
     ) -> Problem:
         """The problem of the pairs inside a gate, of predicted measurements zhat (T, m), cov (T, m, m) and a scan.
 
-        run (T,) Monte Carlo runs, label (T,) classes, -1 unknown: a pair has one run and, where both are known, one
-        class. angles: components of z that wrap.
+        run (T,) Monte Carlo runs, label (T,) classes, -1 unknown: both sides of a pair are of one run, and of one class
+        where both classes are known. angles: components of z that wrap.
         """
         pairs = gate.pairs(zhat, cov, scan, run, angles)
         if label is not None and scan.label is not None:

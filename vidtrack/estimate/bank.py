@@ -56,4 +56,4 @@ class Estimator(Protocol):
         """New rows with known moments x (B, n), P (B, n, n); scale (B,)."""
 
     def keep(self, rows: np.ndarray) -> None:
-        """Keep the rows of these indices only."""
+        """Drop all rows but these indices."""

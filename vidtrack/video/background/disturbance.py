@@ -146,7 +146,7 @@ class Disturbance:
 
     @property
     def _black(self) -> np.float32:
-        """Luminance of black in the picture, which haze raises."""
+        """Luminance of black as it is seen: haze lifts it where it takes contrast away."""
         lift = max(0.0, self._veil - self._view.black) * (1 - self._contrast) / (1 - LEAST_CONTRAST)
         return np.float32(self._view.black + lift)
 
