@@ -65,7 +65,7 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
-        """zhat (T, m) and its covariance (T, m, m) without R, over all modes."""
+        """zhat (T, m) and its covariance (T, m, m) over all modes; the innovation covariance is that plus R."""
         each = [bank.predicted_measurement(sensor) for bank in self.banks]
         first = each[0][0]
         off = np.stack([wrapped(zhat - first, sensor.angles) for zhat, _ in each])
