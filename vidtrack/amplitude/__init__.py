@@ -1,1 +1,1 @@
-"""How strong a signal must be: amplitude densities, CFAR, information reduction, optimal detection thresholds."""
+"""Amplitudes: densities, CFAR, information reduction, optimal detection thresholds."""

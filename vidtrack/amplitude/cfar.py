@@ -1,8 +1,8 @@
-"""Constant false alarm rate: thresholds from the neighbourhood of the cell under test.
+"""Constant false alarm rate (CFAR): thresholds from the cells around the cell under test.
 
-Powers are those of a square-law detector in exponential noise of unknown mean. Reference cells are the nearest
-ones on both sides beyond the guard cells; at the ends of an array the missing ones come from the other side, so
-P_FA is the same everywhere.
+Powers are the output of a square-law detector in exponential noise of unknown mean. Reference cells are the nearest
+cells on both sides beyond the guard cells; at the ends of an array the missing cells come from the other side, so P_FA
+is the same everywhere.
 """
 
 from __future__ import annotations
@@ -50,18 +50,18 @@ def os_detection_probability(p_fa: float, snr: ArrayLike, cells: int, rank: int)
 def ca_threshold(power: Floats, p_fa: float, cells: int = 16, guard: int = 2) -> Floats:
     """Thresholds (..., n) for powers (..., n) along the last axis: alpha times the mean of the reference cells.
 
-    Raises ConfigError where the last axis has not that many cells, or `cells` is not even.
+    Raises ConfigError if the last axis is too short, or `cells` is not even.
     """
     return float(ca_factor(p_fa, cells)) * _levels(power, cells, guard, 0)
 
 
 def os_threshold(power: Floats, p_fa: float, cells: int = 16, rank: int = 12, guard: int = 2) -> Floats:
-    """Thresholds as of `ca_threshold`, from the rank-th smallest reference cell: other targets do not raise it."""
+    """As `ca_threshold`, from the rank-th smallest reference cell, which other targets do not raise."""
     return os_factor(p_fa, cells, rank) * _levels(power, cells, guard, rank)
 
 
 def _log_exceeds(factor: float | Floats, cells: int, rank: int) -> Floats:
-    """ln P(cell > factor times the rank-th smallest of the others), equal means."""
+    """ln P(cell > factor times the rank-th smallest reference cell), for equal means."""
     full = gammaln(cells + 1) - gammaln(cells - rank + 1)
     return np.asarray(full + gammaln(cells - rank + 1 + factor) - gammaln(cells + 1 + factor))
 

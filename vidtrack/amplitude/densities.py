@@ -1,4 +1,4 @@
-"""How strong echoes are: densities of target and clutter amplitudes, P_D and P_FA.
+"""Densities of target and clutter amplitudes, P_D and P_FA.
 
 An amplitude a is the envelope in units of the noise's in-phase standard deviation, so that noise alone has the
 density a exp(-a^2 / 2) and a square-law detector's power, with noise mean one, is a^2 / 2.
@@ -39,7 +39,7 @@ class Weibull:
         return np.asarray(-self.rate * np.asarray(a, float) ** self.shape)
 
     def survival(self, a: ArrayLike) -> Floats:
-        """P(amplitude > a): what a threshold a lets pass."""
+        """P(amplitude > a)."""
         return np.asarray(np.exp(self.log_survival(a)))
 
     def log_pdf(self, a: ArrayLike) -> Floats:
@@ -52,7 +52,7 @@ class Weibull:
         return np.asarray(np.exp(self.log_pdf(a)))
 
     def threshold(self, probability: ArrayLike) -> Floats:
-        """The amplitude that a share `probability` exceeds; with the clutter's density, the threshold of a P_FA."""
+        """The amplitude exceeded with this probability; for clutter, the threshold of a P_FA."""
         return np.asarray((-np.log(probability) / self.rate) ** (1 / self.shape))
 
     def sample(self, rng: np.random.Generator, size: int | tuple[int, ...], above: ArrayLike = 0.0) -> Floats:
@@ -66,7 +66,7 @@ RAYLEIGH = Weibull()
 
 
 def swerling1(snr: float) -> Weibull:
-    """Amplitudes of a target that fluctuates from scan to scan, in noise; snr: mean power ratio, linear.
+    """Amplitudes of a Swerling I target in noise; snr: mean power ratio, linear.
 
     Raises ConfigError for an SNR that is negative or not finite.
     """
@@ -81,9 +81,9 @@ def linear(db: float) -> float:
 
 
 def detection_probability(p_fa: ArrayLike, snr: float, clutter: Weibull = RAYLEIGH) -> Floats:
-    """P_D of a Swerling I target at the threshold that a share p_fa of the clutter exceeds.
+    """P_D of a Swerling I target at the threshold that clutter exceeds with probability p_fa.
 
-    In Rayleigh clutter this is P_FA^(1 / (1 + SNR)); in any other it is not (paper 002).
+    It is P_FA^(1 / (1 + SNR)) in Rayleigh clutter only (paper 002).
     """
     return swerling1(snr).survival(clutter.threshold(p_fa))
 
@@ -96,7 +96,7 @@ def false_alarm_probability(p_d: ArrayLike, snr: float, clutter: Weibull = RAYLE
 def log_ratio(a: ArrayLike, threshold: ArrayLike, target: Weibull, clutter: Weibull = RAYLEIGH) -> Floats:
     """ln r(a) = ln p_T(a) - ln p_F(a), both densities given that the threshold was exceeded (paper 002, 12 and 13).
 
-    In logarithms, because r itself overflows for strong echoes.
+    In logarithms, because r overflows for strong echoes.
     """
     given = target.log_survival(threshold) - clutter.log_survival(threshold)
     return np.asarray(target.log_pdf(a) - clutter.log_pdf(a) - given)

@@ -1,6 +1,6 @@
-"""The information reduction factor q2: how much of a sure measurement's worth misses and clutter leave to a PDAF.
+"""The information reduction factor q2 of a PDAF: the effect of misses and clutter on its covariance.
 
-The covariance then follows the modified Riccati equation P = P^- - q2 K S K' (paper 000, eq. 16).
+The covariance follows the modified Riccati equation P = P^- - q2 K S K' (paper 000, eq. 16).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ POINTS_S, POINTS_R = 400, 240
 """Quadrature points; 800 and 480 change q2 by less than 1e-12."""
 
 LEAST_P_D = 1e-150
-"""Stands for any smaller P_D, down to zero, whose powers would overflow."""
+"""Smaller P_D, down to zero, are raised to this: their powers would overflow."""
 
 LEAST_GATE, MOST_GATE = 0.1, 10.0
-"""Standard deviations; the quadrature is made for gates between."""
+"""Standard deviations; range of gates that the quadrature supports."""
 
 KE_DIM, KE_GATE = 2, 4.0
-"""The only dimension and gate that Kershaw and Evans fitted."""
+"""Dimension and gate of Kershaw and Evans' fit."""
 
 
 def ball(dim: int) -> float:
@@ -74,10 +74,9 @@ def q2_fit(p_d: ArrayLike, expected_clutter: ArrayLike) -> Floats:
 
 @lru_cache
 def _table(dim: int, gate: float) -> tuple[Floats, Floats, Floats]:
-    """What does not depend on P_D and rho V: s, 1 - Phi(s), and J(s) times all constants and quadrature weights.
+    """The terms independent of P_D and rho V: s, 1 - Phi(s), and J(s) times all constants and quadrature weights.
 
-    s is spaced evenly in its logarithm, where the integrand decays at both ends (trapezoid rule); r in 0..g has
-    Gauss-Legendre points.
+    Trapezoid rule in ln s, where the integrand decays at both ends; Gauss-Legendre points for r in 0..g.
     """
     if dim < 1 or not LEAST_GATE <= gate <= MOST_GATE:
         raise ConfigError(

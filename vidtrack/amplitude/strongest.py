@@ -1,6 +1,7 @@
-"""What a probabilistic strongest neighbour filter (PSNF) can expect of the strongest detection in its gate.
+"""The strongest detection in a gate: probabilities, and the reduction factor q of a PSNF.
 
-Everything depends on the gate only through n = V / V_c, its volume in resolution cells (paper 002).
+PSNF: probabilistic strongest neighbour filter. All results depend on the gate only through n = V / V_c, its volume in
+resolution cells (paper 002).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class Strongest:
     """The strongest detection in a gate of `gate` standard deviations in `dim` dimensions.
 
     snr      linear SNR of the Swerling I target
-    p_fa     share of the clutter's cells above the threshold
+    p_fa     probability of false alarm per resolution cell
     clutter  the clutter's amplitudes
 
     Raises ConfigError for a P_FA or gate out of range.
@@ -52,7 +53,7 @@ class Strongest:
 
     @property
     def p_d(self) -> float:
-        """P_D, from the threshold (not from P_FA^(1 / (1 + SNR)), which holds for Rayleigh clutter only)."""
+        """P_D at the threshold of `p_fa`, for any clutter."""
         return float(self.target.survival(self.clutter.threshold(self.p_fa)))
 
     def alone(self, cells: float) -> float:
@@ -69,14 +70,14 @@ class Strongest:
     def factor_paper(self, cells: float) -> float:
         """The factor q of P = P^- - q K S K' in the paper's prediction, eq. (33).
 
-        It averages the error of a filter that knows whether the strongest detection is the target: a lower bound.
+        It is the mean error of a filter that knows whether the strongest detection is the target: a lower bound.
         """
         return gated_spread(self.dim, self.gate) * gated(self.dim, self.gate) * self.alone(cells)
 
     def factor(self, cells: float) -> float:
-        """The factor q of the PSNF itself: E[P_T^2 v' S^-1 v] / dim, P_T the posterior that it weighs with.
+        """The factor q of the PSNF: E[P_T^2 v' S^-1 v] / dim, with its posterior weight P_T.
 
-        The mean of eq. (24); as for the PDAF's q2, what the filter does not know counts.
+        It is the mean of eq. (24) and, as the PDAF's q2, includes the uncertainty of origin.
         """
         y, w = self._exponents(cells)
         r, w_r = self.gate * (_RADIUS + 1) / 2, self.gate * _RADIUS_WEIGHT / 2
@@ -90,7 +91,7 @@ class Strongest:
         return float(w_r @ (ball(self.dim) * r ** (self.dim + 1) * of_radius))
 
     def _amplitude(self, y: Floats) -> Floats:
-        """Amplitude at y = rate a^shape, minus the logarithm of the clutter's survival function."""
+        """Amplitude at y = rate a^shape = -ln(clutter's survival function)."""
         return np.asarray((y / self.clutter.rate) ** (1 / self.clutter.shape))
 
     def _target_density(self, y: Floats) -> Floats:
@@ -101,9 +102,9 @@ class Strongest:
     def _exponents(self, cells: float) -> tuple[Floats, Floats]:
         """Quadrature points and weights of y above the threshold.
 
-        Below ln n - 4 some false detection is stronger for certain. Panels of 2 cover the change about ln n, then
-        they grow, up to where the target's survival is exp(-45); at the lower end they are fine, since y = 0 can be
-        a branch point.
+        Below ln n - 4 a false detection is stronger with certainty. Panels of width 2 cover the transition about ln n;
+        then they grow, up to a target's survival of exp(-45). At the lower end they are finer, because y = 0 can be a
+        branch point.
         """
         low = max(-log(self.p_fa), log(max(cells, 1e-300)) - 4, 0.0)
         high = self.clutter.rate * (90 * (1 + self.snr)) ** (self.clutter.shape / 2)

@@ -1,4 +1,4 @@
-"""The detection threshold that suits a PDAF best: P_F that maximises the information reduction factor q2.
+"""The optimal detection threshold of a PDAF: the P_F that maximises the information reduction factor q2.
 
 Noise and clutter are Rayleigh and the target Swerling I, so P_D = P_F^(1 / (1 + SNR)); n is the number of
 resolution cells in the gate, and rho V = n P_F. SNR is linear.
@@ -18,17 +18,17 @@ from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
 
 LEAST_LOG_P_FA = -40.0
-"""The optimum is sought down to P_F = exp(-40)."""
+"""The search for the optimum ends at P_F = exp(-40)."""
 
 KE_LEAST_SNR = 1.57
 """Up to this linear SNR (1.96 dB) the fit's q2 has no maximum below P_F = 1; exact q2 can have one."""
 
 
 def closed_form(snr: ArrayLike, cells: ArrayLike, p_fa_max: float = 1.0) -> tuple[Floats, Mask]:
-    """P_F* = [0.37 n (SNR - 1.57)]^(-(1 + SNR) / (SNR - 0.57)), and whether it was clamped (paper 000, eq. 25).
+    """P_F* = [0.37 n (SNR - 1.57)]^(-(1 + SNR) / (SNR - 0.57)), and whether it is clamped (paper 000, eq. 25).
 
-    snr, cells (n) broadcast. Where SNR <= 1.57, or the formula gives p_fa_max or more, the fit's q2 grows with P_F
-    up to there: p_fa_max is returned and flagged.
+    snr, cells (n) broadcast. If SNR <= 1.57, or the formula gives p_fa_max or more, the fit's q2 grows with P_F up to
+    p_fa_max, which is returned as clamped.
     """
     snr, cells = np.broadcast_arrays(np.asarray(snr, float), np.asarray(cells, float))
     valid = snr > KE_LEAST_SNR
@@ -43,7 +43,7 @@ def closed_form(snr: ArrayLike, cells: ArrayLike, p_fa_max: float = 1.0) -> tupl
 def optimum(snr: float, cells: ArrayLike, p_fa_max: float = 1.0, dim: int = 2, gate: float = 4.0) -> Floats:
     """P_F in (0, p_fa_max] that maximises the exact q2 for each number of cells.
 
-    All of ln P_F is searched, then ever finer around the best, since a second maximum can lie at the edge.
+    A grid over ln P_F is searched, then refined around the best point, because a second maximum can lie at the edge.
     """
     cells = np.asarray(cells, float)
     low, high = np.full(cells.shape, LEAST_LOG_P_FA), np.full(cells.shape, np.log(p_fa_max))
@@ -58,12 +58,12 @@ def optimum(snr: float, cells: ArrayLike, p_fa_max: float = 1.0, dim: int = 2, g
 
 @dataclass(frozen=True, slots=True)
 class ThresholdController:
-    """Sets a tracker's detection threshold each scan from its own innovation covariances (paper 000).
+    """Sets a tracker's detection threshold in each scan from its innovation covariances (paper 000).
 
     snr          linear SNR of the target
     cell_volume  V_c of a resolution cell, in the units of the measurement
     gate         g [standard deviations]
-    p_fa_max     largest P_F it gives: at 1 every cell is a detection
+    p_fa_max     largest P_F; at 1 every cell is a detection
     method       "exact": optimum of the exact q2; "closed-form": the paper's, for 2 dimensions and gate 4 only
     """
 
@@ -86,7 +86,7 @@ class ThresholdController:
     def p_fa(self, S: Floats) -> Floats:
         """P_F (T,) for innovation covariances S (T, m, m).
 
-        The exact optimum is interpolated in a table, made once for each SNR, gate and dimension.
+        The exact optimum is interpolated in a table, computed once for each SNR, gate and dimension.
         """
         dim = S.shape[-1]
         cells = gate_volume(S, self.gate) / self.cell_volume
@@ -101,7 +101,7 @@ LOG_CELLS = np.linspace(np.log(1e-2), np.log(1e8), 461)
 """ln n of the table's knots; beyond them the end values hold."""
 
 JUMP = 0.3
-"""A larger change of ln P_F from knot to knot is a change from one maximum of q2 to another, with none between."""
+"""A larger change of ln P_F between knots is a jump from one maximum of q2 to another."""
 
 
 @lru_cache
@@ -111,7 +111,7 @@ def _optimum_table(snr: float, p_fa_max: float, dim: int, gate: float) -> Floats
 
 
 def _interpolated(log_cells: Floats, table: Floats) -> Floats:
-    """Linear between knots, except that the nearer knot counts across a jump."""
+    """Linear interpolation; across a jump the value of the nearer knot."""
     at = np.clip((log_cells - LOG_CELLS[0]) / (LOG_CELLS[1] - LOG_CELLS[0]), 0, len(LOG_CELLS) - 1)
     knot = np.minimum(at.astype(int), len(LOG_CELLS) - 2)
     step = table[knot + 1] - table[knot]

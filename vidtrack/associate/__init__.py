@@ -1,1 +1,1 @@
-"""Which measurement belongs to which track: the gate, clusters, and one file an association rule."""
+"""Data association: the gate, clusters, and one file per association rule."""

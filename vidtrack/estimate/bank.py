@@ -1,4 +1,4 @@
-"""The interface of an estimator: one filter per row, all rows as arrays."""
+"""The interface of an estimator: a bank of filters, one row per track."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from vidtrack.scan import Scan
 
 
 class Estimator(Protocol):
-    """Filters in rows.
+    """A bank of filters, one per row.
 
-    model  the motion model, whose columns position and velocity the moments have
+    model  the motion model; x has its columns `position` and `velocity`
     x, P   (T, n), (T, n, n) moments of all rows
     hits   (T,) updates so far
-    scale  (T,) size of each object where the model works per size, one elsewhere
+    scale  (T,) size of each object if the model is `per_size`, else one
     """
 
     model: Motion
@@ -38,16 +38,16 @@ class Estimator(Protocol):
         """x, P after dt seconds; changes nothing."""
 
     def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) or (T, n, n) derivative of what `ahead` makes of means x (T, n)."""
+        """(1, n, n) or (T, n, n) derivative of `ahead` by the means x (T, n)."""
 
     def predict(self, dt: float) -> None:
-        """Move all rows dt seconds on."""
+        """Predict all rows by dt seconds."""
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
-        """zhat (T, m) and its covariance (T, m, m); the innovation covariance is that plus R."""
+        """zhat (T, m) and its covariance (T, m, m) without R."""
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows from the weights of a decision."""
+        """Replace the rows by their successors, updated with the weights of a decision."""
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
         """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""

@@ -1,4 +1,4 @@
-"""Interacting multiple models: a bank for each way to move, and how probable each way is."""
+"""Interacting multiple models: one bank per motion model, and the probability of each model."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from vidtrack.estimate.sensor import Sensor, wrapped
 from vidtrack.scan import Scan
 
 LEAST = 1e-9
-"""Smallest probability of a mode: none is ever ruled out for good."""
+"""Smallest probability of a mode, so that every mode can recover."""
 
 
 class IMMBank:
-    """IMM filters in rows (Blom and Bar-Shalom 1988).
+    """IMM filters, one per row (Blom and Bar-Shalom 1988).
 
     models  motion models, the first the usual one; all have the same dim
-    stay_s  mean time [s] for which each model holds before another takes over
+    stay_s  mean sojourn time [s] of each model
 
-    Models may have more components than position and velocity; what another model does not know keeps its own
-    values in the mixing. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
+    Models may have components beyond position and velocity. In the mixing, a component that the other model lacks
+    keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
     """
 
     def __init__(self, models: Sequence[Motion], stay_s: Sequence[float]) -> None:
@@ -52,17 +52,16 @@ class IMMBank:
         return len(self.x)
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
-        """x, P after dt seconds; changes nothing."""
         return self._moments(*self._moved(dt))
 
     def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) derivative that all modes have in common: positions go on with their velocities."""
+        """(1, n, n) derivative of constant velocity, which all modes share."""
         J = np.eye(x.shape[1])
         J[self.model.position, self.model.velocity] = dt
         return J[None]
 
     def predict(self, dt: float) -> None:
-        """Mix the modes and move all rows dt seconds on."""
+        """Mix the modes and predict all rows by dt seconds."""
         self.banks, self.mode = self._moved(dt)
         self.x, self.P = self._moments(self.banks, self.mode)
 
@@ -79,9 +78,9 @@ class IMMBank:
         return Modes(self.mode.T, np.stack([zhat for zhat, _ in each]), np.stack([cov for _, cov in each]))
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows of each mode, with the weights as that mode sees them, and the modes' new probabilities.
+        """Update each mode with its own weights, and the probabilities of the modes.
 
-        P(mode, measurement) = beta P(mode) N_mode / sum over modes of P(mode) N_mode; a miss tells nothing of modes.
+        P(mode, measurement) = beta P(mode) N_mode / sum over modes of P(mode) N_mode; a miss leaves P(mode) unchanged.
         """
         parent, row = decision.parent, decision.row
         before = self.mode[parent].T
@@ -103,7 +102,6 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
-        """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
         for bank in self.banks:
             bank.append(position, cov, scale)
         self._enter(len(position), scale)
@@ -118,7 +116,6 @@ class IMMBank:
         self._enter(len(x), scale)
 
     def keep(self, rows: np.ndarray) -> None:
-        """Drop all rows but these indices."""
         for bank in self.banks:
             bank.keep(rows)
         self.mode, self.hits, self.scale = self.mode[rows], self.hits[rows], self.scale[rows]
@@ -131,7 +128,7 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def _moved(self, dt: float) -> tuple[list[KalmanBank], Floats]:
-        """The banks after mixing and dt seconds, and the modes' probabilities then."""
+        """The banks after mixing and a prediction by dt seconds, and the probabilities of the modes then."""
         switch = self._switching(dt)
         mode = self.mode @ switch
         moved = []
@@ -145,7 +142,7 @@ class IMMBank:
         return moved, mode
 
     def _switching(self, dt: float) -> Floats:
-        """(r, r) probability to go from one model to another within dt seconds."""
+        """(r, r) transition probabilities of the models over dt seconds."""
         stay = np.exp(-dt / self.stay_s)
         r = len(stay)
         leave = np.repeat(((1 - stay) / (r - 1))[:, None], r, axis=1)
@@ -159,7 +156,7 @@ class IMMBank:
 
 
 def _lifted(source: KalmanBank, target: KalmanBank, shared: int) -> tuple[Floats, Floats]:
-    """Moments of one mode in the state of another: what the source does not hold, the target keeps (Yuan 2012)."""
+    """Moments of one mode in the state of another; components that the source lacks are the target's (Yuan 2012)."""
     if source.model.states == target.model.states:
         return source.x, source.P
     x, P = target.x.copy(), target.P.copy()

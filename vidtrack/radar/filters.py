@@ -1,4 +1,4 @@
-"""Motion models and estimators by the names that users give them, in metres and seconds."""
+"""Motion models and estimators by their names in the settings, in metres and seconds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vidtrack.radar.scans import Measurements
 
 
 def motion(settings: RadarSettings, dim: int) -> Motion:
-    """The motion model that the settings name."""
+    """The motion model of the settings."""
     speed, accel, hold_s = settings.max_speed / 2, settings.accel, settings.hold_s
     if settings.model == "ca":
         return ConstantAcceleration(dim, change=accel, hold_s=hold_s, speed=speed, accel=accel)
@@ -36,7 +36,7 @@ def motion(settings: RadarSettings, dim: int) -> Motion:
 
 
 def estimator(settings: RadarSettings, found: Measurements, seed: int = 0) -> Callable[[Motion], Estimator]:
-    """What makes the settings' bank of filters from a motion model; the seed is for what is random."""
+    """A factory of the settings' bank of filters from a motion model; seed: for particles."""
     if settings.estimator == "ukf":
         return UnscentedBank
     if settings.estimator == "particle":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
-from vidtrack.associate.trust import EQUAL, Trust
+from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
 from vidtrack.config.settings import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.tracking.deferred.forest import ForestRule
@@ -101,7 +101,7 @@ def build_box_tracker(
             coast_scans=None,
         ),
         picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace, exit_s=EXIT_S * pace),
-        trust=EQUAL if detections.sure_score is None else Trust(detections.sure_score),
+        two_stage=SINGLE_STAGE if detections.sure_score is None else TwoStage(detections.sure_score),
         detection_probability=detections.detection_probability,
         clutter_density=settings.clutter_density,
         explain=explain,

@@ -1,1 +1,1 @@
-"""The tracker and its policies. Read `tracker.py` first."""
+"""The tracker and its parts. Read `tracker.py` first."""

@@ -1,1 +1,1 @@
-"""From pixels to scans: sources of frames, background, camera motion, blobs."""
+"""From video to scans: sources of frames, background, camera motion, blobs."""

@@ -1,4 +1,4 @@
-"""The span of media time that a run looks at."""
+"""The span of media time of a run."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Motion models: how a target moves between two scans."""
+"""Motion models of targets."""

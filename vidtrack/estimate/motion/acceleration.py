@@ -10,7 +10,7 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.estimate.motion.model import Columns, at_rest, check
 
 LONG = 10.0
-"""Correlation times beyond which a step is made of two halves."""
+"""Steps longer than this many correlation times are composed of two halves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,9 +18,9 @@ class ConstantAcceleration(Columns):
     """Nearly constant acceleration (Bar-Shalom, Li, Kirubarajan 2001, section 6.3).
 
     change  standard deviation of the acceleration's change, per s^2
-    hold_s  the change happens within this time [s]: continuous white jerk of intensity change^2 / hold_s. None:
-            it happens once a scan, Q = change^2 G G', G = [dt^2/2, dt, 1] (the model of the alpha-beta-gamma filter)
-    speed, accel   standard deviations of a new track's unknown velocity, per s, and acceleration, per s^2
+    hold_s  the change takes place within this time [s]: continuous white jerk of intensity change^2 / hold_s. None:
+            once per scan, Q = change^2 G G', G = [dt^2/2, dt, 1] (the model of the alpha-beta-gamma filter)
+    speed, accel   prior standard deviations of a new track's velocity, per s, and acceleration, per s^2
     """
 
     dim: int = 2
@@ -35,7 +35,6 @@ class ConstantAcceleration(Columns):
 
     @property
     def states(self) -> int:
-        """n, components of the state."""
         return 3 * self.dim
 
     def transition(self, dt: float, x: Floats) -> Floats:
@@ -47,7 +46,6 @@ class ConstantAcceleration(Columns):
         return F
 
     def process_noise(self, dt: float, x: Floats, P: Floats, hits: Ints, scale: Floats) -> Floats:
-        """Q (T, n, n) over dt seconds; scale (T,) multiplies the standard deviations."""
         if self.hold_s is None:
             G = np.array([dt**2 / 2, dt, 1.0])
             Q = np.outer(G, G)
@@ -58,17 +56,16 @@ class ConstantAcceleration(Columns):
         return _each_axis(Q, self.dim) * (self.change * scale[:, None, None]) ** 2
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
-        """x (B, n), P (B, n, n) of new rows from one located measurement each."""
         return at_rest(position, cov, _priors(self.dim, self.speed, self.accel) * scale[:, None])
 
 
 @dataclass(frozen=True, slots=True)
 class Singer(Columns):
-    """Acceleration that fades: exponentially correlated in time (Singer 1970).
+    """Exponentially correlated acceleration (Singer 1970).
 
     accel   standard deviation of the acceleration, per s^2
     hold_s  its correlation time [s]
-    speed   standard deviation of a new track's unknown velocity, per s
+    speed   prior standard deviation of a new track's velocity, per s
     """
 
     dim: int = 2
@@ -82,7 +79,6 @@ class Singer(Columns):
 
     @property
     def states(self) -> int:
-        """n, components of the state."""
         return 3 * self.dim
 
     def transition(self, dt: float, x: Floats) -> Floats:
@@ -94,18 +90,16 @@ class Singer(Columns):
         return F
 
     def process_noise(self, dt: float, x: Floats, P: Floats, hits: Ints, scale: Floats) -> Floats:
-        """Q (T, n, n) over dt seconds; scale (T,) multiplies the standard deviations."""
         return _each_axis(self._discretised(dt)[1], self.dim) * scale[:, None, None] ** 2
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
-        """x (B, n), P (B, n, n) of new rows from one located measurement each."""
         return at_rest(position, cov, _priors(self.dim, self.speed, self.accel) * scale[:, None])
 
     def _discretised(self, dt: float) -> tuple[Floats, Floats]:
         """F and Q (3, 3) of one axis: da/dt = -a / hold_s + w, of intensity 2 accel^2 / hold_s (Van Loan 1978)."""
         from scipy.linalg import expm
 
-        if dt > LONG * self.hold_s:  # the matrix below holds exp(dt / hold_s)
+        if dt > LONG * self.hold_s:  # the matrix below contains exp(dt / hold_s)
             F, Q = self._discretised(dt / 2)
             return F @ F, F @ Q @ F.T + Q
         A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -1 / self.hold_s]])
@@ -117,7 +111,7 @@ class Singer(Columns):
 
 
 def _each_axis(M: Floats, dim: int) -> Floats:
-    """(1, n, n) a matrix (3, 3) over [position, velocity, acceleration] for each axis, in the state's order."""
+    """(1, n, n) block matrix of M (3, 3) over [position, velocity, acceleration], for each axis, in state order."""
     order = np.concatenate([np.arange(2 * dim).reshape(dim, 2), np.arange(2 * dim, 3 * dim)[:, None]], axis=1)
     out = np.zeros((1, 3 * dim, 3 * dim))
     for axis in order:
@@ -126,5 +120,5 @@ def _each_axis(M: Floats, dim: int) -> Floats:
 
 
 def _priors(dim: int, speed: float, accel: float) -> Floats:
-    """(1, n) standard deviations of what one measurement does not tell."""
+    """(1, n) prior standard deviations of the components that one measurement does not determine."""
     return np.array([[speed] * (2 * dim) + [accel] * dim])

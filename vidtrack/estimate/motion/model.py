@@ -11,14 +11,14 @@ from vidtrack.errors import ConfigError
 
 
 class Motion(Protocol):
-    """How a state moves, and how its uncertainty grows between measurements.
+    """A motion model: transition and process noise of a state.
 
-    Every model's state begins with [x, vx, y, vy, ...]; what else it holds (accelerations, a turn rate) follows.
+    Every state begins with [x, vx, y, vy, ...]; other components (accelerations, a turn rate) follow.
 
     dim        space dimensions
     states     n, components of the state
     position, velocity   columns of the state, one per axis
-    per_size   the noise is in object sizes instead of pixels or metres
+    per_size   the noise is in object sizes, not in pixels or metres
     """
 
     def __hash__(self) -> int: ...
@@ -39,7 +39,7 @@ class Motion(Protocol):
     def per_size(self) -> bool: ...
 
     def transition(self, dt: float, x: Floats) -> Floats:
-        """F (1, n, n) or (T, n, n) with F x the states x (T, n) after dt seconds."""
+        """F (1, n, n) or (T, n, n): F x are the states x (T, n) after dt seconds."""
 
     def jacobian(self, dt: float, x: Floats, F: Floats) -> Floats:
         """(1, n, n) or (T, n, n) derivative of F x by x; F itself for linear motion."""
@@ -52,7 +52,7 @@ class Motion(Protocol):
 
 
 class Columns:
-    """Where positions and velocities stand in the state of a model with `dim`."""
+    """The columns of positions and velocities in the state of a model with `dim`."""
 
     __slots__ = ()
     dim: int
@@ -69,7 +69,7 @@ class Columns:
 
 
 def check(model: Columns, dims: tuple[int, ...], *names: str) -> None:
-    """Raise ConfigError if the model's `dim` is not among dims, or a named value is given and not above zero."""
+    """Raise ConfigError if the model's `dim` is not among dims, or a named value is not None and not above zero."""
     kind = type(model).__name__
     if model.dim not in dims:
         allowed = ", ".join(map(str, dims[:-1]))
@@ -81,7 +81,7 @@ def check(model: Columns, dims: tuple[int, ...], *names: str) -> None:
 
 
 def at_rest(position: Floats, cov: Floats, sigma: Floats) -> tuple[Floats, Floats]:
-    """x (B, n), P (B, n, n): located at position (B, d), cov (B, d, d), all else zero with deviations sigma (B, n)."""
+    """x (B, n), P (B, n, n): position (B, d) with cov (B, d, d), all else zero with deviations sigma (B, n)."""
     dim = position.shape[1]
     x = np.zeros(sigma.shape)
     P = np.zeros((*sigma.shape, sigma.shape[1]))

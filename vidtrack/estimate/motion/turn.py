@@ -1,4 +1,4 @@
-"""Coordinated turn: the speed stays, the heading turns at a rate that is estimated too."""
+"""Coordinated turn: constant speed and a turn rate that is part of the state."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.estimate.motion.model import Columns, at_rest, check
 
 STRAIGHT = 1e-4
-"""Turn within one step [rad] below which the series of its sine and cosine are used."""
+"""Turn in one step [rad] below which series replace sine and cosine."""
 
 
 @dataclass(frozen=True, slots=True)
 class CoordinatedTurn(Columns):
     """State [x, vx, y, vy, w], or [x, vx, y, vy, z, vz, w] with a level turn; w is the turn rate [rad/s].
 
-    w is counted from x to y (Bar-Shalom, Li, Kirubarajan 2001, section 11.7).
+    w is positive from x to y (Bar-Shalom, Li, Kirubarajan 2001, section 11.7).
 
     accel      standard deviation of the acceleration, per s^2
     hold_s     its correlation time [s], as in ConstantVelocity; None: it is constant over a step
     turn       standard deviation of the change of the turn rate, rad/s per sqrt(s)
-    speed      standard deviation of a new track's unknown velocity, per s
-    turn_rate  standard deviation of a new track's unknown turn rate, rad/s
+    speed      prior standard deviation of a new track's velocity, per s
+    turn_rate  prior standard deviation of a new track's turn rate, rad/s
     """
 
     dim: int = 2
@@ -39,7 +39,6 @@ class CoordinatedTurn(Columns):
 
     @property
     def states(self) -> int:
-        """n, components of the state."""
         return 2 * self.dim + 1
 
     def transition(self, dt: float, x: Floats) -> Floats:
@@ -56,7 +55,7 @@ class CoordinatedTurn(Columns):
         return F
 
     def jacobian(self, dt: float, x: Floats, F: Floats) -> Floats:
-        """(T, n, n) derivative of F x: F and, in the last column, that by the turn rate."""
+        """(T, n, n) derivative of F x: F, and in the last column the derivative by the turn rate."""
         _, _, ds, dc = _arc(x[:, -1], dt)
         vx, vy = x[:, 1], x[:, 3]
         sin, cos = dt * np.sin(x[:, -1] * dt), dt * np.cos(x[:, -1] * dt)
@@ -82,7 +81,6 @@ class CoordinatedTurn(Columns):
         return Q
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
-        """x (B, n), P (B, n, n) of new rows from one located measurement each."""
         sigma = np.full((len(position), self.states), self.speed) * scale[:, None]
         sigma[:, -1] = self.turn_rate
         return at_rest(position, cov, sigma)

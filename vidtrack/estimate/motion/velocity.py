@@ -1,4 +1,4 @@
-"""Nearly constant velocity, the model of vehicles in pictures."""
+"""Nearly constant velocity, the default motion model."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class ConstantVelocity(Columns):
 
     accel    standard deviation of the acceleration along the heading, per s^2
     cross    the same across the heading; None: equal to accel (isotropic)
-    speed    standard deviation of a new track's unknown velocity, per s
-    hold_s   correlation time of the acceleration [s]: the noise then grows with time alone, whatever
-             the scan rate (continuous white noise of intensity accel^2 hold_s). None: the acceleration
-             is constant over each step, Q = accel^2 G G', G = [dt^2/2, dt] (the papers' model)
-    warmup   updates during which the noise stays isotropic, because the heading is not yet known;
-             an ellipse along a wrong heading makes the filter overconfident (paper 004, SPEC trap)
-    heading  a row's heading is known while its speed is above this many standard deviations of itself
-    per_size accel, cross and speed are in object sizes instead of pixels or metres
+    speed    prior standard deviation of a new track's velocity, per s
+    hold_s   correlation time of the acceleration [s]: continuous white noise of intensity accel^2 hold_s, independent
+             of the scan rate. None: the acceleration is constant over each step, Q = accel^2 G G', G = [dt^2/2, dt]
+             (the papers' model)
+    warmup   updates with isotropic noise, because the heading is not yet known; an ellipse along a wrong heading
+             makes the filter overconfident (paper 004, SPEC trap)
+    heading  a row's heading is known while its speed exceeds this many standard deviations of the speed
+    per_size accel, cross and speed are in object sizes, not in pixels or metres
     """
 
     dim: int = 2
@@ -41,7 +41,6 @@ class ConstantVelocity(Columns):
 
     @property
     def states(self) -> int:
-        """n, components of the state."""
         return 2 * self.dim
 
     def transition(self, dt: float, x: Floats) -> Floats:
@@ -53,7 +52,7 @@ class ConstantVelocity(Columns):
         return F
 
     def process_noise(self, dt: float, x: Floats, P: Floats, hits: Ints, scale: Floats) -> Floats:
-        """Q (T, n, n) over dt seconds: accelerations stretched along the heading of rows that know theirs.
+        """Q (T, n, n) over dt seconds, elongated along the heading in rows whose heading is known.
 
         x (T, n), P (T, n, n), hits (T,) updates so far, scale (T,) multiplies the standard deviations. The
         acceleration covariance is A = cross^2 I + (accel^2 - cross^2) u u', u the unit velocity (SPEC 004).
@@ -68,8 +67,8 @@ class ConstantVelocity(Columns):
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
         """State and covariance of new rows from one located measurement each.
 
-        position (B, d), cov (B, d, d), scale (B,) -> x (B, n), P (B, n, n). The velocity is zero with
-        the prior's variance: the second measurement then gives the two-point estimate.
+        position (B, d), cov (B, d, d), scale (B,) -> x (B, n), P (B, n, n). The velocity is zero with the prior
+        variance, so the second measurement gives the two-point estimate.
         """
         return at_rest(position, cov, np.repeat((self.speed * scale)[:, None], self.states, axis=1))
 
@@ -92,7 +91,7 @@ def _accelerations(
 ) -> Floats:  # fmt: skip
     """Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2.
 
-    A row's heading is known after enough updates, and while its speed is well above its own uncertainty.
+    A row's heading is known after `warmup` updates, while its speed exceeds `heading` standard deviations.
     """
     rows, n = x.shape
     dim = n // 2

@@ -23,7 +23,7 @@ REGION = 0.95
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """The region is that of our own filter; nothing is random here, so runs and seed change nothing."""
+    """Draw the region of our filter. Deterministic: runs and seed have no effect."""
     zhat, cov = predicted()
     S = cov + R
     along, across = np.sqrt(np.diag(S))
@@ -77,7 +77,7 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def predicted() -> tuple[Floats, Floats]:
-    """Predicted position (2,) and its covariance (2, 2) of a target seen at 2 px/frame, COAST frames after the last."""
+    """Predicted position (2,) and covariance (2, 2) of a target at 2 px/frame, COAST frames after the last update."""
     bank = KalmanBank(MODEL)
     bank.append(np.array([[-2.0 * UPDATES - 2.0 * COAST, 0.0]]), R[None], np.ones(1))
     one = Decision(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64), np.ones(1), np.zeros(1))

@@ -1,1 +1,1 @@
-"""How well a radar will track: errors and probabilities by theory, and the Monte Carlo runs beside them."""
+"""Performance prediction for a radar tracker: theory and Monte Carlo runs."""

@@ -1,4 +1,4 @@
-"""A filter's error in clutter, predicted by both formulas of its paper, and tried by simulation."""
+"""A filter's error in clutter: predicted by two formulas, and simulated."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from vidtrack.radar.performance.prediction import (
 Kind = Literal["psn", "pda"]
 
 LIMIT: dict[Kind, float] = {"psn": 20.0, "pda": 10.0}
-"""Position error above which a track is lost, in units of sqrt(r): as each paper's experiment is judged."""
+"""Position error above which a track is lost, in units of sqrt(r), as in each paper."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forecast:
     """Position errors sqrt(P11 + P33 + ...).
 
-    kind, scenario, law   what is predicted; law.p_d is the probability of detection
+    kind, scenario, law   filter, target and radar; law.p_d is the probability of detection
     scan    (scans,) 1, 2, ...
-    error   for each formula the errors (scans,); None where it does not hold
-    steady  where each ends; None: it grows without bound, or does not hold
+    error   errors (scans,) by each formula; None outside its range of validity
+    steady  steady-state error by each formula; None: it grows without bound, or the formula is not valid
     """
 
     kind: Kind
@@ -48,7 +48,7 @@ class Forecast:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """Simulated runs: actual_all (scans,) root mean square error of all; actual_kept of those never above `limit`."""
+    """Simulated runs: actual_all (scans,) RMS error of all runs, actual_kept of the runs never above `limit`."""
 
     runs: int
     limit: float
@@ -84,7 +84,7 @@ def forecast(
 
 
 def trial(outlook: Forecast, runs: int, seed: int) -> Trial:
-    """The same filter and radar in `runs` simulated tracks."""
+    """Simulate the filter and radar of a forecast in `runs` tracks."""
     from vidtrack.associate.pda import PDA
     from vidtrack.associate.strongest import PSN
     from vidtrack.radar.performance.in_gate import AllPlots, StrongestPlot

@@ -1,6 +1,6 @@
-"""What a radar reports in the gates of many independent runs: the target or not, and clutter.
+"""Simulated plots in the gates of many independent runs: target and clutter.
 
-Only what lies inside a gate matters to a single-target filter, so clutter is drawn there and nowhere else.
+A single-target filter uses the plots in its gate only, so clutter is drawn only there.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.scan import Scan
 
 MOST_CLUTTER = 1000.0
-"""False plots expected in a gate beyond which none are drawn and the target is missed: nothing can be learnt."""
+"""If more false plots than this are expected in a gate, no plot is drawn there: the scan carries no information."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gates:
-    """The gates of T runs at one time, and the target's measurement in each.
+    """The gates of T runs at one time, and the target's measurement of each run.
 
     zhat (T, m), S (T, m, m); gate g [standard deviations]; target (T, m)
     """
@@ -34,12 +34,12 @@ class Gates:
 
     @property
     def volume(self) -> Floats:
-        """(T,)"""
+        """(T,) volume of each gate."""
         return gate_volume(self.S, self.gate)
 
     @property
     def holds_target(self) -> Mask:
-        """(T,) whether the target's measurement lies inside."""
+        """(T,) gates that contain the target's measurement."""
         v = self.target - self.zhat
         d2 = np.einsum("ti,ti->t", v, np.linalg.solve(self.S, v[..., None])[..., 0])
         return np.asarray(d2 < self.gate**2)
@@ -54,7 +54,7 @@ class Gates:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plots:
-    """A scan of all runs, with what the associator is told: P_FA, P_D and clutter density (T,) of each run."""
+    """A scan of all runs, with P_FA, P_D and clutter density (T,) for the associator."""
 
     scan: Scan
     p_fa: Floats
@@ -64,7 +64,7 @@ class Plots:
 
 @dataclass(frozen=True, slots=True)
 class AllPlots:
-    """Everything above the threshold, for a PDAF; threshold: P_FA, fixed or set by a controller from each S."""
+    """All plots above the threshold, for a PDAF; threshold: P_FA, fixed or by a controller from each S."""
 
     snr: float
     threshold: float | ThresholdController
@@ -72,7 +72,7 @@ class AllPlots:
     clutter: Weibull = RAYLEIGH
 
     def draw(self, rng: np.random.Generator, t: float, gates: Gates, R: Floats) -> Plots:
-        """Poisson clutter, uniform in each gate, and the target if it is detected there."""
+        """Poisson clutter, uniform in each gate, and the target if it is detected in the gate."""
         runs = len(gates.zhat)
         level = self.threshold
         p_fa = level.p_fa(gates.S) if isinstance(level, ThresholdController) else np.full(runs, level)
@@ -89,7 +89,7 @@ class AllPlots:
 
 @dataclass(frozen=True, slots=True)
 class StrongestPlot:
-    """The strongest detection of each gate, all that a strongest neighbour filter looks at (paper 002)."""
+    """The strongest detection of each gate, for a strongest neighbour filter (paper 002)."""
 
     strongest: Strongest
     cell_volume: float
@@ -97,8 +97,8 @@ class StrongestPlot:
     def draw(self, rng: np.random.Generator, t: float, gates: Gates, R: Floats) -> Plots:
         """At most one plot a run, with its amplitude.
 
-        The strongest of all false amplitudes is drawn at once: with E exponential, E V_c / V is the share of the
-        clutter's cells that exceed it, and if that is below P_FA there is one.
+        The strongest false amplitude is drawn directly: with E exponential, it is exceeded in a cell with probability
+        E V_c / V; it is a plot if that is below P_FA.
         """
         runs, law = len(gates.zhat), self.strongest
         share = rng.standard_exponential(runs) * self.cell_volume / gates.volume

@@ -1,4 +1,4 @@
-"""Thousands of single-target runs in clutter as one bank of filters: what a prediction is checked against."""
+"""Monte Carlo simulation of single targets in clutter: thousands of runs as one bank of filters."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from vidtrack.radar.performance.in_gate import AllPlots, Gates, StrongestPlot
 from vidtrack.radar.performance.prediction import Scenario, position_error
 
 BLOCK = 1000
-"""Runs at a time: bounds the memory that clutter takes."""
+"""Runs per block; bounds the memory for clutter."""
 
 LAST_SCANS = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What became of the runs.
+    """Result of the runs.
 
     error     (scans, runs) distance of the estimate from the truth after each update
     expected  (scans, runs) the filter's own root mean square position error
     p_fa      (scans, runs)
-    outside   (runs,) for how many scans, up to the last, the target's measurement has been outside the gate
+    outside   (runs,) number of last scans in a row with the target's measurement outside the gate
     """
 
     error: Floats
@@ -38,16 +38,16 @@ class Outcome:
     outside: Ints
 
     def lost(self, limit: float) -> Mask:
-        """(runs,) error above `limit` at the end, or the target outside the gate in all of the last five scans."""
+        """(runs,) error above `limit` at the end, or target outside the gate in the last five scans."""
         return np.asarray((self.error[-1] > limit) | (self.outside >= LAST_SCANS))
 
     def strayed(self, limit: float) -> Mask:
-        """(runs,) error above `limit` at any scan, even if the track recovered."""
+        """(runs,) error above `limit` in any scan."""
         return np.asarray((self.error > limit).any(axis=0))
 
 
 def root_mean_square(error: Floats) -> tuple[Floats, Floats]:
-    """(scans,) root mean square over the runs of error (scans, runs), and its standard error; NaN without runs."""
+    """(scans,) RMS of error (scans, runs) over the runs, and its standard error; NaN without runs."""
     if not error.shape[1]:
         return np.full(len(error), np.nan), np.full(len(error), np.nan)
     square = error**2
@@ -64,7 +64,7 @@ def simulate(
     runs: int,
     rng: np.random.Generator,
 ) -> Outcome:
-    """Track one target per run; the initial estimate has the errors that P0 says."""
+    """Track one target per run; the initial errors have covariance P0."""
     blocks = [
         _block(scenario, radar, associate, scans, min(BLOCK, runs - first), rng) for first in range(0, runs, BLOCK)
     ]
@@ -106,6 +106,6 @@ def _block(
 
 
 def _scattered(rng: np.random.Generator, mean: Floats, cov: Floats) -> Floats:
-    """Rows of mean (T, n), each with Gaussian noise of covariance cov (n, n), which may be singular."""
+    """Rows of mean (T, n) plus Gaussian noise of covariance cov (n, n), which may be singular."""
     variance, axis = np.linalg.eigh(cov)
     return mean + (rng.standard_normal(mean.shape) * np.sqrt(np.maximum(variance, 0.0))) @ axis.T

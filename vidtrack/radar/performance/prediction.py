@@ -1,8 +1,8 @@
-"""How good a track will be in clutter, before a single plot is seen: modified Riccati equation and HYCA.
+"""Predicted covariance of a track in clutter: modified Riccati equation, hybrid conditional averaging (HYCA).
 
-Every prediction here is one recursion, P = P^- - q K S K', where the factor q in 0..1 follows from the volume of the
-gate: q2 for a PDAF (paper 000), its counterpart for a PSNF (paper 002). A q that falls as the gate grows can let the
-error grow without bound; such a prediction has no steady state.
+Every prediction is the recursion P = P^- - q K S K'. The factor q in 0..1 follows from the volume of the gate: q2 for a
+PDAF (paper 000), its counterpart for a PSNF (paper 002). If q falls as the gate grows, the error can grow without
+bound; the prediction then has no steady state.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Factor = Callable[[float], float]
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What is tracked, by which radar, with which gate; the plots are positions.
+    """Target, radar and gate; the plots are positions.
 
-    model        how the target moves
+    model        motion model of the target
     R            (m, m) covariance of a plot
     P0           (n, n) covariance after the initialisation
     gate         g [standard deviations]
@@ -70,9 +70,9 @@ class Scenario:
 
 
 def normalised(q: float, gate: float, cell_volume: float, dim: int = 2) -> Scenario:
-    """Nearly constant velocity with T = 1 and R = I, begun by two points on each axis (paper 002, section V).
+    """Nearly constant velocity with T = 1 and R = I, initialised from two points (paper 002, section V).
 
-    q: variance of the acceleration in units of r / T^4. Raises ConfigError for values that no radar has.
+    q: variance of the acceleration in units of r / T^4. Raises ConfigError for values out of range.
     """
     for name, value, low, high in (
         ("q", q, 1e-9, 1e9),
@@ -87,9 +87,9 @@ def normalised(q: float, gate: float, cell_volume: float, dim: int = 2) -> Scena
 
 
 def pda_factor(scenario: Scenario, p_d: float, p_fa: float, fit: bool = False) -> Factor:
-    """q2 of a PDAF; fit: Kershaw and Evans' formula in place of the exact one.
+    """q2 of a PDAF; fit: by Kershaw and Evans' formula, not exact.
 
-    Raises ConfigError where the fit is asked for outside 2 dimensions and gate 4.
+    Raises ConfigError for the fit outside 2 dimensions and gate 4.
     """
     if fit and (scenario.dim, scenario.gate) != (KE_DIM, KE_GATE):
         raise ConfigError(
@@ -106,8 +106,8 @@ def psn_factor(
 ) -> Factor:
     """q of a PSNF for HYCA.
 
-    mode  "paper": eq. (33) as printed, which is a lower bound of the error; "corrected": the mean of the filter's
-          own covariance, eq. (24)
+    mode  "paper": eq. (33) as printed, a lower bound of the error; "corrected": the mean of the filter's covariance,
+          eq. (24)
     """
     strongest = Strongest(snr, p_fa, clutter, scenario.dim, scenario.gate)
     if mode not in ("paper", "corrected"):
@@ -116,7 +116,7 @@ def psn_factor(
 
 
 def advance(scenario: Scenario, factor: Factor, P: Floats) -> Floats:
-    """One scan: expected covariance (n, n) after the update from that after the last one."""
+    """Expected covariance (n, n) after the update, from the covariance P after the last update."""
     P = scenario.F @ P @ scenario.F.T + scenario.Q
     PH = P @ scenario.H.T
     S = scenario.H @ PH + scenario.R
@@ -140,7 +140,7 @@ def position_error(scenario: Scenario, P: Floats) -> Floats:
 
 
 def steady_state(scenario: Scenario, factor: Factor, tolerance: float = 1e-9, most: int = 2000) -> Floats | None:
-    """The covariance (n, n) that the recursion settles at; None if it has not after `most` scans: it diverges."""
+    """The steady-state covariance (n, n); None if the recursion has not converged after `most` scans."""
     P = scenario.P0
     for _ in range(most):
         before, P = P, advance(scenario, factor, P)

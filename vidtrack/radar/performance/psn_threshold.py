@@ -1,4 +1,4 @@
-"""The detection threshold of a PSNF by its predicted error, the use that paper 002 promises."""
+"""The optimal detection threshold of a PSNF by its predicted error (paper 002)."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from vidtrack.errors import ConfigError
 from vidtrack.radar.performance.prediction import Scenario, position_error, psn_factor, steady_state
 
 SLACK = 1.01
-"""What counts as hardly worse than the best error."""
+"""Accepted ratio to the best error."""
 
 
 @dataclass(frozen=True, slots=True)
 class PsnThreshold:
-    """The best threshold, and how high it may be set at little cost.
+    """The best threshold, and the highest threshold at little cost.
 
-    p_fa           minimises the steady-state error; it is the largest allowed: the strongest detection and its
-                   amplitude carry more information the lower the threshold, never less
-    p_d            probability of detection there
-    error          position error of the corrected prediction's steady state; None: the prediction diverges
-    p_fa_one_percent  smallest P_FA whose steady-state error is within 1 % of that; None as before
+    p_fa              minimises the steady-state error; always the largest allowed, because a lower threshold never
+                      removes information
+    p_d               probability of detection at p_fa
+    error             steady-state position error of the corrected prediction; None: the prediction diverges
+    p_fa_one_percent  smallest P_FA with a steady-state error within 1 % of `error`; None: the prediction diverges
     """
 
     p_fa: float
@@ -37,8 +37,8 @@ def best_psn_threshold(
 ) -> PsnThreshold:
     """The P_FA in (0, p_fa_max] that minimises the corrected steady-state prediction.
 
-    The factor q is an integral of positive terms over all amplitudes above the threshold, so it only grows with
-    P_FA; how far P_FA can be lowered before that costs 1 % is found by bisection.
+    The factor q is an integral of positive terms over all amplitudes above the threshold, so it grows with P_FA. The
+    P_FA at 1 % more error is found by bisection.
     """
     if not 0 < p_fa_max <= 1:
         raise ConfigError(f"the largest P_FA is {p_fa_max}; it must lie above 0 and up to 1")

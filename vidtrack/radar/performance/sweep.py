@@ -1,4 +1,4 @@
-"""Plots that were not measured all at once: the prediction is moved to the time of the plots around it."""
+"""Measurement model of a scan whose plots have different times: predictions are moved to the plots' times."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """What `sensor` measures while its beam goes round: h(x) is that of the state moved by v times the offset.
+    """A sensor with a rotating beam: h(x) is `sensor.h` of the state moved by velocity times time offset.
 
-    A target's offset is that of the plot nearest to it. Where the beam goes round, neighbours are seen at nearly the
-    same time; elsewhere the nearest plot is the target's own, if it has one.
+    A target's offset is that of the nearest plot. Under a rotating beam neighbours are measured at nearly the same
+    time; with other time patterns the nearest plot is the target's own, if it has one.
 
     sensor  the measurement model without the motion during the scan
     plots   positions of the scan's plots
-    offset  (M,) their times minus the scan's [s]
-    speed   standard deviation of an unknown velocity: a track that begins from a plot is where it is now only to
-            within this times the offset
+    offset  (M,) the plots' times minus the scan's time [s]
+    speed   prior standard deviation of a velocity; speed times offset widens the position of a new track
     """
 
     sensor: Sensor
@@ -39,11 +38,11 @@ class Sweep:
         return self.sensor.angles
 
     def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
-        """(T, m) expected measurements at the times of the plots around."""
+        """(T, m) expected measurements at the times of the nearest plots."""
         return self.sensor.h(self._moved(x, position)[0], position)
 
     def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
-        """(T, m, n) Jacobians of h: those of the sensor, and through the position by the velocity."""
+        """(T, m, n) Jacobians of h, with the velocity's effect on the moved position."""
         moved, offset = self._moved(x, position)
         H = self.sensor.H(moved, position)
         H = np.broadcast_to(H, (len(x), *H.shape[1:])).copy()
@@ -52,7 +51,7 @@ class Sweep:
         return H
 
     def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
-        """Positions (M, d) and covariances (M, d, d), wider by the unknown motion since the plot."""
+        """Positions (M, d) and covariances (M, d, d), widened by the unknown motion between plot and scan time."""
         found, cov = self.sensor.locate(z, R)
         spread = (self.speed * self._offset(found)) ** 2
         return found, cov + spread[:, None, None] * np.eye(found.shape[1])
@@ -62,7 +61,7 @@ class Sweep:
         return np.asarray(self.offset[self.plots.query(position)[1]])
 
     def _moved(self, x: Floats, position: tuple[int, ...]) -> tuple[Floats, Floats]:
-        """The states (T, n) moved by their offsets (T,), and these."""
+        """The states (T, n) moved by their offsets, and the offsets (T,)."""
         offset = self._offset(x[:, position])
         moved = x.copy()
         for column in position:

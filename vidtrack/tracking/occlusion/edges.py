@@ -1,4 +1,4 @@
-"""Where the tracks on a shared blob are: its edges belong to somebody, its centroid to nobody."""
+"""Positions of the tracks on a shared blob, measured by the blob's edges."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from vidtrack.compiled import kernel
 from vidtrack.estimate.noise import edge_variance
 
 UNKNOWN = 1e8
-"""Variance of a coordinate that no edge tells about."""
+"""Variance of a coordinate without an edge."""
 
 
 @kernel(error_model="numpy")

@@ -1,4 +1,4 @@
-"""Where the picture moves without traffic: leaves, water, flags, burnt-in clocks."""
+"""Map of places with motion but no traffic: leaves, water, flags, burnt-in clocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What traffic teaches about a scene: how large vehicles are at each place, and where things move that are none."""
+"""Maps learnt from traffic: the size of vehicles at each place, and places with motion but no vehicles."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Road:
         self.forget()
 
     def forget(self) -> None:
-        """Nothing is known of the scene any more: the camera looks elsewhere."""
+        """Reset all maps after a change of the camera's view."""
         self.sizes = SizeField(self._width, self._height)
         self.restless = RestlessMap(self._width, self._height)
 

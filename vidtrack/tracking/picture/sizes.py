@@ -1,4 +1,4 @@
-"""How large vehicles are at each place of the picture, learnt from those that drove there."""
+"""Typical size of vehicles at each place of the picture, learnt from tracks."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class SizeField:
 
     @property
     def known(self) -> bool:
-        """Whether vehicles have shown enough to tell what is typical."""
+        """Whether the field is fitted."""
         return bool((self.spread < _SPREAD).all())
 
     def typical(self, box: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""The disturbance map as paper 004 has it (Halevy and Weinshall): a running average and a fixed threshold."""
+"""The disturbance map of paper 004 (Halevy and Weinshall): a running average and a fixed threshold."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vidtrack.video.frame import Frame, Image
 class Paper:
     """D = I - A, foreground where |D| > threshold, then A = (1 - w) A + w I; luminance only, per frame.
 
-    A is the average of the frames before; the first frame is the first average and shows nothing.
+    A is the average of the earlier frames. The first frame initialises it and has no foreground.
     """
 
     STATE = ("_view", "_average")

@@ -1,1 +1,1 @@
-"""From foreground to blobs that are one vehicle each. Read `explain.py` first."""
+"""Blobs: regions of the foreground, each of one vehicle. Read `explain.py` first."""

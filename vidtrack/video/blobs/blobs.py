@@ -28,8 +28,8 @@ class Blobs:
     area       (B,)
     amplitude  (B,) mean strength
     step       source pixels per processed pixel
-    settings   what noise `scan` gives the centroids
-    surveyed   (4,) left, top, right, bottom of what the detector saw; None: not known
+    settings   measurement noise of the centroids
+    surveyed   (4,) left, top, right, bottom of the area in view; None: not known
     """
 
     centroid: Floats
@@ -55,7 +55,7 @@ class Blobs:
         )  # fmt: skip
 
     def moved(self, place: Floats | None) -> Blobs:
-        """The blobs elsewhere, by a map of the plane (2, 3); None is the identity."""
+        """The blobs transformed by an affine map (2, 3); None is the identity."""
         if place is None:
             return self
         return replace(
@@ -68,15 +68,13 @@ class Blobs:
 
 
 def find_blobs(foreground: Foreground, settings: BlobSettings) -> Blobs:
-    """8-connected regions of at least `min_area_share` of the picture, in raster order of their first pixel, where they
-    are in the scene.
-    """
+    """8-connected regions of at least `min_area_share` of the picture, in raster order, in scene coordinates."""
     regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
     return measured(regions, foreground, settings)
 
 
 def measured(regions: Regions, foreground: Foreground, settings: BlobSettings) -> Blobs:
-    """Each region as one blob, where it is in the scene."""
+    """Each region as one blob, in scene coordinates."""
     step = foreground.step
     n, mean, cov, box, amplitude = _measure(*regions, foreground.strength)
     return Blobs(
@@ -95,7 +93,7 @@ def measured(regions: Regions, foreground: Foreground, settings: BlobSettings) -
 def _measure(
     row: Runs, start: Runs, stop: Runs, label: Ints, blobs: int, strength: NDArray
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Of each region: count (B,), mean (B, 2), covariance (B, 2, 2), box (B, 4), mean strength (B,)."""
+    """Pixels (B,), mean (B, 2), covariance (B, 2, 2), box (B, 4) and mean strength (B,) of each region."""
     n = np.zeros(blobs)
     first = np.zeros((blobs, 2))
     second = np.zeros((blobs, 3))  # xx, xy, yy

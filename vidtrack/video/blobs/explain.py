@@ -1,4 +1,4 @@
-"""The one explanation of every blob: is it a vehicle, a piece of one, or several?"""
+"""Segmentation of the foreground into vehicles: each region is a vehicle, a part of one, or several."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
 
 
 class _Measure:
-    """What the mask's pixels are in the scene, and what is typical of vehicles there."""
+    """Maps between mask and scene, and the typical vehicle sizes at each place."""
 
     def __init__(self, foreground: Foreground, sizes: SizeField) -> None:
         place = affine.IDENTITY if foreground.place is None else foreground.place
@@ -50,22 +50,22 @@ class _Measure:
             self.edges = np.array([left, top, left + width, top + height])
 
     def typical(self, box: Ints | Floats) -> Floats:
-        """(N, 2) width and height [px of the mask] typical of vehicles at boxes (N, 4) there; NaN if unknown."""
+        """(N, 2) typical width and height [px of the mask] of vehicles at boxes (N, 4) of the mask; NaN if unknown."""
         return self.sizes.typical(affine.boxes(self._to_scene, box.astype(float))) * affine.scale(self._to_mask)
 
     def predicted(self, box: Floats) -> Floats:
-        """Boxes (K, 4) of the scene in pixels of the mask."""
+        """Boxes (K, 4) of the scene, in pixels of the mask."""
         return affine.boxes(self._to_mask, box)
 
     def border(self, box: Ints) -> tuple[int, int, int, int]:
-        """Which sides (left, top, right, bottom) of a box (4,) [px of the mask] the picture ends at."""
+        """1 for each side (left, top, right, bottom) of a box (4,) [px of the mask] at the picture's border."""
         left, top, width, height = box
         low, high = self.edges[:2] + _AT_EDGE, self.edges[2:] - _AT_EDGE
         return (left < low[0], top < low[1], left + width > high[0], top + height > high[1])
 
 
 def explain(foreground: Foreground, expected: Tracks, road: Road | None, settings: BlobSettings) -> Blobs:
-    """The foreground as blobs that are one vehicle each, as far as shapes, sizes and predictions tell.
+    """Blobs of one vehicle each, by the shapes and sizes of regions and the predicted tracks.
 
     expected  tracks predicted to the time of the foreground, in the scene
     """
@@ -87,9 +87,9 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
 
 
 def _links(regions: Regions, weak: Image | None) -> Ints:
-    """(R,) which regions a region of the weak mask (h, w) links: they have its number, others one of their own.
+    """(R,) group of each region: regions inside one region of the weak mask (h, w) have the same number.
 
-    Weak foreground that is much more than the regions in it, as where the light flickers, links nothing.
+    Weak foreground much larger than the regions in it, as in flickering light, links nothing.
     """
     link = -1 - np.arange(regions.total)
     if weak is None or regions.total < 2:  # nothing to link
@@ -104,7 +104,7 @@ def _links(regions: Regions, weak: Image | None) -> Ints:
 
 
 def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
-    """The regions, those cut that are large enough for several vehicles and have necks between them."""
+    """The regions; those large enough for several vehicles are cut at their necks."""
     box, area = regions.boxes(), regions.areas()
     typical = measure.typical(box)
     large = np.any(box[:, 2:] > _LARGE * typical, axis=1)
@@ -133,7 +133,7 @@ def _cut(inside: Image, border: tuple[int, int, int, int], neck: float, least: F
 
 
 def _likelier(cut: Regions, box: Ints, typical: Floats, sizes: SizeField) -> bool:
-    """Whether vehicles of the parts' sizes explain a region better than one vehicle of the size of its box (4,)."""
+    """Whether vehicles of the parts' sizes are likelier than one vehicle of the size of the region's box (4,)."""
     sigma = np.maximum(sizes.spread, _SURE)
 
     def surprise(size: Ints) -> Floats:
@@ -143,7 +143,7 @@ def _likelier(cut: Regions, box: Ints, typical: Floats, sizes: SizeField) -> boo
 
 
 def _alike(cut: Regions) -> bool:
-    """Whether parts are of like size and each fills its box, as vehicles do."""
+    """Whether the parts have similar sizes and each fills its box, as vehicles do."""
     if cut.total < 2:
         return False
     box = cut.boxes()
@@ -152,9 +152,9 @@ def _alike(cut: Regions) -> bool:
 
 
 def divided(regions: Regions, predicted: Floats, measure: _Measure) -> Regions:
-    """The regions, those divided among predicted boxes (K, 4) [px of the mask] that are too large for one vehicle.
+    """The regions; those too large for one vehicle are divided among the predicted boxes (K, 4) [px of the mask].
 
-    Vehicles nose to tail have no neck between them; each pixel goes to the box that it is nearest to.
+    Vehicles nose to tail have no neck between them. Each pixel is assigned to the nearest box.
     """
     box = regions.boxes()
     for i in np.flatnonzero((box[:, 2:] > _LARGE * measure.typical(box)).any(axis=1)).tolist():

@@ -1,4 +1,4 @@
-"""Which regions are pieces of one vehicle."""
+"""Grouping of regions that are pieces of one vehicle."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ _NEAR = 0.35  # typical sizes between such pieces at most
 def together(
     box: Floats, area: Floats, link: Ints, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
 ) -> tuple[Ints, int]:
-    """Group of each region (R,) and their number: the pieces of one vehicle have one.
+    """Group of each region (R,) and the number of groups; pieces of one vehicle have the same group.
 
     box (R, 4) and area (R,) of the regions, link (R,) the same number for regions that weak foreground links,
     predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, NaN where unknown;
     pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
 
-    Pieces lie inside one predicted box, close together; or nobody predicted them, and one is small, near the other,
-    and with it no larger than a vehicle; or they are linked, no larger than a vehicle, and before that is known one is
-    smaller than the other. Two regions that are each like a vehicle are never pieces.
+    Two regions are pieces of one vehicle if they are close together inside one predicted box; or if no box predicts
+    them, one is small and near the other, and both together are no larger than a vehicle; or if they are linked and
+    together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that are
+    each like a vehicle are never pieces.
     """
     parent = np.arange(len(box))
     vehicle = np.empty(len(box), np.int64)
@@ -54,7 +55,7 @@ def together(
 
 @kernel
 def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
-    """Whether a small box and another, near by, make no more than a vehicle of typical (2,) width and height."""
+    """Whether a small box and a near one together are no larger than a vehicle of typical (2,) width and height."""
     if np.isnan(typical[0]):
         return False
     usual = typical[0] * typical[1]
@@ -64,7 +65,7 @@ def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
 
 @kernel
 def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
-    """Whether two linked boxes make no more than a vehicle of typical (2,) width and height."""
+    """Whether two linked boxes together are no larger than a vehicle of typical (2,) width and height."""
     if np.isnan(typical[0]):
         one, other = a[2] * a[3], b[2] * b[3]
         return min(one, other) < _LESSER * max(one, other)
@@ -85,7 +86,7 @@ def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -
 
 @kernel
 def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
-    """The predicted box in which most of this box (4,) lies; -1 if there is none, or others have a part in it."""
+    """Index of the predicted box that contains most of this box (4,); -1 for none, or if others overlap it too."""
     vehicle, sharers = -1, 0
     for k in range(len(predicted)):
         share = _share_inside(box, predicted[k])
@@ -97,7 +98,7 @@ def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
 
 @kernel(inline="always")
 def _share_inside(box: Floats, other: Floats) -> float:
-    """Share of a box's area that lies in the other one, spread."""
+    """Share of a box's area inside the other box, enlarged by _SPREAD."""
     common = 1.0
     for axis in range(2):
         size = _SPREAD * other[axis + 2]
@@ -108,7 +109,7 @@ def _share_inside(box: Floats, other: Floats) -> float:
 
 @kernel(inline="always")
 def _union(a: Floats, b: Floats) -> float:
-    """Area of the box around both."""
+    """Area of the bounding box of both."""
     wide = max(a[0] + a[2], b[0] + b[2]) - min(a[0], b[0])
     return wide * (max(a[1] + a[3], b[1] + b[3]) - min(a[1], b[1]))
 

@@ -1,4 +1,4 @@
-"""Dividing a region among the predicted boxes that lie on it."""
+"""Division of a region among the predicted boxes on it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _SAME = 0.5  # share of the smaller of two boxes in the other: they do not tell 
 
 @kernel(error_model="numpy")
 def nearest_box(inside: Image, box: Ints, predicted: Floats) -> tuple[Ints, int]:
-    """Number of the predicted box nearest to each pixel (h, w), -1 outside, and how many boxes have pixels.
+    """Index of the predicted box nearest to each pixel (h, w), -1 outside, and the number of boxes with pixels.
 
     inside (h, w) uint8, 1 inside the region with this box (4,); predicted (K, 4), in pixels of the mask. The distance
-    is in the box's own half sizes, the larger of both axes. Boxes that the region does not fill have no part in it, nor
-    have those that lie on another one, the first of them excepted.
+    is in half sizes of the box, the larger of both axes. Boxes that the region does not fill are left out, and of
+    boxes that lie on each other all but the first.
     """
     h, w = inside.shape
     label, used = np.full((h, w), -1), np.zeros(len(predicted), np.bool_)
@@ -65,5 +65,5 @@ def _filled(inside: Image, box: Ints, p: Floats) -> float:
 
 @kernel(error_model="numpy")
 def _share(a: Floats, b: Floats) -> float:
-    """What two boxes have in common as a share of the smaller one."""
+    """Intersection of two boxes as a share of the smaller one."""
     return common(a, b) / min(a[2] * a[3], b[2] * b[3])

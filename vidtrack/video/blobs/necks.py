@@ -1,4 +1,4 @@
-"""Cutting a region at its necks: two vehicles that touch are wide, what joins them is narrow."""
+"""Cuts a region at its necks: the narrow places between touching vehicles."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _LEVELS = 8  # per pixel of distance, for sorting
 
 
 def parts(inside: Image, border: tuple[int, int, int, int], neck: float, least: Floats) -> tuple[Ints, int]:
-    """Parts (h, w) of a region, numbered from 0, -1 outside, and how many there are.
+    """Parts (h, w) of a region, numbered from 0, -1 outside, and the number of parts.
 
     inside  (h, w) uint8, 1 inside the region
-    border  1 for each side (left, top, right, bottom) that is the picture's: the region goes on behind it
+    border  1 for each side (left, top, right, bottom) at the picture's border, beyond which the region continues
     neck    largest half width of the region between two parts, as a share of the smaller one's
-    least   (2,) width and height whose product is the smallest box of a part; smaller ones join a neighbour
+    least   (2,) width and height whose product is the smallest box area of a part; smaller parts join a neighbour
 
-    The half width is the distance to the nearest pixel outside; parts are the basins of its watershed.
+    The half width is the distance to the nearest pixel outside; parts are the basins of the watershed transform.
     """
     left, top, right, bottom = border
     grown = cv2.copyMakeBorder(inside, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
@@ -71,7 +71,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
 
 @kernel
 def _deepest_first(depth: NDArray[np.float32]) -> Ints:
-    """Pixels inside the region in the order of falling depth, by counting."""
+    """Pixels inside the region by decreasing depth; counting sort."""
     flat = depth.ravel()
     deepest = 0
     for d in flat:

@@ -1,4 +1,4 @@
-"""What the user should know while tracking goes on: what is seen lies outside what the tracker can do."""
+"""Warnings during tracking about pictures outside the tracker's limits."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _THIN = 8  # every so many pixels are looked at
 
 
 class Outlook:
-    """Looks once a second; what has lasted for five looks is said once."""
+    """Checks once a second; a condition that lasts for five checks gives one warning."""
 
     def __init__(self) -> None:
         self._due_s = 0.0
         self._lasted = dict.fromkeys(("dark", "small", "restless"), 0)
 
     def look(self, frame: Frame, foreground: Foreground, road: Road | None) -> tuple[str, ...]:
-        """What is to be said of this frame."""
+        """New warnings at this frame."""
         if frame.time_s < self._due_s or road is None:
             return ()
         self._due_s = frame.time_s + _EVERY_S
@@ -53,7 +53,7 @@ def _is_dark(frame: Frame) -> bool:
 
 
 def _are_small(foreground: Foreground, road: Road) -> bool:
-    """Whether vehicles at the middle of the picture are small."""
+    """Whether vehicles in the middle of the picture are too small."""
     if not road.sizes.known or foreground.step == 1:
         return False
     h, w = (size * foreground.step for size in foreground.mask.shape)

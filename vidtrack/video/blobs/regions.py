@@ -1,4 +1,4 @@
-"""Regions of a mask: its runs of pixels, each with the number of the region that it belongs to."""
+"""Regions of a mask, as runs of pixels with region numbers."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Regions(NamedTuple):
         return np.bincount(self.label, self.stop - self.start, self.total).astype(np.int64)
 
     def joined(self, group: Ints, total: int) -> Regions:
-        """The same runs in `total` larger regions; group (self.total,) has the new number of each region."""
+        """The runs in `total` larger regions; group (self.total,) has the new number of each region."""
         return self._replace(label=group[self.label], total=total)
 
     def without(self, region: int) -> Regions:
-        """The runs of all other regions; the numbers stay."""
+        """The runs of all other regions, with unchanged numbers."""
         stays = self.label != region
         return Regions(self.row[stays], self.start[stays], self.stop[stays], self.label[stays], self.total)
 
@@ -62,12 +62,12 @@ def find_regions(mask: Image, least: float) -> Regions:
 
 
 def patch(regions: Regions, region: int, box: Ints) -> Image:
-    """(height, width) uint8: 1 where the region is, inside its box (4,)."""
+    """(height, width) uint8: 1 inside the region, cropped to its box (4,)."""
     return _patch(regions.row, regions.start, regions.stop, regions.label, region, box)
 
 
 def of_labels(labels: Ints, count: int, box: Ints) -> Regions:
-    """Regions from a picture of labels (height, width), -1 for none, whose upper left corner is that of box (4,)."""
+    """Regions from an array of labels (height, width), -1 for none, with the upper left corner of box (4,)."""
     row, start, stop, label = _runs_of(labels, box)
     return Regions(row, start, stop, label, count)
 

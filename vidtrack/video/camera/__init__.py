@@ -1,1 +1,1 @@
-"""The motion of the camera: each picture is laid on the learnt scene."""
+"""Camera motion: registration of each picture with the learnt scene."""

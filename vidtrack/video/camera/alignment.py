@@ -1,4 +1,4 @@
-"""Lays a picture on the scene: robust inverse-compositional Gauss-Newton steps on points of the scene."""
+"""Registration of a picture with the scene: robust inverse-compositional Gauss-Newton steps on points of the scene."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from vidtrack.video.camera.points import CELLS, Points
 from vidtrack.video.frame import Image
 
 FEWEST = 24
-"""Points; fewer say nothing."""
+"""Smallest number of points for a registration."""
 _STEPS = (3, 3, 6)  # at full, half and quarter size
 _SIGMA = 1.0  # grey levels; the smallest assumed spread of residuals
 _TUKEY = 4.685
-_SAMPLED = 200  # points tell the spread
+_SAMPLED = 200  # points for the spread
 _GREY = 64.0  # grey levels; luminance in this unit is of the size of gradients
-_GAIN = 5.0  # no exposure changes more
+_GAIN = 5.0  # largest change of exposure
 _INSIDE = 0.3  # share of the points that must be in the picture
 _SETTLED_PX = 0.03  # a smaller step is the last one
-_FITS_LEVELS, _FITS_PX = 4.0, 0.3  # a point fits if its residual is less than this, and that much of its gradient
+_FITS_LEVELS, _FITS_PX = 4.0, 0.3  # a point fits if residual < the first + the second * gradient
 
 
 class Fit(NamedTuple):
-    """A picture on the canvas.
+    """The result of a registration.
 
-    motion  (2, 3) from the canvas to the picture, in pixels of both
-    share   of the points used, those that fit
+    motion  (2, 3) map from canvas to picture, in pixels of both
+    share   share of the points that fit
     """
 
     motion: Floats
@@ -50,11 +50,11 @@ def pyramid(luma: Image, levels: int) -> list[Image]:
 
 
 def align(pictures: Sequence[Image], points: Points, free: Mask, motion: Floats, every: int = 1) -> Fit:
-    """The picture laid on the points from a first guess, coarse to fine.
+    """Register the picture with the points from an initial motion, coarse to fine.
 
-    pictures  the picture at full, half, ... size; as many levels of points are used
+    pictures  the picture at full, half, ... size, one for each level of points used
     free      (N,) points where no traffic is expected
-    every     only each so many'th point is used
+    every     every n-th point is used
     """
     fit = Fit(motion, 0.0)
     for level in reversed(range(len(pictures))):
@@ -65,7 +65,7 @@ def align(pictures: Sequence[Image], points: Points, free: Mask, motion: Floats,
 
 
 def leap(scene: Levels, luma: Image, motion: Floats) -> Floats:
-    """A first guess where the last motion is far off: phase correlation at quarter size."""
+    """An initial motion if the last one is far off: phase correlation at quarter size."""
     h, w = luma.shape[0] // 4, luma.shape[1] // 4
     quarter = affine.rescaled(affine.inverse(motion), 0.25)
     small = cv2.resize(scene, (scene.shape[1] // 4, scene.shape[0] // 4), interpolation=cv2.INTER_AREA)
@@ -84,9 +84,9 @@ def _fit(
 ) -> tuple[Floats, float]:  # fmt: skip
     """Motion, and share of the points that fit.
 
-    I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d (a mere shift if it is stiff), gain and
-    bias by least squares with Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the
-    points' scale; part: from which to which point, and every how many'th.
+    I(A q) = g (T(q) + grad T . W'(q) d) + b is solved for the displacement d (a translation if `stiff`), gain and bias
+    by least squares with Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the points'
+    scale; part: start, stop and step of the points.
     """
     used = np.arange(part[0], part[1], part[2])
     used = used[free[part[0] : part[1] : part[2]]]
@@ -140,7 +140,7 @@ def _fit(
 
 @kernel(error_model="numpy")
 def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[float, float]:
-    """Median and robust standard deviation of what the points are off, from some of them."""
+    """Median and robust standard deviation of the residuals, from a sample of the points."""
     stride = max(1, len(seen) // _SAMPLED)
     off = np.empty(len(seen) // stride + 1)
     n = 0
@@ -156,7 +156,7 @@ def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[floa
 
 @kernel
 def _undone(A: Floats, tx: float, ty: float, c: float, s: float, middle_x: float, middle_y: float) -> Floats:
-    """A after the inverse of q -> middle + (c, -s; s, c) (q - middle) + t."""
+    """A composed with the inverse of q -> middle + (c, -s; s, c) (q - middle) + t."""
     norm = c * c + s * s
     a, b = c / norm, s / norm
     x, y = middle_x + tx, middle_y + ty
@@ -171,7 +171,7 @@ def _undone(A: Floats, tx: float, ty: float, c: float, s: float, middle_x: float
 
 @kernel
 def _sample(luma: Image, size: float, x: Levels, y: Levels, A: Floats, seen: Floats) -> int:
-    """Luminance seen (N,) at the points, bilinear, NaN outside the picture; returns how many are inside."""
+    """Fill seen (N,) with the luminance at the points, bilinear, NaN outside the picture; returns the number inside."""
     h, w = luma.shape
     inside = 0
     for k in range(len(x)):

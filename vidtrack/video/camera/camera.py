@@ -1,4 +1,4 @@
-"""The camera's motion: each picture is laid on the learnt scene, cheaply while it stands still."""
+"""Camera motion by registration of each picture with the learnt scene; a still camera is checked with few points."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from vidtrack.video.camera.points import CELLS, Points, choose, no_points, shift
 from vidtrack.video.frame import Image
 
 _GOOD = 0.5  # share of the points that fit
-_STRANGE = 0.3  # less is another view, and no vehicle before the camera
-_SURE = 0.65  # the same where the camera is sought close to where it was only
-_LEAST_PX = 0.75  # that a corner of the picture is off, before it is laid on the scene
-_EVERY = 7  # of the points at full size are enough to watch a camera that stands
-_CHOSEN_S, _HELD_S = 1.0, 10.0  # points are chosen anew that often while the camera moves, and while it stands
-_TRY_S = 0.3  # between two searches that find nothing
-_FRESH = 0.8  # share of the points that fit, as long as they are those of this hour
-_DRIFT_PX = 0.3  # a camera that has moved so much while it was taken for still has drifted, and the scene with it
+_STRANGE = 0.3  # with a smaller share the view has changed; a vehicle before the camera leaves more
+_SURE = 0.65  # the same if the search starts from the last motion only
+_LEAST_PX = 0.75  # displacement of a corner from which the picture is resampled
+_EVERY = 7  # every n-th point at full size is used for a still camera
+_CHOSEN_S, _HELD_S = 1.0, 10.0  # period of the choice of points while the camera moves, and while it is still
+_TRY_S = 0.3  # between failed searches
+_FRESH = 0.8  # share of the points that fit; with less the points are outdated
+_DRIFT_PX = 0.3  # displacement of a still camera that counts as drift
 _STILL_PX = 0.5
-_HOLD_S = 0.5  # a camera that was lost for longer must be followed, or stand, for so long before it is trusted
-_LATELY_S, _RESTLESS_S = 10.0, 3.0  # one that was lost for so many of the last seconds never holds still
-_LARGEST = 0.25  # share of the picture's longer side by which it may be off; farther, the view is another
+_HOLD_S = 0.5  # after a longer loss, time of successful registration before the camera is trusted
+_LATELY_S, _RESTLESS_S = 10.0, 3.0  # a camera that was lost for so many of the last seconds is restless
+_LARGEST = 0.25  # largest displacement, share of the picture's longer side; beyond it the view has changed
 
 
 _MOVED_AWAY = (
@@ -38,13 +38,13 @@ _RESTLESS = "the camera does not hold still and cannot be followed; nothing is r
 
 
 class Camera:
-    """Where the picture is on the canvas, and the canvas in the scene; all in processed pixels.
+    """The maps between picture, canvas and scene, in processed pixels.
 
-    motion  (2, 3) from canvas to picture; the identity while the camera stands
-    place   (2, 3) from canvas to scene, the first picture
-    moves   whether the picture has to be laid on the canvas
-    fits    whether the last picture could be
-    lost_s  s for which nobody has known where the camera looks; 0 while it is known
+    motion  (2, 3) from canvas to picture; the identity while the camera is still
+    place   (2, 3) from canvas to scene (the first picture)
+    moves   whether pictures must be resampled on the canvas
+    fits    whether the last registration succeeded
+    lost_s  s since registration was lost; 0 while it succeeds
     """
 
     STATE = (
@@ -54,7 +54,7 @@ class Camera:
     )
 
     def __init__(self, still_s: float) -> None:
-        """still_s: a camera that has stood still for so long is only watched."""
+        """still_s: a camera counts as still after so long without motion."""
         self._rest_s = still_s
         self.motion = self.place = affine.IDENTITY.copy()
         self.moves = False
@@ -62,7 +62,7 @@ class Camera:
         self.lost_s = 0.0
         self._points = no_points()
         self._chosen_s = -np.inf
-        self._still = affine.IDENTITY.copy()  # where the camera last came to rest, and when
+        self._still = affine.IDENTITY.copy()  # motion and time of the last rest
         self._still_s = 0.0
         self._tried_s = -np.inf  # last search without success
         self._time_s = 0.0
@@ -74,12 +74,12 @@ class Camera:
 
     @property
     def trusted(self) -> bool:
-        """Whether it has been known for a while where the camera looks."""
+        """Whether registration has succeeded for long enough."""
         return self._time_s >= self._trusted_s
 
     @property
     def at_home(self) -> bool:
-        """Whether canvas, scene and picture are the same, as they are until the camera moves."""
+        """Whether canvas, scene and picture have the same coordinates, as until the first motion."""
         return np.array_equal(self.place, affine.IDENTITY) and not self.moves
 
     def on_canvas(self, box: Floats, step: int) -> Floats:
@@ -87,7 +87,7 @@ class Camera:
         return (box if self.at_home else affine.boxes(affine.inverse(affine.rescaled(self.place, step)), box)) / step
 
     def restart(self) -> None:
-        """The last picture is the scene now; of another view, it is a scene of its own."""
+        """The last picture becomes the scene; after a change of view, with new coordinates."""
         self.place = affine.IDENTITY.copy() if self._away else affine.after(self.place, affine.inverse(self.motion))
         self.motion = affine.IDENTITY.copy()
         self.moves = self._away = False
@@ -96,13 +96,13 @@ class Camera:
         self._chosen_s = -np.inf
 
     def follow(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
-        """Find out how the picture (h, w) lies on the scene; returns the scene, on another canvas where it must be.
+        """Register the picture (h, w) with the scene; returns the scene, on another canvas if necessary.
 
         known  (K, 4) boxes of vehicles expected here, on the canvas
         """
         if self._points.start[1] < FEWEST and time_s - self._chosen_s > _CHOSEN_S:
             self._choose(scene, time_s)
-        if not self.moves and self._points.start[1] < FEWEST:  # nothing to hold on to
+        if not self.moves and self._points.start[1] < FEWEST:  # too few points
             self.fits, self.lost_s, self._time_s = False, 0.0, time_s
             return scene
         scene = (self._track if self.moves else self._watch)(luma, scene, known, time_s)
@@ -110,7 +110,7 @@ class Camera:
         return scene
 
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know and was not told yet."""
+        """New warnings for the user."""
         if not self._away and self._lately_s < _RESTLESS_S:
             return ()
         due = [text for text, holds in ((_MOVED_AWAY, self._away), (_RESTLESS, self._lately_s > _RESTLESS_S)) if holds]
@@ -119,7 +119,7 @@ class Camera:
         return new
 
     def _notice_loss(self, luma: Image, time_s: float) -> None:
-        """A camera that moves nobody knows where, or too far, is lost, and not trusted until it has held still."""
+        """Note lost registration or too large a motion; the camera is trusted again once it holds still."""
         h, w = luma.shape
         dt, self._time_s = min(time_s - self._time_s, 1.0), time_s
         if self.moves:
@@ -132,7 +132,7 @@ class Camera:
         self._lately_s = self._lately_s * math.exp(-dt / _LATELY_S) + dt * lost
 
     def _watch(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
-        """Is the camera where it was? A few points tell."""
+        """Check a still camera for motion, with few points."""
         some = _free(self._points, scene.covered_s, known, self._points.start[1], _EVERY)
         fit = align([luma], self._points, some, affine.IDENTITY, _EVERY)
         self.fits = fit.share > _GOOD
@@ -151,7 +151,7 @@ class Camera:
         return scene
 
     def _check_drift(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> None:
-        """Has the scene, which learns, crept along with the camera? The points have not."""
+        """Check for slow drift, which the scene learns but the points do not."""
         free = _free(self._points, scene.covered_s, known, self._points.start[1], 1)
         fit = align([luma], self._points, free, affine.IDENTITY)
         drifted = fit.share > _GOOD and self._off(fit, luma) > _DRIFT_PX
@@ -162,7 +162,7 @@ class Camera:
         self._chosen_s = time_s
 
     def _track(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
-        """Where has the camera moved to?"""
+        """Register the picture of a moving camera."""
         fit = self._search(luma, scene, known)
         self.fits = fit.share > _GOOD
         if self.fits:
@@ -176,7 +176,7 @@ class Camera:
         return scene
 
     def _search(self, luma: Image, scene: Scene, known: Floats) -> Fit:
-        """The best fit from the last motion on, or from where phase correlation sees the picture."""
+        """The best fit, from the last motion or from phase correlation."""
         free = _free(self._points, scene.covered_s, known, len(self._points.x), 1)
         pictures = pyramid(luma, len(CELLS))
         fit = self._sane(align(pictures[:2], self._points, free, self.motion), luma)
@@ -187,7 +187,7 @@ class Camera:
         return max(fit, *fits, key=lambda found: found.share)
 
     def _moved(self, luma: Image, scene: Scene, fit: Fit, time_s: float) -> Scene:
-        """Take over a fit."""
+        """Accept a fit; returns the scene, on another canvas if necessary."""
         self.motion = fit.motion
         h, w = luma.shape
         cut = fitting(scene, fit.motion, (h, w))
@@ -207,7 +207,7 @@ class Camera:
         return affine.displacement(fit.motion, luma.shape[1], luma.shape[0])
 
     def _sane(self, fit: Fit, luma: Image) -> Fit:
-        """The fit, of no share if no camera jumps like that."""
+        """The fit, with share 0 if the motion is implausible."""
         h, w = luma.shape
         jump = affine.displacement(fit.motion, w, h, self.motion)
         return fit if jump < _LARGEST * max(h, w) else fit._replace(share=0.0)
@@ -219,9 +219,7 @@ class Camera:
 
 @kernel
 def _free(points: Points, covered_s: Levels, box: Floats, end: int, every: int) -> Mask:
-    """(N,) points that nothing covered when last seen, and none of the boxes (K, 4) covers; only every so many'th up
-    to the end is looked at.
-    """
+    """(N,) points outside the boxes (K, 4) that were free when last seen; of every n-th point up to `end`."""
     h, w = covered_s.shape
     free = np.zeros(len(points.x), np.bool_)
     for k in range(0, end, every):

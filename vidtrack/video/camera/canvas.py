@@ -1,4 +1,4 @@
-"""The canvas: the scene larger than the picture, while the camera moves over it."""
+"""The canvas: the scene extended beyond the picture, while the camera moves."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from vidtrack.video.background.scene import NEVER, UNKNOWN, UNSEEN, Levels, Scen
 from vidtrack.video.frame import Image
 
 _NEW_NOISE = np.float32(6)  # grey levels assumed of what has just come into the picture
-_RIM, _CHROMA_RIM = 1.5, 0.5  # px at the picture's edge that are not used: filters have mirrored them
-_ALIKE_PX = 0.08  # by which what is taken from the picture together may differ in place
+_RIM, _CHROMA_RIM = 1.5, 0.5  # unused px at the picture's edge, where filters mirror
+_ALIKE_PX = 0.08  # largest error of position within pixels that are interpolated together
 _SPARE = 8  # px that the canvas grows beyond what is needed, at least
 _LARGEST = 0.15  # share of the picture's longer side that the canvas reaches beyond it on each side
 
 
 def lay(picture: Picture, motion: Floats, scene: Scene) -> tuple[Picture, Ints]:
-    """The picture on the canvas, and (h, 2) the columns from which to which each row shows it.
+    """The picture resampled on the canvas, and (h, 2) its first and last columns in each row.
 
-    What is seen for the first time becomes scene; outside the picture the scene is repeated.
+    Pixels seen for the first time become scene; outside the picture the scene is repeated.
 
     motion  (2, 3) from canvas to picture
     """
@@ -40,14 +40,14 @@ def lay(picture: Picture, motion: Floats, scene: Scene) -> tuple[Picture, Ints]:
 
 @kernel
 def mark_unseen(covered: Image, span: Ints) -> None:
-    """Set covered (h, w) to UNSEEN where the picture does not show it."""
+    """Set covered (h, w) to UNSEEN outside the picture."""
     for y in range(len(span)):
         covered[y, : span[y, 0]] = UNSEEN
         covered[y, span[y, 1] :] = UNSEEN
 
 
 def fitting(scene: Scene, motion: Floats, shape: tuple[int, int]) -> tuple[int, int, int, int] | None:
-    """Left, top, right, bottom on the canvas to cut it to, so that a picture (h, w) fits; None if it does already."""
+    """Left, top, right, bottom of a new canvas that contains a picture (h, w); None if the present one does."""
     h, w = scene.luma.shape
     edges = affine.points(affine.inverse(motion), affine.corners(shape[1], shape[0]))
     need = np.concatenate([np.floor(edges.min(axis=0)), np.ceil(edges.max(axis=0)) + 1]).astype(int)
@@ -60,7 +60,7 @@ def fitting(scene: Scene, motion: Floats, shape: tuple[int, int]) -> tuple[int, 
     most = np.array([shape[1], shape[0]]) + 2 * (int(_LARGEST * max(shape)) + _SPARE)
     for axis in range(2):
         excess = cut[axis + 2] - cut[axis] - most[axis]
-        if excess > 0:  # what the camera moves away from goes
+        if excess > 0:  # drop the side that the camera moves away from
             if missing[axis + 2]:
                 cut[axis] += min(excess, need[axis] - cut[axis])
             else:
@@ -72,7 +72,7 @@ def fitting(scene: Scene, motion: Floats, shape: tuple[int, int]) -> tuple[int, 
 
 
 def recut(scene: Scene, left: int, top: int, right: int, bottom: int) -> Scene:
-    """The scene from column left to right and row top to bottom, all even; nothing is known of what is added."""
+    """The scene from column left to right and row top to bottom, all even; added pixels are unknown."""
     fills = (0.0, 128.0, 128.0, float(UNKNOWN), 0.0, float(NEVER), 0.0, 0.0)
     whole = (left, top, right, bottom)
     half = (left // 2, top // 2, right // 2, bottom // 2)
@@ -84,7 +84,7 @@ def recut(scene: Scene, left: int, top: int, right: int, bottom: int) -> Scene:
 
 
 def settled(scene: Scene, motion: Floats, shape: tuple[int, int]) -> Scene:
-    """The scene as a picture (h, w) at this motion shows it."""
+    """The scene resampled to a picture (h, w) with this motion."""
     size, back = (shape[1], shape[0]), affine.inverse(motion)
     half, half_size = affine.rescaled(back, 0.5), ((shape[1] + 1) // 2, (shape[0] + 1) // 2)
     return Scene(
@@ -98,7 +98,7 @@ def _warped(
     source: NDArray, to_source: Floats, size: tuple[int, int], border: int = cv2.BORDER_CONSTANT,
     how: int = cv2.INTER_LINEAR,
 ) -> NDArray:  # fmt: skip
-    """(height, width) of size (width, height): each pixel from where the map finds it in the source."""
+    """An image of size (width, height), resampled from the source by the map `to_source`."""
     return np.asarray(cv2.warpAffine(source, to_source, size, flags=how | cv2.WARP_INVERSE_MAP, borderMode=border))
 
 
@@ -114,10 +114,10 @@ def _cut(old: Levels, cut: tuple[int, int, int, int], fill: float) -> Levels:
 
 @kernel(error_model="numpy")
 def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, span: Ints) -> None:
-    """Fill laid (h, w) from source (H, W), bilinear; where it ends, from the scene. Sets span (h, 2).
+    """Fill laid (h, w) from source (H, W), bilinear; outside it, from the scene. Sets span (h, 2).
 
-    Neighbours go together while the place within a pixel is the same to 1/50: along whole rows, where the camera
-    only shifts.
+    Neighbouring pixels whose subpixel positions differ by less than _ALIKE_PX are interpolated together: for a pure
+    translation, whole rows.
     """
     H, W = source.shape
     h, w = laid.shape
@@ -146,7 +146,7 @@ def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, 
 
 @kernel
 def _blend(upper: Image, lower: Image, u: float, v: float, out: Image) -> None:
-    """out (n,) between the pixels of two rows (n + 1,): u of the way to the right, v of the way down."""
+    """Fill out (n,) by bilinear interpolation of two rows (n + 1,), with fractions u to the right and v down."""
     ends = np.uint16(256 * u * v + 0.5)
     right, below = np.uint16(256 * u + 0.5) - ends, np.uint16(256 * v + 0.5) - ends
     own = np.uint16(256) - right - below - ends
@@ -157,7 +157,7 @@ def _blend(upper: Image, lower: Image, u: float, v: float, out: Image) -> None:
 
 @kernel(error_model="numpy")
 def _narrowed(low: float, high: float, slope: float, offset: float, least: float, most: float) -> tuple[float, float]:
-    """The part of low..high where slope x + offset lies in least..most."""
+    """The part of low..high in which slope x + offset is within least..most."""
     if abs(slope) < 1e-9:
         return (low, high) if least <= offset <= most else (0.0, -1.0)
     one, other = (least - offset) / slope, (most - offset) / slope

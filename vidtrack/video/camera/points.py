@@ -1,4 +1,4 @@
-"""Points by which a picture is laid on the scene: where the scene is steep, spread over all of it."""
+"""Points for registration: places of steep gradient, spread over the scene."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from vidtrack.video.background.scene import UNKNOWN, Levels, Scene
 from vidtrack.video.frame import Image
 
 CELLS = ((32, 24), (24, 18), (16, 12))
-"""Columns and rows of cells at full, half and quarter size; each gives two points."""
+"""Columns and rows of cells at full, half and quarter size; each cell gives two points."""
 _STEEP = np.float32(1.5)  # grey levels per pixel; flatter cells give none
-_SMALLEST = 32  # px; smaller pictures have no place for cells
+_SMALLEST = 32  # px; smaller pictures have no cells
 _REACH = 2  # px around a point that must be known
 
 
 class Points(NamedTuple):
-    """N points of the canvas; places and gradients are in pixels of full size, whatever the level.
+    """N points of the canvas; places and gradients are in pixels of full size at all levels.
 
     x, y    (N,)
     value   (N,) luminance of the scene
@@ -37,13 +37,13 @@ class Points(NamedTuple):
 
 
 def no_points() -> Points:
-    """None chosen yet."""
+    """No points."""
     x, y, value, gx, gy = np.empty((5, 0), np.float32)
     return Points(x, y, value, gx, gy, np.zeros(len(CELLS) + 1, np.int64))
 
 
 def choose(scene: Scene) -> Points:
-    """The steepest places of a scene, of those that are known and free of traffic."""
+    """The steepest places of a scene that are known and free of traffic."""
     if min(scene.luma.shape) < _SMALLEST:
         return no_points()
     luma, usable = scene.luma, ((scene.noise < UNKNOWN) & (scene.covered_s == 0)).astype(np.uint8)
@@ -63,13 +63,13 @@ def choose(scene: Scene) -> Points:
 
 
 def shifted(points: Points, x: float, y: float) -> Points:
-    """The same points where the canvas begins elsewhere."""
+    """The points after a shift of the canvas's origin by (x, y)."""
     return points._replace(x=points.x + np.float32(x), y=points.y + np.float32(y))
 
 
 @kernel
 def _steepest(luma: Levels, usable: Image, columns: int, rows: int, size: np.float32) -> Levels:
-    """(5, N) x, y, value, gx, gy in pixels of full size: of each cell what is steepest across, and steepest down.
+    """(5, N) x, y, value, gx, gy in pixels of full size: the steepest pixel of each cell, horizontally and vertically.
 
     luma, usable (h, w); size: pixels of full size per pixel.
     """

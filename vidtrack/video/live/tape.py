@@ -1,4 +1,4 @@
-"""What a reader offers its packets to: a recording, or nothing."""
+"""The interface of a recorder for a reader's packets, and the null recorder."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ import av
 from vidtrack.video.live.connection import Connection
 
 Place = tuple[int, int]
-"""Number of a recording's part, and of a packet in it."""
+"""Index of a part of a recording, and of a packet in it."""
 
 
 class Tape(Protocol):
-    """Takes packets as they are received, in parts that can be decoded by themselves."""
+    """Records received packets, in parts that can be decoded separately."""
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
-        """Begin a new part with this packet if it is time; then the decoder has to start anew as well."""
+        """Begin a new part with this packet if it is due; returns whether, because the decoder must then restart."""
 
     def place(self) -> Place:
-        """Where the next packet goes."""
+        """The place of the next packet."""
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
-        """Keep a packet, or of a raw camera its pictures."""
+        """Record a packet, or the pictures of an uncompressed camera."""
 
     def hang_up(self) -> None:
-        """The connection is gone; the next packet begins a new part."""
+        """End the part after a lost connection; the next packet begins a new one."""
 
 
 class NoTape:
-    """Keeps nothing."""
+    """Records nothing."""
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
         """Never."""
@@ -40,7 +40,7 @@ class NoTape:
         return 0, 0
 
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
-        """Forget it."""
+        """Discard the packet."""
 
     def hang_up(self) -> None:
-        """There is nothing to end."""
+        """Do nothing."""

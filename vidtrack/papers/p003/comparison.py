@@ -1,4 +1,4 @@
-"""The experiment of table 2: filters of the range in a contest, while the target speeds up with 2.5 g."""
+"""The experiment of table 2: a comparison of range filters while the target accelerates with 2.5 g."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ WINDOWS = {
 }
 
 Make = Callable[[Motion, float, int], Estimator]
-"""A bank from a motion model, the standard deviation [m] that it is told, and a seed."""
+"""A bank from a motion model, the assumed standard deviation [m] of a measurement, and a seed."""
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
-    """A filter in the contest.
+class Candidate:
+    """A filter in the comparison.
 
-    name   as the paper's table calls its kind, or what else it is
-    accel  m/s^2 that it is told; None: it knows no motion
-    make   None: the measurement as it is
-    sigma  m, standard deviation of a measurement that it is told
+    name   its name in the paper's table, or another one
+    accel  m/s^2, assumed acceleration; None: no motion model
+    make   factory of the bank; None: the measurement itself
+    sigma  m, assumed standard deviation of a measurement
     """
 
     name: str
@@ -61,11 +61,11 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Contest:
-    """Entries on measurements of one kind: errors of sigma [m] with or without glint, target from a range [m] on."""
+class Comparison:
+    """Filters on the same measurements: errors of sigma [m] with or without glint, from an initial range [m]."""
 
     title: str
-    entries: Sequence[Entry]
+    candidates: Sequence[Candidate]
     sigma: float = SIGMA_M
     glint: Glint = NO_GLINT
     from_m: float = 60e3
@@ -95,43 +95,43 @@ def _bootstrap(glint: Glint = NO_GLINT) -> Make:
     return lambda model, sigma, seed: ParticleBank(model, PARTICLES, glint=glint, seed=seed)
 
 
-RAW = Entry("measurement")
-CONTESTS = (
-    Contest(
+RAW = Candidate("measurement")
+COMPARISONS = (
+    Comparison(
         "normal errors of 5 m",
         (
             RAW,
-            Entry("Kalman", 49, _kalman),
-            Entry("alpha-beta", 49, _alpha_beta),
-            Entry("bootstrap", 49, _bootstrap()),
-            Entry("Kalman", 24.5, _kalman),
-            Entry("bootstrap", 24.5, _bootstrap()),
-            Entry("SIR of fig. 3", 49, _sir()),
-            Entry("SIR of fig. 3", 24.5, _sir()),
-            Entry("SIS of table 1", None, _bins),
-            Entry("Kalman", 2, _kalman),
-            Entry("Kalman", 1, _kalman),
-            Entry("SIS", 24.5, _sis),
+            Candidate("Kalman", 49, _kalman),
+            Candidate("alpha-beta", 49, _alpha_beta),
+            Candidate("bootstrap", 49, _bootstrap()),
+            Candidate("Kalman", 24.5, _kalman),
+            Candidate("bootstrap", 24.5, _bootstrap()),
+            Candidate("SIR of fig. 3", 49, _sir()),
+            Candidate("SIR of fig. 3", 24.5, _sir()),
+            Candidate("SIS of table 1", None, _bins),
+            Candidate("Kalman", 2, _kalman),
+            Candidate("Kalman", 1, _kalman),
+            Candidate("SIS", 24.5, _sis),
         ),
     ),
-    Contest(
+    Comparison(
         "glint: a tenth of the errors is 25 m",
         (
             RAW,
-            Entry("bootstrap", 49, _bootstrap(GLINT)),
-            Entry("Kalman", 49, _kalman, TOTAL_M),
-            Entry("SIR of fig. 3", 49, _sir(GLINT)),
+            Candidate("bootstrap", 49, _bootstrap(GLINT)),
+            Candidate("Kalman", 49, _kalman, TOTAL_M),
+            Candidate("SIR of fig. 3", 49, _sir(GLINT)),
         ),
         glint=GLINT,
     ),
-    Contest(
+    Comparison(
         "reconstruction: errors of 3.15 m, from 85 km",
         (
             RAW,
-            Entry("Kalman", 35, _kalman, 3.15),
-            Entry("alpha-beta", 3.24, _alpha_beta, 3.15),
-            Entry("SIS of table 1", None, _bins, 3.15),
-            Entry("Kalman", 1.37, _kalman, 3.15),
+            Candidate("Kalman", 35, _kalman, 3.15),
+            Candidate("alpha-beta", 3.24, _alpha_beta, 3.15),
+            Candidate("SIS of table 1", None, _bins, 3.15),
+            Candidate("Kalman", 1.37, _kalman, 3.15),
         ),
         sigma=3.15,
         from_m=85e3,
@@ -139,17 +139,19 @@ CONTESTS = (
 )
 
 
-def run(contest: Contest, runs: int, rng: Generator) -> dict[str, Floats]:
-    """Errors (SCANS, runs) [m] of each entry, by title."""
+def run(comparison: Comparison, runs: int, rng: Generator) -> dict[str, Floats]:
+    """Errors (SCANS, runs) [m] of each filter, by title."""
     truth = polar(speed(rng)[0].flight)[:, :1]
-    seen = measure(truth + contest.from_m - truth[0], np.array([contest.sigma]), runs, rng, contest.glint)
+    seen = measure(truth + comparison.from_m - truth[0], np.array([comparison.sigma]), runs, rng, comparison.glint)
     errors = {}
-    for entry in contest.entries:
+    for candidate in comparison.candidates:
         found = seen.z
-        if entry.make:
-            bank = entry.make(ConstantVelocity(1, accel=entry.accel or 1.0), entry.sigma, int(rng.integers(2**32)))
-            found = estimate(bank, replace(seen, sigma=np.full(runs, entry.sigma)), np.ones(runs))
-        errors[entry.title] = found - seen.truth
+        if candidate.make:
+            bank = candidate.make(
+                ConstantVelocity(1, accel=candidate.accel or 1.0), candidate.sigma, int(rng.integers(2**32))
+            )
+            found = estimate(bank, replace(seen, sigma=np.full(runs, candidate.sigma)), np.ones(runs))
+        errors[candidate.title] = found - seen.truth
     return errors
 
 

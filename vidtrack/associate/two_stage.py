@@ -1,4 +1,4 @@
-"""The score of a detection as evidence: detections with a low score may continue a track but start none."""
+"""Two-stage association by score: low-scored detections continue tracks, but start none."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from vidtrack.scan import Scan
 
 
 @dataclass(frozen=True, slots=True)
-class Trust:
-    """Detections that score at least `least` are sure; without scores all are.
+class TwoStage:
+    """Two-stage association by score (as in ByteTrack, Zhang et al. 2022).
 
-    Tracks choose among sure detections first and, where they get none, among the others. Only sure ones start tracks,
-    confirm them and keep them alive.
+    Detections with a score of at least `least` are sure; without scores all are. Tracks are associated with sure
+    detections first, and the tracks left over with the others. Only sure detections start, confirm and keep tracks.
     """
 
     least: float
@@ -28,7 +28,7 @@ class Trust:
         return np.ones(len(scan), bool) if scan.score is None else scan.score >= self.least
 
     def decide(self, associate: Associator, problem: Problem, rows: Mask, sure: Mask) -> Decision:
-        """The decision about rows (T,), in two rounds: measurements that are `sure` (M,) come first."""
+        """The decision about rows (T,): measurements that are `sure` (M,) in the first stage, others in the second."""
         pairs = problem.pairs
         asked, first_round = rows[pairs.row], sure[pairs.measurement]
         first = associate.decide(problem.only(asked & first_round))
@@ -40,5 +40,5 @@ class Trust:
         return first.without(missed).joined(second)
 
 
-EQUAL = Trust(-np.inf)
-"""All detections are sure, whatever their scores."""
+SINGLE_STAGE = TwoStage(-np.inf)
+"""One stage: all detections are sure."""

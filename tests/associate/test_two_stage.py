@@ -5,7 +5,7 @@ import pytest
 
 from vidtrack.associate.hard import GNN
 from vidtrack.associate.jpda import JPDA
-from vidtrack.associate.trust import Trust
+from vidtrack.associate.two_stage import TwoStage
 from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.scan import Scan
 from vidtrack.tracking.lifecycle import LifeCycle
@@ -16,7 +16,9 @@ R = np.eye(2)
 
 
 def tracker(associate=None, **life):
-    return Tracker(ConstantVelocity(accel=1.0, speed=5.0), associate or GNN(), life=LifeCycle(**life), trust=Trust(0.5))
+    return Tracker(
+        ConstantVelocity(accel=1.0, speed=5.0), associate or GNN(), life=LifeCycle(**life), two_stage=TwoStage(0.5)
+    )
 
 
 def fed(tracker, *scans):
