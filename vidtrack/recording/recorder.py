@@ -23,7 +23,7 @@ from vidtrack.recording.source import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VI
 from vidtrack.state import State, write_state
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.connection import Connection
-from vidtrack.video.live.tape import NoTape, Place
+from vidtrack.video.live.packet_sink import NoPacketSink, Place
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +33,7 @@ _END_S = 0.5  # for the reader to finish its packet at the end
 _NOWHERE: Place = (-1, 0)
 
 
-class NoRecorder(NoTape):
+class NoRecorder(NoPacketSink):
     """Records nothing: a run without --record."""
 
     lost = 0
@@ -86,7 +86,7 @@ class Recorder:
             begins = self._muxer is None and monotonic() >= self._retry_s
             if not begins and not (self._muxer is not None and packet.is_keyframe and self._due(self._muxer)):
                 return False
-            self.hang_up()
+            self.end_part()
             try:
                 self._begin(connection)
             except (OSError, av.FFmpegError) as error:
@@ -113,7 +113,7 @@ class Recorder:
             if self._muxer.error is not None:
                 self._pause(self._muxer.error.strerror or str(self._muxer.error))
 
-    def hang_up(self) -> None:
+    def end_part(self) -> None:
         """End the part."""
         with self._writing:
             muxer, self._muxer = self._muxer, None
@@ -144,7 +144,7 @@ class Recorder:
             log.warning("the end of the recording is lost: the disk does not answer")
             return
         try:
-            self.hang_up()
+            self.end_part()
             self._retry_s = inf  # a packet that the reader still delivers begins no part
             self._write_log()
             self._end_list()
@@ -173,7 +173,7 @@ class Recorder:
     def _pause(self, why: str) -> None:
         self.lost += 1
         self._retry_s = monotonic() + _RETRY_S
-        self.hang_up()
+        self.end_part()
         folder = self._folders.get(self._part)
         if folder is not None and not (folder / FRAMES).exists():  # without frames.csv a part cannot be repeated
             del self._folders[self._part]

@@ -19,8 +19,8 @@ from vidtrack.video.live.backoff import Backoff
 from vidtrack.video.live.clock import CaptureClock
 from vidtrack.video.live.connection import Connection, Refused, Stalled
 from vidtrack.video.live.mailbox import Mailbox
+from vidtrack.video.live.packet_sink import PacketSink, Place
 from vidtrack.video.live.stats import LiveStats
-from vidtrack.video.live.tape import Place, Tape
 from vidtrack.video.planes import to_frame
 
 log = logging.getLogger(__name__)
@@ -58,7 +58,7 @@ class Reader:
         shots: Mailbox[Shot],
         stats: LiveStats,
         settings: LiveSettings,
-        tape: Tape,
+        recorder: PacketSink,
         clock: CaptureClock,
     ) -> None:
         self._connect = connect
@@ -66,7 +66,7 @@ class Reader:
         self._stats = stats
         self._settings = settings
         self._backoff = Backoff(settings.backoff_s, settings.backoff_longest_s, Random())
-        self._tape = tape
+        self._recorder = recorder
         self._clock = clock
         self._stopping = Event()
         self._failures = 0  # since the last picture
@@ -122,7 +122,7 @@ class Reader:
             self._clock.reconnected()
             self._read_packets(connection)
         finally:
-            self._tape.hang_up()
+            self._recorder.end_part()
             connection.close()
 
     def _read_packets(self, connection: Connection) -> None:
@@ -139,11 +139,11 @@ class Reader:
             live = live or slow or edge_s == now_s
             if packet.is_keyframe or (slow and not self._settings.every_frame):
                 skipping = not packet.is_keyframe
-            if self._tape.cut(connection, packet):
+            if self._recorder.cut(connection, packet):
                 self._deliver(connection, connection.start_decoder_anew(), now_s)
-            packet.opaque = self._tape.place()
+            packet.opaque = self._recorder.place()
             pictures = [] if skipping else self._decoded(connection, packet)
-            self._tape.take(packet, pictures, now_s)
+            self._recorder.take(packet, pictures, now_s)
             self._stats.frames_dropped += skipping
             if pictures:
                 pictured_s = now_s
@@ -171,7 +171,7 @@ class Reader:
             self._report_stream(connection, picture)
             time_s = self._clock.time_s(connection.stamp_s(picture), now_s)
             self._stats.arrived(now_s)
-            place: Any = picture.opaque or self._tape.place()
+            place: Any = picture.opaque or self._recorder.place()
             shot = Shot(to_frame(0, time_s, picture), connection.fps, place)
             if not self._stopping.is_set():
                 self._stats.frames_dropped += self._shots.put(shot)

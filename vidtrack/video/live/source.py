@@ -14,9 +14,9 @@ from vidtrack.video.live.address import Address
 from vidtrack.video.live.clock import CaptureClock
 from vidtrack.video.live.connection import Connection
 from vidtrack.video.live.mailbox import Mailbox
+from vidtrack.video.live.packet_sink import NoPacketSink, PacketSink, Place
 from vidtrack.video.live.reader import Reader, Shot
 from vidtrack.video.live.stats import LiveStats
-from vidtrack.video.live.tape import NoTape, Place, Tape
 from vidtrack.video.planes import matched
 
 IDLE_S = 0.25
@@ -39,7 +39,7 @@ class LiveSource:
     origin_s       monotonic time of time_s = 0
 
     settings   of the capture
-    tape       receives the packets; None: no recording
+    recorder   receives the packets; None: no recording
     first      number of the first frame
     origin_s   None: the first picture has time 0
     like       all frames are converted to its size and kind; None: those of the first frame
@@ -52,7 +52,7 @@ class LiveSource:
         self,
         address: Address,
         settings: LiveSettings,
-        tape: Tape | None = None,
+        recorder: PacketSink | None = None,
         *,
         first: int = 0,
         origin_s: float | None = None,
@@ -62,7 +62,7 @@ class LiveSource:
         self._address = address
         self._settings = settings
         self._connect = connect or (lambda: Connection(address, settings.timeout_s, settings.ffmpeg))
-        self._tape = tape or NoTape()
+        self._recorder = recorder or NoPacketSink()
         self._shots: Mailbox[Shot] = Mailbox(_EVERY if settings.every_frame else _NEWEST, waits=settings.every_frame)
         self._clock = CaptureClock(patient=settings.every_frame)
         self._index = first
@@ -122,7 +122,7 @@ class LiveSource:
         self._reader.stop(_END_S)
 
     def _read_on(self) -> Reader:
-        return Reader(self._connect, self._shots, self.stats, self._settings, self._tape, self._clock)
+        return Reader(self._connect, self._shots, self.stats, self._settings, self._recorder, self._clock)
 
     def _first_shot(self) -> Shot:
         try:

@@ -12,7 +12,7 @@ Place = tuple[int, int]
 """Index of a part of a recording, and of a packet in it."""
 
 
-class Tape(Protocol):
+class PacketSink(Protocol):
     """Records received packets, in parts that can be decoded separately."""
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
@@ -24,11 +24,11 @@ class Tape(Protocol):
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
         """Record a packet, or the pictures of an uncompressed camera."""
 
-    def hang_up(self) -> None:
+    def end_part(self) -> None:
         """End the part after a lost connection; the next packet begins a new one."""
 
 
-class NoTape:
+class NoPacketSink:
     """Records nothing."""
 
     def cut(self, connection: Connection, packet: av.Packet) -> bool:
@@ -42,5 +42,5 @@ class NoTape:
     def take(self, packet: av.Packet, pictures: list[av.VideoFrame], arrived_s: float) -> None:
         """Discard the packet."""
 
-    def hang_up(self) -> None:
+    def end_part(self) -> None:
         """Do nothing."""
