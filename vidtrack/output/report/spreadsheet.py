@@ -1,0 +1,33 @@
+"""CSV that a spreadsheet opens and runs nothing of."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from vidtrack.output.folder import replacing
+
+Cell = str | float | int | None
+_BEGINS_FORMULA = "=+-@＝＋－＠"
+
+
+def write_sheet(path: Path, header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
+    """Write UTF-8 with a byte order mark, as spreadsheets expect it; None and NaN become empty cells.
+
+    Words that a spreadsheet would take for a formula get an apostrophe in front. Raises StoppedEarly on a full disk.
+    """
+    with replacing(path) as new, new.open("w", encoding="utf-8-sig", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([_plain(name) for name in header])
+        writer.writerows([_plain(cell) for cell in row] for row in rows)
+
+
+def _plain(cell: Cell) -> str:
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return ""
+    if isinstance(cell, str):
+        dangerous = cell[:1] in "\t\r\n" or cell.strip()[:1] in _BEGINS_FORMULA
+        return f"'{cell}" if cell and dangerous and cell.strip() else cell
+    return f"{cell:.10g}"
