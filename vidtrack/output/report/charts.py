@@ -29,14 +29,14 @@ from vidtrack.traffic.report.speeds import Speeds
 
 WAYS_DRAWN = 6
 """Most histograms of speeds; the others are in the table."""
-_NUMBERED = 40
-"""Most intervals whose counts can be read as numbers"""
+_NUMBERED = 100
+"""Most intervals, a day of 15 minutes, whose counts are written as numbers"""
 
 
 def movements(sheet: Sheet, peak: PeakHour | None, clock: Clock) -> bytes:
     """Counts by interval and movement, darker for more; the peak hour framed, hatched where nobody watched."""
     intervals, columns = sheet.count.shape
-    with drawing(1.5 + min(0.17 * intervals, 7.0)) as (figure, (axes,)):
+    with drawing(1.2 + 0.15 * min(max(intervals, 4), _NUMBERED)) as (figure, (axes,)):
         (axis,) = axes
         axis.imshow(np.ma.masked_invalid(sheet.count), cmap="Blues", vmin=0, aspect="auto", interpolation="nearest")
         for k in np.flatnonzero(sheet.coverage <= 0).tolist():
@@ -70,7 +70,7 @@ def speed_histograms(ways: Sequence[Speeds]) -> bytes:
     top = max(float(np.quantile(one.speed, 0.995)) for one in shown)
     step = 5.0 if top < 150 else 10.0
     bins = np.arange(0, max(top, 30.0) + step, step)
-    with drawing(0.4 + 1.5 * rows, nrows=rows, ncols=columns, sharex=True) as (figure, axes):
+    with drawing(0.4 + 1.5 * rows, rows, columns, shared=True) as (figure, axes):
         for axis, one in zip(axes.flat, shown, strict=False):
             axis.hist(np.clip(one.speed, 0, bins[-1]), bins, color=PALE, edgecolor=BLUE, linewidth=0.6)
             axis.axvline(one.v85, color=SIGNAL, linewidth=1.4)
@@ -91,7 +91,7 @@ def over_the_day(
     legs: Sequence[LegDay], values: Sequence[Floats], what: str, clock: Clock, edges: Floats, coverage: Floats
 ) -> bytes:
     """One row of bars for each leg; hatched where nobody watched."""
-    with drawing(0.5 + 0.95 * len(legs), nrows=len(legs), sharex=True, sharey=True) as (figure, axes):
+    with drawing(0.5 + 0.95 * len(legs), len(legs), shared=True) as (figure, axes):
         for axis, leg, height in zip(axes.flat, legs, values, strict=True):
             known = np.isfinite(height)
             axis.bar(edges[:-1][known], height[known], np.diff(edges)[known], align="edge", color=BLUE, linewidth=0)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.path import Path as Curve
+from matplotlib.ticker import FuncFormatter
 
 from vidtrack.output.report.style import BLUE, GREY, INK, PALE, SIGNAL, WIDTH, drawing, png
 from vidtrack.scan import Floats
@@ -21,13 +24,18 @@ _WIDEST = 9.0
 """pt; of the arrow of the movement with most trips"""
 _PALER = 0.55
 """How far the scene is mixed with white, so that arrows and names can be read on it"""
-_NAME = {"fontsize": 7.5, "color": INK, "bbox": {"facecolor": "white", "edgecolor": GREY, "linewidth": 0.4, "pad": 1.5}}
+_NAME: dict[str, Any] = {
+    "fontsize": 7.5,
+    "color": INK,
+    "bbox": {"facecolor": "white", "edgecolor": GREY, "linewidth": 0.4, "pad": 1.5},
+}
 
 
 def origins(site: Site, sheet: Sheet, scene: Image | None) -> bytes:
     """Arrows from the entry gates to the exit gates, as wide as trips are many, over the scene if there is one."""
     width, height = site.camera.width, site.camera.height
-    with drawing(WIDTH * height / width) as (figure, axes):
+    left, top, right, bottom = (0.0, 0.0, width, height) if scene is not None else _around_gates(site)
+    with drawing(WIDTH * (bottom - top) / (right - left)) as (figure, axes):
         axis = axes[0, 0]
         if scene is not None:
             grey = cv2.cvtColor(scene, cv2.COLOR_BGR2GRAY)
@@ -48,8 +56,8 @@ def origins(site: Site, sheet: Sheet, scene: Image | None) -> bytes:
                 axis.plot(*np.array(gate.line).T, color=INK, linewidth=2, solid_capstyle="butt")
         for leg in site.legs:
             _write_leg(axis, site, leg)
-        axis.set_xlim(-0.5, width - 0.5)
-        axis.set_ylim(height - 0.5, -0.5)
+        axis.set_xlim(left - 0.5, right - 0.5)
+        axis.set_ylim(bottom - 0.5, top - 0.5)
         _bare(axis)
         return png(figure)
 
@@ -57,7 +65,7 @@ def origins(site: Site, sheet: Sheet, scene: Image | None) -> bytes:
 def heat_map(heat: Heat, gates: Gates, metres: bool) -> bytes:
     """Vehicle-seconds on the road, on a logarithmic scale, with the gates."""
     extent = np.ptp(heat.y) / np.ptp(heat.x)
-    with drawing(WIDTH * min(max(extent, 0.5), 1.2) + 0.2) as (figure, axes):
+    with drawing(min(max((WIDTH - 1.3) * extent + 0.5, 2.0), 6.5)) as (figure, axes):
         axis = axes[0, 0]
         seconds = np.ma.masked_less_equal(heat.seconds, 0)
         most = max(float(heat.seconds.max()), 1e-3)
@@ -69,7 +77,7 @@ def heat_map(heat: Heat, gates: Gates, metres: bool) -> bytes:
             ours = np.concatenate(
                 [gates.segment[gates.first[g] : gates.first[g + 1]] for g in range(len(gates)) if gates.legs[g] == leg]
             )
-            axis.text(*ours.reshape(-1, 2).mean(axis=0), leg, ha="center", va="center", **_NAME)
+            axis.text(*ours.reshape(-1, 2).mean(axis=0).tolist(), leg, ha="center", va="center", **_NAME)
         axis.set_aspect("equal")
         axis.set_xlim(heat.x[0], heat.x[-1])
         axis.set_ylim(*((heat.y[0], heat.y[-1]) if metres else (heat.y[-1], heat.y[0])))
@@ -77,8 +85,18 @@ def heat_map(heat: Heat, gates: Gates, metres: bool) -> bytes:
         axis.set_xlabel(f"x, {unit}")
         axis.set_ylabel(f"y, {unit}")
         side = heat.x[1] - heat.x[0]
-        figure.colorbar(drawn, ax=axis, shrink=0.8, label=f"vehicle-seconds in {side:.2g} x {side:.2g} {unit}")
+        label = f"vehicle-seconds in {side:.2g} x {side:.2g} {unit}"
+        figure.colorbar(drawn, ax=axis, shrink=0.8, label=label, format=FuncFormatter(lambda s, _: f"{s:g}"))
         return png(figure)
+
+
+def _around_gates(site: Site) -> tuple[float, float, float, float]:
+    """Left, top, right, bottom in px: the gates with some room, where there is no scene to see the rest of."""
+    points = np.array([point for gate in site.gates.values() for point in gate.line])
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = 0.12 * (high - low).max()
+    (left, top), (right, bottom) = (low - room).tolist(), (high + room).tolist()
+    return left, top, right, max(bottom, top + 0.4 * (right - left))
 
 
 def _arrow(axis: Axes, start: Floats, end: Floats, site: Site, width: float, label: str) -> None:
@@ -96,7 +114,8 @@ def _arrow(axis: Axes, start: Floats, end: Floats, site: Site, width: float, lab
     )  # fmt: skip
     t = 0.72
     at = (1 - t) ** 2 * start + 2 * t * (1 - t) * bend + t**2 * end
-    axis.text(*at, label, fontsize=6.5, ha="center", va="center", color=INK, zorder=5)
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
+    axis.text(at[0], at[1], label, fontsize=6.5, ha="center", va="center", color=INK, zorder=5, bbox=box)
 
 
 def _middle(site: Site, leg: str, role: str) -> Floats | None:

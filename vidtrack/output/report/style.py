@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -19,7 +20,7 @@ INK, BLUE, PALE, GREY, SIGNAL = "#1c2733", "#2f5d8a", "#c3d3e3", "#8a949e", "#b3
 WIDTH = 5.4
 """in; of every picture"""
 _DPI = 200
-_LOOK = {
+_LOOK: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
     "axes.titlesize": 8.5,
@@ -38,19 +39,21 @@ _LOOK = {
     "text.parse_math": False,  # a $ in a name is a $
     "axes.unicode_minus": False,
 }
-_STEPS = np.array([60, 300, 600, 900, 1800, 3600, 7200, 10800, 14400, 21600, 43200, 86400])
+_STEPS = np.array([5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 14400, 21600, 43200, 86400])
 _TICKS = 8
 
 
 @contextmanager
-def drawing(height: float, **subplots: int | bool) -> Iterator[tuple[Figure, np.ndarray]]:
+def drawing(
+    height: float, rows: int = 1, columns: int = 1, shared: bool = False
+) -> Iterator[tuple[Figure, np.ndarray]]:
     """A picture with its axes (rows, columns), in the look of the report; close it by `png`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with mpl.rc_context(_LOOK):
         figure = Figure((WIDTH, height), layout="constrained")
         FigureCanvasAgg(figure)
-        yield figure, figure.subplots(squeeze=False, **subplots)  # type: ignore[arg-type]
+        yield figure, figure.subplots(rows, columns, squeeze=False, sharex=shared, sharey=shared and columns == 1)
 
 
 def png(figure: Figure) -> bytes:

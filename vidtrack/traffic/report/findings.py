@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from vidtrack.errors import FormatError, SourceError
-from vidtrack.scan import Floats
+from vidtrack.scan import Floats, Ints
 from vidtrack.traffic.site import Site, read_site
 
 COLUMNS = {
@@ -49,7 +49,7 @@ class Clock:
     @property
     def zone(self) -> str:
         """What times are told in."""
-        return "hours after the first picture" if self.zero is None else self.zero.strftime("UTC%z")
+        return "hours after the first picture" if self.zero is None else str(self.zero.tzinfo)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +90,9 @@ class Findings:
         words: list[str | None] = self.tables[table][column].to_pylist()
         return words
 
-    def interval(self, t: Floats) -> Floats:
+    def interval(self, t: Floats) -> Ints:
         """(N,) number of the interval of each time [s]."""
-        return np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, len(self.coverage) - 1)
+        return np.asarray(np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, len(self.coverage) - 1))
 
 
 def read_findings(folder: Path) -> Findings:

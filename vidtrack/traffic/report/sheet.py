@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import betaincinv
 
 from vidtrack.scan import Floats, Mask
 from vidtrack.traffic.report.findings import Findings
@@ -13,8 +14,8 @@ from vidtrack.traffic.report.turns import TURNS
 
 WATCHED = 0.99
 """Share of an interval from which on it counts as watched for the peak hour: 9 s of 15 minutes may be missing."""
-_DRAWS = 4000
-_LEVELS = (2.5, 97.5)
+_TAIL = 0.025
+"""of bounds of 95 %"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +86,7 @@ def sheet_of(found: Findings, turns: Mapping[tuple[str, str], str]) -> Sheet:
     number = {pair: column for column, pair in enumerate(shown)}
     count = np.zeros((len(found.coverage), len(shown)))
     at = found.interval(found.numbers("trips", "begin_s")[complete])
-    np.add.at(count, (at, np.array([number[pair] for pair in pairs], int)), 1)
+    np.add.at(count, (at, np.array([number[pair] for pair in pairs], int)), 1.0)
     count[found.coverage <= 0] = np.nan
     movements = tuple(Movement(*pair, turns.get(pair, "")) for pair in shown)
     return Sheet(found.edges, found.coverage, movements, count)
@@ -113,19 +114,15 @@ def peak_hour(total: Floats, watched: Mask, edges: Floats) -> PeakHour | None:
 def peak_hour_factor(counts: Floats) -> tuple[float, float, float]:
     """V / (n max V_i) of the counts V_i (n,) of an hour in n intervals, and its bounds, 95 %; NaN without vehicles.
 
-    Bounds by a parametric bootstrap: each V_i is drawn again from a Poisson distribution with mean V_i. A factor from
-    counts is too low, because the largest of them is; the draws are too low again by as much. So the bounds are
-    reflected about the factor (Davison and Hinkley 1997, 5.2.1). The draws are the same each time.
+    Of V vehicles that come independently, each is of interval i with probability p_i, and the factor that they are a
+    sample of is 1 / (n max p_i). The largest p_i is at most the largest of their upper Clopper-Pearson bounds at
+    2.5 %, and at least the largest of the lower bounds at 2.5 % / n. So at least 95 % of such bounds hold.
     """
-    if counts.sum() == 0:
+    volume, n = counts.sum(), len(counts)
+    if volume == 0:
         return np.nan, np.nan, np.nan
-    factor = _factor(counts)
-    drawn = _factor(np.random.default_rng(0).poisson(counts, (_DRAWS, len(counts))).astype(float))
-    low, high = np.percentile(drawn[np.isfinite(drawn)], _LEVELS)
-    bounds = np.clip([2 * factor - high, 2 * factor - low], 1 / len(counts), 1.0)
-    return float(factor), float(bounds[0]), float(bounds[1])
-
-
-def _factor(counts: Floats) -> Floats:
-    with np.errstate(invalid="ignore"):
-        return np.asarray(counts.mean(axis=-1) / counts.max(axis=-1))
+    low = betaincinv(np.maximum(counts, 0.5), volume - counts + 1, _TAIL / n) * (counts > 0)
+    high = np.where(counts < volume, betaincinv(counts + 1, np.maximum(volume - counts, 0.5), 1 - _TAIL), 1.0)
+    share = n * np.array([counts.max() / volume, high.max(), max(low.max(), 1 / n)])
+    factor, least, most = (1 / share).tolist()
+    return factor, least, most

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import bdtr
+from scipy.special import bdtr, ndtri
 
 from vidtrack.scan import Floats
 from vidtrack.traffic.report.findings import Findings
@@ -46,17 +46,21 @@ def speeds_of(found: Findings) -> list[Speeds]:
     result = []
     for (gate, direction), rows in ways.items():
         of_all = float(np.nan_to_num(shared[rows]).mean())
-        bounds = v85_of(speed[rows], of_all)
         rough = float(np.sqrt(np.mean(np.nan_to_num(own[rows]) ** 2)))
+        bounds = v85_of(speed[rows], rough, of_all)
         result.append(Speeds(gate, direction, speed[rows], *bounds, rough, of_all))
     return sorted(result, key=lambda one: -len(one.speed))
 
 
-def v85_of(speed: Floats, shared: float) -> tuple[float, float, float]:
-    """The 85th percentile of speeds (N,), and its bounds, 95 %, when `shared` is the standard deviation of all.
+def v85_of(speed: Floats, own: float, shared: float) -> tuple[float, float, float]:
+    """The 85th percentile of speeds (N,), and its bounds, 95 %.
+
+    own     standard deviation of each speed's own error
+    shared  standard deviation of the error of all together
 
     Two of the ordered speeds bound the percentile of all vehicles, by the binomial distribution (David and Nagaraja
-    2003, 7.1), with N of 23 or more; the shared error adds to both distances in quadrature.
+    2003, 7.1), with N of 23 or more; the shared error adds to both distances in quadrature. Own errors widen the
+    distribution of the speeds: the lower bound is lowered by what they add to the percentile of a normal one.
     """
     ordered, n = np.sort(speed), len(speed)
     v85 = float(np.quantile(ordered, SHARE))
@@ -67,4 +71,6 @@ def v85_of(speed: Floats, shared: float) -> tuple[float, float, float]:
     high = ordered[int(np.searchsorted(below, 1 - _TAIL))]
     sampled = np.array([v85 - low, high - v85])
     down, up = np.hypot(sampled, _SIGMAS * shared)
-    return v85, float(v85 - down), float(v85 + up)
+    spread = float(np.std(speed))
+    added = ndtri(SHARE) * (spread - np.sqrt(max(spread**2 - own**2, 0.0)))
+    return v85, float(v85 - down - added), float(v85 + up)
