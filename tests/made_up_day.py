@@ -6,8 +6,8 @@ import json
 from datetime import UTC, datetime
 
 import numpy as np
+import pyarrow.parquet as pq
 
-from vidtrack.output.figures import write_figures
 from vidtrack.traffic.measures.tables import stamps, table
 
 SITE = """
@@ -156,7 +156,9 @@ def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("nort
         **changed,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    write_figures(folder, tables, json.loads(json.dumps(report)))
+    for table_name, content in tables.items():  # as Parquet only: the CSV of measures refuses names that no site has
+        pq.write_table(content, folder / f"{table_name}.parquet")
+    (folder / "measures.json").write_text(json.dumps(report), encoding="utf-8")
     calibration = CALIBRATION if metres else ""
     (folder / "site.toml").write_text(SITE.format(name="site", calibration=calibration), encoding="utf-8")
     return folder

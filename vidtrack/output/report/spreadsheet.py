@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from vidtrack.output.folder import replacing
 
 Cell = str | float | int | None
-_BEGINS_FORMULA = "=+-@＝＋－＠"
+_FORMULA = tuple("=+-@＝＋－＠")
+_CONTROL = re.compile(r"[\x00-\x1f]")
 
 
 def write_sheet(path: Path, header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
     """Write UTF-8 with a byte order mark, as spreadsheets expect it; None and NaN become empty cells.
 
-    Words that a spreadsheet would take for a formula get an apostrophe in front. Raises StoppedEarly on a full disk.
+    Words that a spreadsheet would take for a formula get an apostrophe in front; control characters become spaces. Raises StoppedEarly on a full disk.
     """
     with replacing(path) as new, new.open("w", encoding="utf-8-sig", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -28,6 +30,6 @@ def _plain(cell: Cell) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
     if isinstance(cell, str):
-        dangerous = cell[:1] in "\t\r\n" or cell.strip()[:1] in _BEGINS_FORMULA
-        return f"'{cell}" if cell and dangerous and cell.strip() else cell
+        line = _CONTROL.sub(" ", cell)
+        return f"'{line}" if line.lstrip().startswith(_FORMULA) else line
     return f"{cell:.10g}"

@@ -64,7 +64,7 @@ def v85_of(speed: Floats, own: float, shared: float) -> tuple[float, float, floa
     """
     ordered, n = np.sort(speed), len(speed)
     v85 = float(np.quantile(ordered, SHARE))
-    below = bdtr(np.arange(n, dtype=float), float(n), SHARE)  # that at most k speeds are below the percentile
+    below = bdtr(np.arange(n, dtype=float), n, SHARE)  # that at most k speeds are below the percentile
     if below[-1] < 1 - _TAIL:  # not even the largest speed is a bound
         return v85, np.nan, np.nan
     low = ordered[max(int(np.searchsorted(below, _TAIL, side="right")) - 1, 0)]
