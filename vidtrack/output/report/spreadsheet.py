@@ -18,7 +18,8 @@ _CONTROL = re.compile(r"[\x00-\x1f]")
 def write_sheet(path: Path, header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
     """Write UTF-8 with a byte order mark, as spreadsheets expect it; None and NaN become empty cells.
 
-    Words that a spreadsheet would take for a formula get an apostrophe in front; control characters become spaces. Raises StoppedEarly on a full disk.
+    Words that a spreadsheet would take for a formula get an apostrophe in front; control characters become spaces.
+    Raises StoppedEarly on a full disk.
     """
     with replacing(path) as new, new.open("w", encoding="utf-8-sig", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
