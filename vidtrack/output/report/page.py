@@ -21,7 +21,7 @@ NOT_KNOWN = "–"
 CHECKS = {
     "inflow": "vehicles in over entry gates",
     "outflow": "vehicles out over exit gates",
-    "left_over": "in − out − more inside at the end; 0 where none was lost or made",
+    "left_over": "in − out − growth of the number inside; 0 where none was lost or made",
     "appeared": "appeared between the gates",
     "vanished": "vanished between the gates",
 }
