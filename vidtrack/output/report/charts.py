@@ -47,7 +47,7 @@ def movements(sheet: Sheet, peak: PeakHour | None, clock: Clock) -> bytes:
             for k, m in np.argwhere(np.isfinite(sheet.count)).tolist():
                 count = sheet.count[k, m]
                 colour = "white" if count > half else INK
-                axis.text(m, k, f"{count:.0f}", ha="center", va="center", fontsize=6.5, color=colour)
+                axis.text(m, k, f"{count:.0f}", ha="center", va="center", fontsize=6.5, color=colour, in_layout=False)
         if peak is not None:
             place = (-0.5, peak.first - 0.5)
             axis.add_patch(
