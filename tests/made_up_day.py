@@ -6,6 +6,7 @@ import json
 from datetime import UTC, datetime
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from vidtrack.traffic.measures.tables import stamps, table
@@ -65,6 +66,8 @@ sigma_picture_px = 0.5
 """From straight above, 10 px a metre."""
 INTERVAL_S = 900.0
 TRIP_S = 8.0
+FPS, SPEED = 10.0, 45.0
+"""of `write_run`; px/s: 8 s from the north gate to the south gate"""
 
 
 def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("north", "south"), **changed):
@@ -181,3 +184,25 @@ def busy_day(folder):
         for b, n in zip(range(5400, 9000, 300), [2, 5, 8, 9, 9, 7, 6, 4, 3, 2, 2, 1], strict=True)
     ]
     return write_day(folder, counts, coverage, random.normal(48, 7, 3000).clip(5), queues, MOVEMENTS)
+
+
+def write_run(folder, begin_s):
+    """Track 1 passes the gate north_in at begin_s and south_out 8 s later; track 2 stands aside all the time."""
+    t = np.arange(0, 60, 1 / FPS)
+    on = (t > begin_s - 1.05) & (t < begin_s + 9.05)
+    ours, still = t[on], np.ones(len(t))
+    columns = {
+        "time_s": np.append(ours, t),
+        "track_id": np.append(np.ones(len(ours), int), 2 * still.astype(int)),
+        "status": ["confirmed"] * (len(ours) + len(t)),
+        "x_px": np.append(595 * np.ones(len(ours)), 700 * still),
+        "y_px": np.append(180 + SPEED * (ours - begin_s), 300 * still),
+        **{
+            name: np.ones(len(ours) + len(t))
+            for name in ("vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "width_px", "height_px")
+        },
+    }
+    folder.mkdir()
+    pq.write_table(pa.table(columns), folder / "tracks.parquet")
+    summary = {"frames": len(t), "media_s": t[-1], "fps": FPS, "width": 1280, "height": 720}
+    (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": None}}}))

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from made_up_day import busy_day, write_day
+from made_up_day import SITE, busy_day, write_day, write_run
 
 from vidtrack.cli import cli
 from vidtrack.errors import ConfigError, OutputError, SourceError
@@ -49,7 +49,7 @@ def test_page_pictures_and_spreadsheets_agree(made):
     text = words(out)
     assert f"Whole trips {trips}" in text
     (whole, *_) = table(out / "peak_hour.csv")
-    assert f"Peak hour {whole['begin']}–{whole['end']} {whole['vehicles']} vehicles" in text
+    assert f"Peak hour {whole['begin'][-5:]}–{whole['end'][-5:]} {whole['vehicles']} vehicles" in text
     assert f"Peak hour factor {float(whole['peak_hour_factor']):.2f}" in text
     for name in ("turning_movements", "origin_destination", "speeds", "flow", "queues", "coverage"):
         assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")
@@ -66,7 +66,7 @@ def test_the_page_needs_nothing_from_elsewhere(made):
 def test_nobody_watched_is_said_and_not_zero(made):
     _, out = made
     gap = [row for row in table(out / "turning_movements.csv") if row["coverage"] == "0"]
-    assert [row["begin"] for row in gap] == ["12:00", "12:15", "12:30", "12:45"]
+    assert [row["begin"] for row in gap] == [f"2026-06-01 12:{minute:02d}" for minute in (0, 15, 30, 45)]
     assert {value for row in gap for name, value in row.items() if name not in ("begin", "end", "coverage")} == {""}
     flows = [row for row in table(out / "flow_and_queues.csv") if row["coverage"] == "0"]
     assert {(row["flow_per_h"], row["queue"]) for row in flows} == {("", "")}
@@ -161,3 +161,16 @@ def test_what_the_command_refuses(tmp_path):
     with pytest.raises(ConfigError, match="not the same shape"):
         command(day, "-o", tmp_path / "out", "--picture", tmp_path / "square.png")
     assert not (tmp_path / "out").exists()
+
+
+def test_from_a_run_to_its_report(tmp_path, monkeypatch):
+    """Two vehicles: one drives from the north to the south, one stands aside."""
+    monkeypatch.chdir(tmp_path)
+    write_run(tmp_path / "run", 20.0)
+    (tmp_path / "site.toml").write_text(SITE.format(name="cross", calibration=""))
+    cli.main(["measure", "run", "--site", "site.toml", "-o", "measures", "-q"], standalone_mode=False)
+    command("measures", "-o", "out")
+    (movement,) = [row for row in table(tmp_path / "out" / "origin_destination.csv") if row["trips"] != "0"]
+    assert movement == {"from": "north", "to": "south", "turn": "through", "trips": "1"}
+    assert (tmp_path / "out" / "time_space.png").is_file()
+    assert "Whole trips 1" in words(tmp_path / "out")

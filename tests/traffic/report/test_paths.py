@@ -4,10 +4,8 @@ import json
 from datetime import UTC, datetime
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
-from made_up_day import write_day
+from made_up_day import FPS, SPEED, write_day, write_run
 
 from vidtrack.errors import SourceError
 from vidtrack.output.report.report import write_report
@@ -15,30 +13,6 @@ from vidtrack.traffic.report.findings import read_findings
 from vidtrack.traffic.report.paths import paths_of
 from vidtrack.traffic.report.sheet import sheet_of
 from vidtrack.traffic.report.turns import drawn, turns
-
-FPS, SPEED = 10.0, 45.0  # px/s: 8 s from the north gate to the south gate
-
-
-def write_run(folder, begin_s):
-    """Track 1 goes straight down from y = 180 in 8 s, beginning at begin_s; track 2 stands aside all the time."""
-    t = np.arange(0, 60, 1 / FPS)
-    on = (t >= begin_s) & (t <= begin_s + 8)
-    ours, still = t[on], np.ones(len(t))
-    columns = {
-        "time_s": np.append(ours, t),
-        "track_id": np.append(np.ones(len(ours), int), 2 * still.astype(int)),
-        "status": ["confirmed"] * (len(ours) + len(t)),
-        "x_px": np.append(595 * np.ones(len(ours)), 700 * still),
-        "y_px": np.append(180 + SPEED * (ours - begin_s), 300 * still),
-        **{
-            name: np.ones(len(ours) + len(t))
-            for name in ("vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "width_px", "height_px")
-        },
-    }
-    folder.mkdir()
-    pq.write_table(pa.table(columns), folder / "tracks.parquet")
-    summary = {"frames": len(t), "media_s": t[-1], "fps": FPS, "width": 1280, "height": 720}
-    (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": None}}}))
 
 
 def findings(tmp_path, offset_s=0.0):
@@ -63,7 +37,7 @@ def test_a_vehicle_drives_straight_from_gate_to_gate(tmp_path, offset_s):
 
 def test_heat_is_how_long_vehicles_were_where(tmp_path):
     heat = paths(findings(tmp_path)).heat
-    assert heat.seconds.sum() == pytest.approx(60 + 8.1)
+    assert heat.seconds.sum() == pytest.approx(60 + 10.1)
     row, column = np.searchsorted(heat.y, 300) - 1, np.searchsorted(heat.x, 700) - 1
     assert heat.seconds[row, column] == pytest.approx(60)
     assert heat.seconds.shape == (len(heat.y) - 1, len(heat.x) - 1)

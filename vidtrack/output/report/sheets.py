@@ -15,7 +15,8 @@ SPEED_STEP = 5.0
 
 def write_sheets(folder: Path, page: Page) -> None:
     """Write each table that there is data for. Raises StoppedEarly on a full disk."""
-    found, sheet, times = page.found, page.sheet, page.times
+    found, sheet = page.found, page.sheet
+    times = [found.clock.stamp(t) for t in found.edges]
     when = list(zip(times[:-1], times[1:], found.coverage.tolist(), strict=True))
     if sheet.movements:
         header = ["begin", "end", "coverage", *(one.name for one in sheet.movements), "all"]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from vidtrack.output.folder import replacing
 
+_DECIMALS = 4
 Cell = str | float | int | None
 _FORMULA = tuple("=+-@＝＋－＠")
 _CONTROL = re.compile(r"[\x00-\x1f]")
@@ -33,4 +34,4 @@ def _plain(cell: Cell) -> str:
     if isinstance(cell, str):
         line = _CONTROL.sub(" ", cell)
         return f"'{line}" if line.lstrip().startswith(_FORMULA) else line
-    return f"{cell:.10g}"
+    return f"{round(cell, _DECIMALS):.12g}"

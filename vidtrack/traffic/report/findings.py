@@ -19,9 +19,9 @@ from vidtrack.traffic.site import Site, read_site
 
 COLUMNS = {
     "crossings": ("time_s", "gate", "direction", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"),
-    "trips": ("run", "track_id", "from_leg", "to_leg", "begin_s", "end_s", "complete", "reason"),
+    "trips": ("run", "track_id", "from_leg", "to_leg", "begin_s", "end_s", "complete"),
     "queues": ("leg", "begin_s", "end_s", "vehicles", "length_m"),
-    "checks": (*("begin_s", "end_s", "coverage", "inflow", "outflow", "stored", "left_over", "appeared", "vanished"),),
+    "checks": ("begin_s", "end_s", "coverage", "inflow", "outflow", "left_over", "appeared", "vanished"),
 }
 """What is read of each table."""
 KEYS = ("site", "metres", "runs", "utc_of_time_0", "watched_s", "tracks", "joins", "impossible_movements")
@@ -41,6 +41,10 @@ class Clock:
             return time.strftime("%H:%M:%S" if time.second else "%H:%M")
         minutes, seconds = divmod(round(t), 60)
         return f"{minutes // 60}:{minutes % 60:02d}" + (f":{seconds:02d}" if seconds else "")
+
+    def stamp(self, t: float) -> str:
+        """Date and time of t [s], where they are known; else as `label`."""
+        return f"{self.date(t) or ''} {self.label(t)}".strip()
 
     def date(self, t: float) -> str | None:
         """Date of t [s]."""
