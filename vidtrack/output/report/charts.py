@@ -24,7 +24,7 @@ from vidtrack.scan import Floats
 from vidtrack.traffic.report.findings import Clock
 from vidtrack.traffic.report.legs import LegDay
 from vidtrack.traffic.report.paths import Ways
-from vidtrack.traffic.report.sheet import PeakHour, Sheet
+from vidtrack.traffic.report.sheet import WATCHED, PeakHour, Sheet
 from vidtrack.traffic.report.speeds import Speeds
 
 WAYS_DRAWN = 6
@@ -34,7 +34,10 @@ _NUMBERED = 100
 
 
 def movements(sheet: Sheet, peak: PeakHour | None, clock: Clock) -> bytes:
-    """Counts by interval and movement, darker for more; the peak hour framed, hatched where nobody watched."""
+    """Counts by interval and movement, darker for more; the peak hour framed, hatched where nobody watched.
+
+    Intervals that were watched in part have their share beside them.
+    """
     intervals, columns = sheet.count.shape
     with drawing(1.2 + 0.15 * min(max(intervals, 4), _NUMBERED)) as (figure, (axes,)):
         (axis,) = axes
@@ -53,9 +56,11 @@ def movements(sheet: Sheet, peak: PeakHour | None, clock: Clock) -> bytes:
             axis.add_patch(
                 Rectangle(place, columns, peak.last - peak.first, fill=False, edgecolor=SIGNAL, linewidth=1.6)
             )
-        step = max(1, intervals // 24)
-        axis.set_yticks(range(0, intervals, step), [clock.label(t) for t in sheet.edges[:-1:step]])
-        names = [f"{one.start}\n{one.turn}" for one in sheet.movements]
+        step = -(-intervals // _NUMBERED)
+        begins = zip(sheet.edges[:-1].tolist(), sheet.coverage.tolist(), strict=True)
+        times = [clock.label(t) + (f" ({share:.0%})" if 0 < share < WATCHED else "") for t, share in begins]
+        axis.set_yticks(range(0, intervals, step), times[::step], fontsize=6.5)
+        names = [f"{one.start} {one.turn}\nto {one.end}" for one in sheet.movements]
         axis.set_xticks(range(columns), names, rotation=90, fontsize=6.5)
         axis.xaxis.tick_top()
         axis.tick_params(length=0)
