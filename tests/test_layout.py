@@ -111,9 +111,9 @@ def test_opencv_is_used_where_there_are_pictures():
     assert {name.split(".")[0] for name in users_of("cv2")} <= {"video", "output", "simulate", "papers"}
 
 
-@pytest.mark.parametrize("library", ["matplotlib", "click", "rich", "starlette", "uvicorn"])
+@pytest.mark.parametrize("library", ["matplotlib", "jinja2", "click", "rich", "starlette", "uvicorn"])
 def test_libraries_for_people_stay_out_of_the_core(library):
-    allowed = {"matplotlib": {"output", "papers"}, "click": {"cli", "__main__"}, "rich": {"cli"}}
+    allowed = {"matplotlib": {"output", "papers"}, "jinja2": {"output"}, "click": {"cli", "__main__"}, "rich": {"cli"}}
     allowed |= {"starlette": {"serve"}, "uvicorn": {"serve"}}
     assert {name.split(".")[0] for name in users_of(library)} <= allowed[library]
 
@@ -141,7 +141,7 @@ def run(code):
 
 
 HEAVY = {
-    *("av", "cv2", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "pydantic", "rerun", "rich", "scipy"),
+    *("av", "cv2", "jinja2", "matplotlib", "numba", "numpy", "pandas", "pyarrow", "pydantic", "rerun", "rich", "scipy"),
     *("scipy.optimize", "scipy.spatial", "scipy.special", "scipy.stats", "starlette"),
 }
 COMPILED = {"numpy", "numba", "scipy", "scipy.special"}

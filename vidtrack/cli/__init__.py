@@ -17,6 +17,7 @@ COMMANDS = {
     "live": "Tracks from a camera or a stream, until stopped.",
     "calibrate": "Check what a site's calibration is worth.",
     "measure": "Traffic figures of a site from finished runs.",
+    "report": "A site's report as a page, pictures and spreadsheets.",
     "doctor": "Look at a source, and say which setting will hurt.",
     "radar": "Tracks from a table of radar plots.",
     "simulate": "Draw a traffic video or radar plots with exact truth.",

@@ -45,7 +45,7 @@ def command(options: MeasureOptions) -> None:
     """
     from vidtrack.cli.json_file import write_json
     from vidtrack.output.figures import write_figures
-    from vidtrack.output.folder import open_folder
+    from vidtrack.output.folder import open_folder, replacing
     from vidtrack.recording.retention import parts_of
     from vidtrack.traffic.measures.measure import measured
     from vidtrack.traffic.site import read_site
@@ -56,6 +56,8 @@ def command(options: MeasureOptions) -> None:
     found = measured(runs, site)
     folder = open_folder(options.output, options.site.stem, options.force)
     write_figures(folder, found.tables, found.report)
+    with replacing(folder / "site.toml") as new:  # the report draws its gates
+        new.write_bytes(options.site.read_bytes())
     if options.json_to is not None:
         write_json(found.report, options.json_to)
     if not options.quiet:
