@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from vidtrack.config import TrackerSettings
+from vidtrack.config.settings import TrackerSettings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.scan import Scan
 

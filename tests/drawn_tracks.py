@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vidtrack.scan import CONFIRMED, Tracks
+from vidtrack.tracks import CONFIRMED, Tracks
 
 
 def tracks_of(t, box=(), ids=None, status=CONFIRMED, travel=1e3, age_s=1.0):

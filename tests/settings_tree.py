@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 
 
 def places(group=Settings, prefix=""):

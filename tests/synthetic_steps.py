@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.output.sink import Step
-from vidtrack.scan import Scan, Status, Tracks
+from vidtrack.scan import Scan
+from vidtrack.tracks import Status, Tracks
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame
 

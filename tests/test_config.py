@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from settings_tree import places
 
-from vidtrack.config import Settings, load, names, value_of
+from vidtrack.config.explain import as_toml
+from vidtrack.config.load import load, names, value_of
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
-from vidtrack.explain import as_toml
 
 LEAVES = {name: group.model_fields[field] for name, (group, field) in places()}
 

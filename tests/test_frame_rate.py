@@ -5,11 +5,11 @@ import pytest
 from command_line import SAMPLES
 
 from vidtrack import formats, score
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.papers.p004.clips import by_default
 from vidtrack.run.files import run_file
-from vidtrack.scan import TENTATIVE
 from vidtrack.simulate import simulate
+from vidtrack.tracks import TENTATIVE
 
 
 def followed(scenario, seed, fps):

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vidtrack.decision import Decision
 from vidtrack.errors import Error, ScanError
-from vidtrack.scan import Decision, Scan
+from vidtrack.scan import Scan
 
 EYE = np.eye(2)
 

@@ -5,14 +5,15 @@ from pathlib import Path
 import pytest
 from settings_tree import places
 
-from vidtrack.config import Input, Settings, load, value_of
+from vidtrack.config.explain import as_toml
+from vidtrack.config.group import Group
+from vidtrack.config.inputs import Input, needs, reads
+from vidtrack.config.load import load, value_of
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
-from vidtrack.explain import as_toml
 from vidtrack.run.files import run_file
 from vidtrack.run.radar import run_plots
 from vidtrack.run.run import Extras
-from vidtrack.settings.group import Group
-from vidtrack.settings.inputs import needs, reads
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 

@@ -7,10 +7,12 @@ import pytest
 from click import Choice
 
 from vidtrack.cli import radar, track
-from vidtrack.config import DetectorSettings, RadarSettings, TrackerSettings
+from vidtrack.config import names
+from vidtrack.config.radar import RadarSettings
+from vidtrack.config.settings import TrackerSettings
+from vidtrack.config.video import DetectorSettings
 from vidtrack.estimate import resampling
 from vidtrack.radar.filters import estimator, motion
-from vidtrack.settings import names
 from vidtrack.tracking.methods import METHODS, rule
 from vidtrack.video import background
 from vidtrack.video.frame import Frame

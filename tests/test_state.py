@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from command_line import SAMPLES
 
-from vidtrack.config import Settings, load
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps

@@ -29,9 +29,10 @@ import numpy as np
 from peers.environment import python_of
 
 import vidtrack as vt
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.hard import Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Floats
+from vidtrack.decision import Decision
 
 GATE = 0.999
 WHOLE: dict[str, Associator] = {"gnn": vt.GNN(), "pda": vt.PDA(), "jpda": vt.JPDA()}

@@ -20,9 +20,10 @@ from time import perf_counter
 import cv2
 import numpy as np
 
-from vidtrack.config import BlobSettings, DetectorSettings, SourceSettings
+from vidtrack.config.settings import SourceSettings
+from vidtrack.config.video import BlobSettings, DetectorSettings
 from vidtrack.video.background import create
-from vidtrack.video.blobs import find_blobs
+from vidtrack.video.blobs.blobs import find_blobs
 from vidtrack.video.frame import Frame, Image
 from vidtrack.video.source import open_source
 

@@ -38,7 +38,7 @@ from peers.environment import python_of
 from scipy.optimize import linear_sum_assignment
 
 from vidtrack import formats, score
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.formats import Table
 from vidtrack.run.files import run_file
 from vidtrack.score.matching import box_iou

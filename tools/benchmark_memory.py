@@ -18,7 +18,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.run.files import run_file
 
 SAMPLE = Path(__file__).parent.parent / "samples" / "junction.avi"

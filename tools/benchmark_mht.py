@@ -16,7 +16,7 @@ from benchmark_memory import resident_mb
 from scipy.spatial import cKDTree
 
 import vidtrack as vt
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 SIDE_M, SIGMA_M, SCAN_S, P_D = 20e3, 20.0, 1.0, 0.9
 WARM_UP = 10

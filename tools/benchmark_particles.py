@@ -22,7 +22,7 @@ from unittest.mock import patch
 import numpy as np
 from peers.environment import python_of
 
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import ParticleBank
 from vidtrack.papers.p003.experiment import PARTICLES, SCAN_S, SCANS, SETTLED, Channels, estimate, measure, polar
 from vidtrack.simulate.radar_scenarios import speed

@@ -31,7 +31,7 @@ import numpy as np
 from peers.environment import python_of
 
 from vidtrack import formats, score
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.formats import Table
 from vidtrack.run.files import run_file
 from vidtrack.simulate import Clip, simulate

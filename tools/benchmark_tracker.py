@@ -29,10 +29,11 @@ import numpy as np
 from peers.environment import python_of
 
 from vidtrack import formats, score
-from vidtrack.config import Settings, SourceSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.settings import Settings, SourceSettings
+from vidtrack.detections.stored import open_detections
 from vidtrack.run.trackers import build_box_tracker
-from vidtrack.scan import Floats, Ints, Status
-from vidtrack.video.detections import open_detections
+from vidtrack.tracks import Status
 
 FPS = 25.0
 SPACING = 150.0  # px; one vehicle on each square of this side

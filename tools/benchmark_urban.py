@@ -26,14 +26,16 @@ import numpy as np
 from peers.environment import python_of
 
 from vidtrack import score
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Gate
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.formats import Table
-from vidtrack.scan import Floats, Ints, Scan, Status
+from vidtrack.scan import Scan
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.methods import METHODS
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status
 
 FPS, EVERY = 25.0, 5
 DT = EVERY / FPS

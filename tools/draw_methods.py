@@ -10,9 +10,9 @@ import sys
 import numpy as np
 
 import vidtrack as vt
-from vidtrack.detection.amplitude import RAYLEIGH, linear, swerling1
+from vidtrack.amplitude.densities import RAYLEIGH, linear, swerling1
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
-from vidtrack.scan import Floats
 from vidtrack.tracking.methods import METHODS
 
 SCANS, SIGMA, P_D, CLUTTER, P_FA = 40, 1.0, 0.9, 4e-3, 1e-2

@@ -15,9 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.config import Settings
-from vidtrack.detection.amplitude import RAYLEIGH
-from vidtrack.detection.threshold import ThresholdController
+from vidtrack.amplitude.densities import RAYLEIGH
+from vidtrack.amplitude.threshold import ThresholdController
+from vidtrack.config.settings import Settings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.video.source import open_source

@@ -22,7 +22,7 @@ from threading import active_count
 import av
 import numpy as np
 
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.errors import SourceError
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.run import LiveRun

@@ -24,11 +24,12 @@ import numpy as np
 from peers.environment import python_of
 from read_joyride import SIGMA_M, Joyride, read_joyride, write_joyride
 
-from vidtrack.config import Settings, load
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings
 from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import clutter_density, measurements
 from vidtrack.run.radar import track_plots
-from vidtrack.scan import Status
+from vidtrack.tracks import Status
 
 NEAR_M = 50.0
 BOAT = ("radar.max_speed=20", "radar.accel=1", "radar.quiet_accel=0.1", "radar.detection_probability=0.85")

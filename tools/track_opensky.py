@@ -18,9 +18,10 @@ import numpy as np
 import pyarrow.csv
 
 from vidtrack import formats, score
-from vidtrack.config import Settings, load
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings
 from vidtrack.run.radar import track_plots
-from vidtrack.scan import Status
+from vidtrack.tracks import Status
 
 SIGMA_M, P_D, FALSE_PLOTS = 100.0, 0.9, 20
 OLDEST_S = 10.0

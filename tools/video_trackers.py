@@ -16,7 +16,7 @@ from score_events import Event, read_counts
 from video_clips import Clip
 
 from vidtrack import formats
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.formats import Table
 from vidtrack.run.files import run_file
 from vidtrack.run.run import Extras

@@ -1,13 +1,14 @@
 """Vehicle tracks from traffic video and radar plots, on a plain CPU, without a neural network.
 
-Names are imported when they are first used: `vidtrack --help` needs none of them. The block below is for type checkers
-and editors, `_HOME` for the interpreter.
+Names are imported on first use, so that `vidtrack --help` loads none of them. The block below serves type checkers and
+editors, `_HOME` the interpreter.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from vidtrack.amplitude.threshold import ThresholdController as ThresholdController
     from vidtrack.associate.gate import Gate as Gate
     from vidtrack.associate.gate import LikelihoodGate as LikelihoodGate
     from vidtrack.associate.generalized_nn import GeneralizedNN as GeneralizedNN
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
     from vidtrack.associate.pda import PDA as PDA
     from vidtrack.associate.strongest import PSN as PSN
     from vidtrack.associate.strongest import StrongestNeighbour as StrongestNeighbour
-    from vidtrack.config import Settings as Settings
-    from vidtrack.config import load as load_settings  # noqa: F401
-    from vidtrack.detection.threshold import ThresholdController as ThresholdController
+    from vidtrack.config.load import load as load_settings  # noqa: F401
+    from vidtrack.config.settings import Settings as Settings
     from vidtrack.errors import ConfigError as ConfigError
     from vidtrack.errors import Error as Error
     from vidtrack.errors import FormatError as FormatError
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from vidtrack.errors import ScanError as ScanError
     from vidtrack.errors import SourceError as SourceError
     from vidtrack.errors import StoppedEarly as StoppedEarly
-    from vidtrack.estimate.acceleration import ConstantAcceleration as ConstantAcceleration
-    from vidtrack.estimate.acceleration import Singer as Singer
     from vidtrack.estimate.fixed_gain import FixedGainBank as FixedGainBank
     from vidtrack.estimate.imm import IMMBank as IMMBank
     from vidtrack.estimate.kalman import KalmanBank as KalmanBank
-    from vidtrack.estimate.motion import ConstantVelocity as ConstantVelocity
+    from vidtrack.estimate.motion.acceleration import ConstantAcceleration as ConstantAcceleration
+    from vidtrack.estimate.motion.acceleration import Singer as Singer
+    from vidtrack.estimate.motion.turn import CoordinatedTurn as CoordinatedTurn
+    from vidtrack.estimate.motion.velocity import ConstantVelocity as ConstantVelocity
     from vidtrack.estimate.particle import ParticleBank as ParticleBank
-    from vidtrack.estimate.turn import CoordinatedTurn as CoordinatedTurn
     from vidtrack.estimate.unscented import UnscentedBank as UnscentedBank
     from vidtrack.radar.sensors import PositionRangeRate as PositionRangeRate
     from vidtrack.radar.sensors import RangeAzimuth as RangeAzimuth
@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     from vidtrack.run.trackers import box_tracker as box_tracker
     from vidtrack.run.video import track as track
     from vidtrack.scan import Scan as Scan
-    from vidtrack.scan import Status as Status
-    from vidtrack.scan import Tracks as Tracks
     from vidtrack.tracking.boxes import box_scan as box_scan
     from vidtrack.tracking.deferred.mht import MHT as MHT
     from vidtrack.tracking.deferred.splitting import Split as Split
@@ -58,12 +56,14 @@ if TYPE_CHECKING:
     from vidtrack.tracking.picture.picture import NoPicture as NoPicture
     from vidtrack.tracking.picture.picture import Picture as Picture
     from vidtrack.tracking.tracker import Tracker as Tracker
+    from vidtrack.tracks import Status as Status
+    from vidtrack.tracks import Tracks as Tracks
 
 _HOME = {
     "ConfigError": "errors",
-    "ConstantAcceleration": "estimate.acceleration",
-    "ConstantVelocity": "estimate.motion",
-    "CoordinatedTurn": "estimate.turn",
+    "ConstantAcceleration": "estimate.motion.acceleration",
+    "ConstantVelocity": "estimate.motion.velocity",
+    "CoordinatedTurn": "estimate.motion.turn",
     "Error": "errors",
     "FixedGainBank": "estimate.fixed_gain",
     "FormatError": "errors",
@@ -94,20 +94,20 @@ _HOME = {
     "RangeAzimuthElevation": "radar.sensors",
     "Scan": "scan",
     "ScanError": "errors",
-    "Settings": "config",
-    "Singer": "estimate.acceleration",
+    "Settings": "config.settings",
+    "Singer": "estimate.motion.acceleration",
     "SourceError": "errors",
     "Split": "tracking.deferred.splitting",
-    "Status": "scan",
+    "Status": "tracks",
     "StoppedEarly": "errors",
     "StrongestNeighbour": "associate.strongest",
-    "ThresholdController": "detection.threshold",
+    "ThresholdController": "amplitude.threshold",
     "Tracker": "tracking.tracker",
-    "Tracks": "scan",
+    "Tracks": "tracks",
     "UnscentedBank": "estimate.unscented",
     "box_scan": "tracking.boxes",
     "box_tracker": "run.trackers",
-    "load_settings": "config",
+    "load_settings": "config.load",
     "track": "run.video",
     "track_plots": "run.radar",
 }

@@ -1,4 +1,4 @@
-"""What all compiled kernels share: where they are kept between runs, and that a signal waits for the compiler."""
+"""Compiled kernels: the decorators, the cache on the disk, and the handling of signals during compilation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PACKAGE = Path(__file__).parent
 
 
 def _writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, or in the nearest one above it that exists."""
+    """Whether files can be created in a folder, or in its nearest existing parent."""
     while not folder.exists():
         folder = folder.parent
     return os.access(folder, os.W_OK)
@@ -37,21 +37,21 @@ def _writable(folder: Path) -> bool:
 
 IN_TREE = _writable(PACKAGE / "__pycache__")
 CACHE = bool(os.environ.get("NUMBA_CACHE_DIR")) or IN_TREE or _writable(Path(AppDirs("numba", False).user_cache_dir))
-"""Whether kernels can be cached: numba refuses to compile a cached function where it finds no place to write.
+"""Whether kernels can be cached. numba refuses to compile a cached function if no cache folder is writable.
 
-Without one, as in a read-only container, each run compiles anew; NUMBA_CACHE_DIR names another place.
+Without a cache, as in a read-only container, each run compiles anew; NUMBA_CACHE_DIR names another folder.
 """
 
 
 def first_run() -> bool:
-    """Whether the kernels are still to be compiled, as far as the package's own folders tell."""
+    """Whether no kernel is compiled yet in the package's own folders."""
     return IN_TREE and not os.environ.get("NUMBA_CACHE_DIR") and not any(PACKAGE.rglob("*.nbi"))
 
 
 def forget_stale(package: Path) -> None:
-    """Delete all kernels cached below a folder if a source was changed since one of its own was compiled.
+    """Delete all kernels cached below a folder if any source file is newer than one of its kernels.
 
-    numba compiles a function again when its own file changes, but not when another one does that it calls into.
+    numba recompiles a function when its own file changes, but not when a file of a function that it calls changes.
     """
     kernels = list(package.rglob("*.nbi"))
     if any(_older_than_source(kernel) for kernel in kernels):
@@ -61,34 +61,36 @@ def forget_stale(package: Path) -> None:
 
 def _older_than_source(kernel: Path) -> bool:
     source = kernel.parent.parent / f"{kernel.name.split('.')[0]}.py"
-    with suppress(FileNotFoundError):  # another process has just deleted it
+    with suppress(FileNotFoundError):  # deleted by another process
         return not source.exists() or source.stat().st_mtime > kernel.stat().st_mtime
     return False
 
 
 class KernelCache(FunctionCache):
-    """Compiled kernels of one function on the disk, for several processes at once; a full disk ends no run."""
+    """Cache of one function's kernels on the disk, safe for concurrent processes. A full disk does not end the run."""
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a kernel for later runs, or say that it could not be kept."""
+        """Save a kernel for later runs; warn if it cannot be saved."""
         folder = Path(self.cache_path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with _one_writer(folder):
                 super().save_overload(sig, data)
         except OSError as error:
-            _tell(f"compiled kernels cannot be kept in {folder} ({error.strerror}); the next run compiles them again")
+            _warn_once(
+                f"compiled kernels cannot be kept in {folder} ({error.strerror}); the next run compiles them again"
+            )
 
 
 @contextmanager
 def _one_writer(folder: Path) -> Iterator[None]:
-    """Processes take turns: numba reads a function's index, adds a line and writes it back."""
+    """Lock the folder: numba reads a function's index, adds a line and writes it back."""
     if sys.platform == "win32":
         yield
         return
     handle = os.open(folder, os.O_RDONLY)
     try:
-        with suppress(OSError):  # no locks on this disk
+        with suppress(OSError):  # the file system has no locks
             fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
@@ -96,13 +98,13 @@ def _one_writer(folder: Path) -> Iterator[None]:
 
 
 @cache
-def _tell(what: str) -> None:
-    """A warning, once."""
+def _warn_once(what: str) -> None:
+    """Log a warning once."""
     log.warning(what)
 
 
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Decorator: compiled when first called, kept for later runs, and without the lock of the interpreter.
+    """Decorator: compile on the first call, cache for later runs, release the interpreter's lock.
 
     options  of numba.njit
     """
@@ -115,9 +117,9 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., Any]:
-    """A compiled closure over constants, under a name of its own.
+    """A compiled closure over constants, with the constants in its name.
 
-    Kernels of one name but other constants, cached by different processes, must not meet in a later one.
+    The cache is by name: closures of one name with other constants must not be confused.
     """
     name = "_".join([function.__name__, *map(str, constants)])
     function.__name__ = function.__qualname__ = name
@@ -125,24 +127,24 @@ def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., 
 
 
 class SignalsWait(Listener):
-    """Lets Ctrl-C and SIGTERM take effect when the kernel in work is compiled.
+    """Delays Ctrl-C and SIGTERM until the current kernel is compiled.
 
-    An exception that a signal handler raises inside the compiler is lost in a callback of LLVM, or comes out as
-    another one that says nothing to the user.
+    An exception that a signal handler raises inside the compiler is lost in a callback of LLVM, or appears as an
+    unrelated one.
     """
 
     def __init__(self) -> None:
-        self._handlers: dict[int, Any] = {}  # those in force outside the compiler; none: it is not at work
+        self._handlers: dict[int, Any] = {}  # handlers outside the compiler; empty: not compiling
         self._caught: list[int] = []
 
     def on_start(self, event: Event) -> None:
-        """The main thread enters the compiler, perhaps for a kernel that another one calls."""
+        """The main thread enters the compiler, possibly nested."""
         if not self._handlers and current_thread() is main_thread():
             ours = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not None]
             self._handlers = {number: signal.signal(number, self._note) for number in ours}  # None: set by a host in C
 
     def on_end(self, event: Event) -> None:
-        """It leaves the compiler; what was caught meanwhile comes now."""
+        """The main thread leaves the compiler: raise the signals caught meanwhile."""
         if self._handlers and current_thread() is main_thread() and not global_compiler_lock.is_locked():
             for number, handler in self._handlers.items():
                 signal.signal(number, handler)

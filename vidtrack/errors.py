@@ -1,10 +1,10 @@
-"""Errors a user can act on: each says what was wrong, with the offending value, and what to do."""
+"""Errors that the user can correct. Each message contains the fault, the value and the remedy."""
 
 from __future__ import annotations
 
 
 class Error(Exception):
-    """Base of every error vidtrack raises on purpose; `exit_code` is what the command line returns."""
+    """Base of all errors that vidtrack raises; `exit_code` is that of the command."""
 
     exit_code = 2
 
@@ -14,7 +14,7 @@ class ConfigError(Error):
 
 
 class OutputError(Error):
-    """Results cannot be written where they were asked for."""
+    """Results cannot be written to the given place."""
 
 
 class StoppedEarly(Error):  # noqa: N818
@@ -24,7 +24,7 @@ class StoppedEarly(Error):  # noqa: N818
 
 
 class SourceError(Error):
-    """The input is missing, empty, not a video, or yields nothing."""
+    """The input is missing, empty or not a video, or yields no frame."""
 
     exit_code = 3
 
@@ -40,4 +40,4 @@ class FormatError(Error):
 
 
 class PlotFormatError(FormatError):
-    """A table of radar plots cannot be used; the message names the column, or the lines and what is wrong in them."""
+    """A table of radar plots cannot be used; the message names the column, or the lines and their faults."""

@@ -1,4 +1,4 @@
-"""Tables of tracks, truth and detections in files: MOTChallenge text, CSV, Parquet, a run folder."""
+"""Reads and writes tables of tracks, truth and detections: MOTChallenge text, CSV, Parquet, run folders."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import FormatError, SourceError
-from vidtrack.scan import Floats, Ints, Mask
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 Place = Callable[[int], str]
-"""Names the place of row i in its file, for error messages."""
+"""Returns the place of row i in its file, for error messages."""
 
 FRAME_COLUMNS = ("frame", "scan")
 ID_COLUMNS = ("track_id", "target_id")
@@ -37,20 +37,20 @@ NUMBER_COLUMNS = (
 
 
 MOST_FRAMES = 10_000_000
-"""Days of video. A frame number above is a slip, or a time; every frame up to it would be an empty scan."""
+"""Days of video. A larger frame number is an error or a time; every frame up to it would be an empty scan."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of tracks, truth or detections; one row an object in a frame.
+    """Rows of tracks, truth or detections; one row per object and frame. None: the file does not contain it.
 
-    frame  (N,) counted from 0, whatever the file counts from
-    id     (N,) identity; -1 for detections, which have none
-    xy     (N, d) position; the centre of the box where the file has only boxes
-    box    (N, 4) left, top, width, height; None where the file has none
-    conf   (N,) confidence; 1 where the file has none
-    cov    (N, d, d) covariance of xy; None where the file has none
-    nis    (N,) normalised innovation squared, NaN for rows without a measurement; None where the file has none
+    frame  (N,) counted from 0
+    id     (N,) identity; -1 for detections
+    xy     (N, d) position; centre of the box if the file has only boxes
+    box    (N, 4) left, top, width, height
+    conf   (N,) confidence; 1 if the file has none
+    cov    (N, d, d) covariance of xy
+    nis    (N,) normalised innovation squared; NaN for rows without a measurement
     unit   of xy: "px" or "m"
     """
 
@@ -67,23 +67,23 @@ class Table:
         return len(self.frame)
 
     def select(self, rows: Mask | Ints) -> Table:
-        """The given rows (a mask or indices) as a table of their own."""
+        """A table of the rows selected by a mask or by indices."""
         box, cov, nis = (None if column is None else column[rows] for column in (self.box, self.cov, self.nis))
         return Table(self.frame[rows], self.id[rows], self.xy[rows], box, self.conf[rows], cov, nis, self.unit)
 
 
 def box_table(frame: Ints, identity: Ints, box: Floats, conf: Floats | None = None) -> Table:
-    """A table from boxes (N, 4) with their centres as positions; `frame` (N,) counts from 0."""
+    """A table of boxes (N, 4) with their centres as positions; `frame` (N,) counts from 0."""
     box = np.asarray(box, dtype=float).reshape(-1, 4)
     conf = np.ones(len(box)) if conf is None else conf
     return Table(np.asarray(frame, np.int64), np.asarray(identity, np.int64), box[:, :2] + box[:, 2:] / 2, box, conf)
 
 
 def read(path: str | Path) -> Table:
-    """Read a MOT text, CSV or Parquet file, told apart by content, or the tracks of a run folder.
+    """Read a MOT text, CSV or Parquet file, recognised by its content, or the tracks of a run folder.
 
-    Of a run folder `mot.txt` is preferred (boxes), then `tracks.parquet`, then `tracks.csv`.
-    Raises SourceError when there is nothing to read, FormatError naming the line that cannot be read.
+    In a run folder `mot.txt` is preferred (boxes), then `tracks.parquet`, then `tracks.csv`.
+    Raises SourceError if the file is missing, FormatError naming the line that cannot be read.
     """
     path = Path(path)
     if path.is_dir():
@@ -102,7 +102,7 @@ def read(path: str | Path) -> Table:
 
 
 def read_states(folder: str | Path) -> Table:
-    """The table of a run folder that has covariances and NIS if any has: `read` in the opposite order."""
+    """Read the table of a run folder that contains covariances and NIS: `read` in the opposite order."""
     return read(_first_of(Path(folder), "tracks.parquet", "tracks.csv", "mot.txt"))
 
 
@@ -122,9 +122,9 @@ def _is_number(text: bytes) -> bool:
 
 
 def read_mot(path: str | Path) -> Table:
-    """Read `frame,id,left,top,width,height[,conf,...]` with frames from 1, as MOTChallenge writes it.
+    """Read `frame,id,left,top,width,height[,conf,...]` with frames from 1, the form of MOTChallenge.
 
-    Detections (id -1) may repeat in a frame, a track may not. An empty file is a table without rows.
+    Detections (id -1) may repeat in a frame, tracks may not. An empty file gives a table without rows.
     Raises FormatError naming the line.
     """
     lines, rows = [], []
@@ -164,7 +164,7 @@ def _mot_row(text: str, place: str) -> list[float]:
 
 
 def write_mot(path: str | Path, table: Table) -> None:
-    """Write boxes in MOT form, frames from 1, in order of frame. Raises FormatError for a table without boxes."""
+    """Write boxes in MOT form, frames from 1, sorted by frame. Raises FormatError for a table without boxes."""
     if table.box is None:
         raise FormatError(f"cannot write {path}: the table has positions but no boxes, which MOT needs")
     with Path(path).open("w", encoding="utf-8") as file:
@@ -176,7 +176,7 @@ def write_mot(path: str | Path, table: Table) -> None:
 def read_csv(path: str | Path) -> Table:
     """Read a CSV table with the columns of `tracks.csv` or of a simulated `truth.csv`.
 
-    Raises FormatError naming the line, or the missing column and those nearest to it.
+    Raises FormatError naming the line, or the missing column and similar names.
     """
     import pyarrow as pa
     import pyarrow.csv
@@ -184,7 +184,7 @@ def read_csv(path: str | Path) -> Table:
     try:
         columns = pyarrow.csv.read_csv(
             path,
-            read_options=pyarrow.csv.ReadOptions(use_threads=False),  # its errors name the row in one thread only
+            read_options=pyarrow.csv.ReadOptions(use_threads=False),  # errors name the row only with one thread
             convert_options=pyarrow.csv.ConvertOptions(column_types=dict.fromkeys(NUMBER_COLUMNS, pa.float64())),
         )
     except pa.ArrowInvalid as error:
@@ -193,7 +193,7 @@ def read_csv(path: str | Path) -> Table:
 
 
 def read_parquet(path: str | Path) -> Table:
-    """Read a Parquet table with the columns of `tracks.parquet`. Raises FormatError as `read_csv` does."""
+    """Read a Parquet table with the columns of `tracks.parquet`. Raises FormatError as `read_csv`."""
     import pyarrow as pa
     import pyarrow.parquet
 
@@ -205,7 +205,7 @@ def read_parquet(path: str | Path) -> Table:
 
 
 def _from_columns(columns: pa.Table, path: str, place: Place) -> Table:
-    """Pick the table's columns by name; positions in metres, then pixels, then the centres of boxes."""
+    """The table from columns by name; positions are preferred in metres, then pixels, then centres of boxes."""
     names = columns.column_names
 
     def numbers(*wanted: str) -> Floats:
@@ -248,7 +248,7 @@ def _covariance(sigma: Floats, corr: Floats) -> Floats:
 
 
 def _one_of(wanted: tuple[str, ...], names: list[str], path: str) -> str:
-    """The first wanted column that is there. Raises FormatError naming what is near."""
+    """The first wanted column that exists. Raises FormatError with similar names."""
     found = next((name for name in wanted if name in names), None)
     if found is None:
         raise FormatError(f"{path} has no column {' or '.join(wanted)}: {_nearest(wanted[0], names)}")
@@ -261,7 +261,7 @@ def _nearest(wanted: str, names: list[str]) -> str:
 
 
 def _whole(name: str, values: Floats, place: Place) -> Ints:
-    """Values as integers. Raises FormatError for the first that is not whole (or missing)."""
+    """Values as integers. Raises FormatError for the first missing or fractional value."""
     _refuse(~(np.isfinite(values) & (values == np.floor(values))), name, values, "must be a whole number", place)
     return values.astype(np.int64)
 
@@ -274,7 +274,7 @@ def _refuse(bad: Mask, name: str, values: NDArray, rule: str, place: Place) -> N
 
 
 def _refuse_repeated(frame: Ints, identity: Ints, place: Place) -> None:
-    """Raise FormatError for an identity that stands twice in one frame."""
+    """Raise FormatError for an identity that occurs twice in one frame."""
     order = np.lexsort((np.arange(len(frame)), identity, frame))
     again = (np.diff(frame[order]) == 0) & (np.diff(identity[order]) == 0) & (identity[order][1:] >= 0)
     if again.any():

@@ -1,7 +1,7 @@
-"""The state of a pipeline as plain data, saved to a file and restored so that a run continues as if never stopped.
+"""Saves the state of a pipeline to a file and restores it, so that a run continues with the same results.
 
 A class lists its state in `STATE`: names of attributes that are arrays, numbers, named tuples of arrays, or objects
-with a STATE of their own. Settings are not state; they come from the user each time.
+with a STATE. Settings are not part of the state; the user gives them each time.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ import numpy as np
 from vidtrack.errors import ConfigError, FormatError
 
 State = dict[str, Any]
-"""Dotted names of attributes, with arrays or what JSON can hold as values."""
+"""Dotted names of attributes; values are arrays or JSON data."""
 
 _PLAIN = "plain"
 _DAMAGE = (
     *(ValueError, KeyError, AttributeError, EOFError, RuntimeError, MemoryError),
     *(zipfile.BadZipFile, zlib.error, struct.error, TokenError),
 )
-"""What NumPy and zipfile raise for bytes that are no saved state."""
+"""Errors of NumPy and zipfile for a file that is not a saved state."""
 
 
 def gather(thing: Any, prefix: str = "") -> State:
-    """Copies of everything in the object's state. Raises ConfigError for a part that cannot be saved."""
+    """A copy of the object's state. Raises ConfigError for a part that cannot be saved."""
     found: State = {}
     for name in _names(thing):
         value = getattr(thing, name)
@@ -51,7 +51,7 @@ def gather(thing: Any, prefix: str = "") -> State:
 
 
 def restore(thing: Any, state: State) -> None:
-    """Set the state that `gather` found in an object made with the same settings. Raises FormatError for a misfit."""
+    """Set an object's state to one gathered with the same settings. Raises FormatError if it does not fit."""
     left = state.keys() - _restored(thing, state, "")
     if left:
         raise FormatError(
@@ -61,11 +61,11 @@ def restore(thing: Any, state: State) -> None:
 
 
 def write_state(path: Path, state: State) -> None:
-    """Write a state atomically: the file is the old one or the new one, whatever happens. Raises OSError."""
+    """Write a state atomically: the file is the old one or the new one. Raises OSError."""
     arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
     plain = {name: value for name, value in state.items() if name not in arrays}
     block = BytesIO()
-    with zipfile.ZipFile(block, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:  # savez takes 6
+    with zipfile.ZipFile(block, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:  # np.savez: level 6
         for name, array in {_PLAIN: np.frombuffer(json.dumps(plain).encode(), np.uint8), **arrays}.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
@@ -83,7 +83,7 @@ def write_state(path: Path, state: State) -> None:
 
 
 def read_state(path: Path) -> State:
-    """What `write_state` wrote. Raises FormatError."""
+    """Read a state written by `write_state`. Raises FormatError."""
     try:
         with np.load(path, allow_pickle=False) as file:
             state: State = {name: file[name] for name in file.files}
@@ -96,7 +96,7 @@ def read_state(path: Path) -> State:
 
 
 def _restored(thing: Any, state: State, prefix: str) -> set[str]:
-    """Set the state of an object and its parts; returns the names that were used."""
+    """Set the state of an object and its parts; returns the names used."""
     used = set()
     for name in _names(thing):
         value = getattr(thing, name)
@@ -115,16 +115,16 @@ def _restored(thing: Any, state: State, prefix: str) -> set[str]:
 
 
 def _unpacked(name: str, value: tuple[Any, ...]) -> State:
-    """A named tuple of arrays field by field; any other tuple as a list, which JSON would make of it."""
+    """A named tuple of arrays by field; any other tuple as a list, as in JSON."""
     if not hasattr(value, "_fields"):
         return {name: list(value)}
     return {f"{name}.{field}": plane.copy() for field, plane in zip(value._fields, value, strict=True)}
 
 
 def _check(name: str, now: Any, found: Any) -> None:
-    """Raise FormatError unless `found` is an array of the same kind as `now`: compiled code would not check it.
+    """Raise FormatError unless `found` is an array of the type of `now`, which compiled code does not check.
 
-    The number of rows may differ, and another axis of length 0 is not known yet.
+    The number of rows may differ, and other axes if they have length 0 in `now`.
     """
     if not isinstance(now, np.ndarray):
         return

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from problems import random_problem, table
 
+from vidtrack.amplitude.densities import detection_probability, linear
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.generalized_nn import GeneralizedNN
 from vidtrack.associate.hard import GNN, GreedyGNN
 from vidtrack.associate.pda import PDA
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.strongest import PSN, StrongestNeighbour
-from vidtrack.detection.amplitude import detection_probability, linear
 from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Scan
 

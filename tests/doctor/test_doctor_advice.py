@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.doctor.examine import examine
 from vidtrack.doctor.judge import judge
 from vidtrack.formats import read

@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from command_line import SAMPLES
 
 from vidtrack.cli import cli
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.judge import judge
 

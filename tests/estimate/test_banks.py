@@ -5,17 +5,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.acceleration import ConstantAcceleration
 from vidtrack.estimate.fixed_gain import FixedGainBank, alpha_beta, alpha_beta_gamma, steady_prediction
 from vidtrack.estimate.imm import IMMBank
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.acceleration import ConstantAcceleration
+from vidtrack.estimate.motion.turn import CoordinatedTurn
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.estimate.turn import CoordinatedTurn
 from vidtrack.estimate.unscented import UnscentedBank
 from vidtrack.radar.sensors import RangeAzimuth
-from vidtrack.scan import Decision, Scan
+from vidtrack.scan import Scan
 
 
 def one_to_one(rows):

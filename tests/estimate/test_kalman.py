@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vidtrack.decision import Decision
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Scan
+from vidtrack.scan import Scan
 
 
 def covariances(rng, count, dim, size=1.0):

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.acceleration import ConstantAcceleration, Singer
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.turn import CoordinatedTurn
+from vidtrack.estimate.motion.acceleration import ConstantAcceleration, Singer
+from vidtrack.estimate.motion.turn import CoordinatedTurn
 
 ONE = np.ones(1)
 

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Scan
+from vidtrack.scan import Scan
 
 KNOWN, UNKNOWN = np.array([True]), np.array([False])
 ONE = np.ones(1)

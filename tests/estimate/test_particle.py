@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.error_signal import ErrorSignalBank, cycle
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.turn import CoordinatedTurn
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import Glint, ParticleBank
 from vidtrack.estimate.resampling import Resampling, choose
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.estimate.turn import CoordinatedTurn
 from vidtrack.estimate.uniform_bins import RANGE_M, UniformBinsBank
 from vidtrack.radar.sensors import RangeAzimuth
-from vidtrack.scan import Decision, Scan
+from vidtrack.scan import Scan
 
 SCHEMES = [kind for kind in Resampling if kind != Resampling.NONE]
 MODEL = ConstantVelocity(1, accel=2.0)

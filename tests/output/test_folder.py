@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 from synthetic_steps import make_step
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.errors import FormatError, OutputError, StoppedEarly
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile

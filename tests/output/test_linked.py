@@ -5,7 +5,7 @@ import pytest
 from synthetic_steps import Kept
 
 import vidtrack as vt
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.errors import ConfigError
 from vidtrack.output.linked import Linked, _within
 from vidtrack.output.sink import Step

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from synthetic_steps import make_step
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
+from vidtrack.decision import Choices, Event
 from vidtrack.errors import ConfigError, OutputError, StoppedEarly
 from vidtrack.output.decisions import HEADER, DecisionLog
 from vidtrack.output.masks import MaskFolder
@@ -17,7 +18,6 @@ from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.threaded import Threaded
 from vidtrack.output.trails import Trails
 from vidtrack.output.video import AnnotatedVideo
-from vidtrack.scan import Choices, Event
 from vidtrack.traffic.lines import parse_line
 
 ALL_STATES = [(1, "t", 20, 20), (2, "c", 60, 30), (3, "o", 90, 50), (4, "m", 30, 70), (5, "m", 40, 72)]

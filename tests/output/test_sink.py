@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from vidtrack.errors import StoppedEarly
-from vidtrack.output.sink import Step, close_together
+from vidtrack.output.sink import Step
+from vidtrack.output.threaded import close_together
 
 
 class Recorded:

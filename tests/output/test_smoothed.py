@@ -6,7 +6,7 @@ import pytest
 from synthetic_steps import Kept
 
 import vidtrack as vt
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.output.mot import MotFile
 from vidtrack.output.sink import Step
 from vidtrack.output.smoothed import Smoothed, smoothed_by

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from vidtrack.papers.p003 import fig7, fig8, fig9, fig10, table2
-from vidtrack.papers.p003.contest import CONTESTS, mean_abs, run
+from vidtrack.papers.p003.comparison import COMPARISONS, mean_abs, run
 from vidtrack.papers.p003.experiment import SCANS, TIMES, polar
 from vidtrack.papers.p003.scenario import WAYS, study
 from vidtrack.simulate.radar_scenarios import altitude, incoming, speed
 
 RUNS = 25
-NORMAL, GLINT, RECONSTRUCTION = CONTESTS
+NORMAL, GLINT, RECONSTRUCTION = COMPARISONS
 EXPECTED = {
     "measurement": (3.961, 0.019),
     "Kalman, 49 m/s²": (2.438, 0.020),

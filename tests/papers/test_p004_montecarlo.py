@@ -3,7 +3,7 @@ import pytest
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers.p004 import reference
 from vidtrack.papers.p004.montecarlo import PAIRS, difference, measure
 from vidtrack.papers.p004.scenarios import crossing, nine, shares, wrong_identities

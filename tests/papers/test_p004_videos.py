@@ -6,9 +6,9 @@ import pytest
 from vidtrack.papers.p004.clips import Watched, ids_on_targets, unshared, watch
 from vidtrack.papers.p004.fig5 import moments, outcome
 from vidtrack.papers.p004.fig6 import lost_identities
-from vidtrack.papers.p004.junction import DEFAULT, GREY, LINE, NEAR, REGION, filmed, story, uncovered
-from vidtrack.scan import Status
+from vidtrack.papers.p004.junction import DEFAULT, GREY, LINE, NEAR, REGION, filmed, junction_outcome, uncovered
 from vidtrack.simulate import simulate
+from vidtrack.tracks import Status
 
 
 def tracks(*rows):
@@ -62,11 +62,11 @@ def test_shared_blobs_are_taken_out_while_the_targets_touch_and_no_longer():
 
 def test_the_white_car_survives_the_stop_line_by_confidence_region_and_not_by_minimum_distance():
     films = filmed(0)
-    near, region = story(*films[NEAR]), story(*films[REGION])
+    near, region = junction_outcome(*films[NEAR]), junction_outcome(*films[REGION])
     assert not near.white_kept
     assert region.fate == "none"
     assert region.white_kept
-    usual = story(*films[DEFAULT])
+    usual = junction_outcome(*films[DEFAULT])
     assert usual.fate == "none"
     assert usual.white_kept
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vidtrack.config import RadarSettings, load
+from vidtrack.config.load import load
+from vidtrack.config.radar import RadarSettings
 from vidtrack.radar.filters import motion
 from vidtrack.run.radar import track_plots
 from vidtrack.simulate.radar_scenarios import simulate_radar

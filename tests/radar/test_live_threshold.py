@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from vidtrack.amplitude.reduction import gated
+from vidtrack.amplitude.threshold import ThresholdController
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.pda import PDA
-from vidtrack.detection.reduction import gated
-from vidtrack.detection.threshold import ThresholdController
-from vidtrack.radar.in_gate import AllPlots, Gates
-from vidtrack.radar.prediction import normalised
+from vidtrack.radar.performance.in_gate import AllPlots, Gates
+from vidtrack.radar.performance.prediction import normalised
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.tracker import Tracker

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 from plot_files import GOOD, HEADER, write
 
-from vidtrack.config import RadarSettings
+from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import FormatError, PlotFormatError, SourceError
 from vidtrack.radar.plots import read_plots
 

@@ -16,7 +16,8 @@ from plot_files import GOOD, write
 
 from vidtrack import formats, score
 from vidtrack.cli.radar import command
-from vidtrack.config import Settings, TrackerSettings, load
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings, TrackerSettings
 from vidtrack.errors import ConfigError, PlotFormatError
 from vidtrack.output.repair import repair
 from vidtrack.run.radar import run_plots, track_plots

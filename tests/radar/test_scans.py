@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from plot_files import HEADER, write
 
-from vidtrack.config import RadarSettings
+from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import clutter_density, measurements, surveyed

@@ -11,7 +11,8 @@ import pytest
 from command_line import SAMPLES
 from synthetic_steps import make_step
 
-from vidtrack.config import Settings, load
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, OutputError, SourceError, StoppedEarly
 from vidtrack.output.summary import Summary
 from vidtrack.run.files import run_file

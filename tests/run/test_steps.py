@@ -3,7 +3,7 @@
 import numpy as np
 
 import vidtrack as vt
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.run.radar import run_plots
 from vidtrack.run.steps import scan_steps
 

@@ -7,15 +7,17 @@ import pytest
 from command_line import SAMPLES
 
 from vidtrack import formats, score
-from vidtrack.config import Settings, SourceSettings, TrackerSettings, load
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings, SourceSettings, TrackerSettings
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.run.files import run_file
 from vidtrack.run.trackers import box_tracker, build_blob_tracker, build_box_tracker
 from vidtrack.run.video import build_detector, has_driven, track, video_steps
-from vidtrack.scan import Scan, Status
+from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import box_scan
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.occlusion.sharing import Exclusive
+from vidtrack.tracks import Status
 from vidtrack.video.frame import Frame
 from vidtrack.video.source import open_source
 

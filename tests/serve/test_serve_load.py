@@ -55,7 +55,7 @@ def test_a_client_that_never_reads_delays_nobody():
 
 
 def test_a_client_that_takes_nothing_is_cut_off(monkeypatch):
-    monkeypatch.setattr("vidtrack.serve.door._GONE_S", 0.5)
+    monkeypatch.setattr("vidtrack.serve.listener._GONE_S", 0.5)
     camera = MadeUp(tracks=[{"track_id": number} for number in range(20000)])
     with Page("0") as page:
         page.show({"gate": camera.camera()})

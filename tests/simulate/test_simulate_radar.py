@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from vidtrack import formats
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull
 from vidtrack.cli.simulate import RADAR, command
-from vidtrack.detection.amplitude import RAYLEIGH, Weibull
 from vidtrack.errors import ConfigError
 from vidtrack.radar.plots import read_plots
 from vidtrack.simulate.flight import G, Leg, fly, sidestep, weave

@@ -8,10 +8,11 @@ from blob_scene import centred, confirmed_ids, default_tracker, events, play
 
 from vidtrack.associate.gate import Gate
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Scan, Status
+from vidtrack.estimate.motion.velocity import ConstantVelocity
+from vidtrack.scan import Scan
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status
 
 EYE = np.eye(2)
 

@@ -100,7 +100,7 @@ def test_limits(detection, clutter, method):
 
 @pytest.mark.parametrize("life", ["m-of-n", "llr"])
 def test_settings_name_the_rule(life):
-    from vidtrack.config import Settings
+    from vidtrack.config.settings import Settings
     from vidtrack.run.trackers import build_blob_tracker
 
     settings = Settings.model_validate({"tracker": {"life": life, "false_track": 1e-5, "confirm_hits": 2}})

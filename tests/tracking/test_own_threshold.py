@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
+from vidtrack.amplitude.densities import RAYLEIGH, swerling1
+from vidtrack.amplitude.reduction import gated
+from vidtrack.amplitude.threshold import ThresholdController
 from vidtrack.associate.adaptive import thresholded
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.pda import PDA
 from vidtrack.associate.problem import Problem
-from vidtrack.detection.amplitude import RAYLEIGH, swerling1
-from vidtrack.detection.reduction import gated
-from vidtrack.detection.threshold import ThresholdController
 from vidtrack.errors import ScanError
-from vidtrack.radar.in_gate import Gates
-from vidtrack.radar.prediction import normalised
+from vidtrack.radar.performance.in_gate import Gates
+from vidtrack.radar.performance.prediction import normalised
 from vidtrack.scan import Scan
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker

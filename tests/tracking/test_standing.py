@@ -4,10 +4,10 @@ import pytest
 from blob_scene import confirmed_ids, default_tracker, events, nearest_id, play
 
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Status
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status
 
 
 def test_what_never_travelled_and_stands_still_ends():

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN
 from vidtrack.errors import ConfigError, ScanError
-from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Scan, Status
+from vidtrack.estimate.motion.velocity import ConstantVelocity
+from vidtrack.scan import Scan
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status
 
 EYE = np.eye(2)
 NOTHING = np.empty((0, 2))

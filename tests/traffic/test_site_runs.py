@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -12,13 +13,13 @@ from command_line import start
 from pinhole import HEIGHT, POINTS, WIDTH, Pinhole
 from synthetic_steps import make_step
 
-from vidtrack.config import Settings
+from vidtrack.arrays.affine import shift
+from vidtrack.config.settings import Settings
 from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
-from vidtrack.plane import shift
 from vidtrack.run.live.parts import Part
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.road import road_at
+from vidtrack.traffic.metres import road_at
 
 CAMERA = Pinhole()
 FPS = 25.0
@@ -83,6 +84,28 @@ def test_a_run_at_a_site_writes_metres_and_speeds(road):
     (road / "out" / "tracks.parquet").unlink()
     repair(road / "out")
     assert pq.read_table(road / "out" / "tracks.parquet").equals(table)
+
+
+def test_a_run_at_a_site_can_be_exported(road):
+    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)[0] == 0
+    code, out, err = vidtrack("export", "out", "--as", "sumo", "-o", "fcd", cwd=road)
+    assert (code, out) == (0, "fcd\n")
+    assert err.startswith("site road; 1 track; ")
+    steps = ElementTree.parse(road / "fcd" / "fcd.xml").getroot()
+    settled = [step for step in steps if 1.0 < float(step.get("time")) < 2.2]
+    assert len(settled) >= 25
+    for step in settled:
+        (car,) = step
+        front = where(float(step.get("time"))) + 4.5 / 2 * np.array([np.sin(HEADING), np.cos(HEADING)])
+        assert np.hypot(*(np.array([float(car.get("x")), float(car.get("y"))]) - front)) < 1.0
+
+
+def test_a_run_without_metres_is_not_exported(road):
+    assert vidtrack("track", "det.txt", "-o", "out", "-q", cwd=road)[0] == 0
+    code, out, err = vidtrack("export", "out", "--as", "sumo", cwd=road)
+    assert (code, out) == (2, "")
+    assert "has no positions in metres" in err
+    assert err.count("\n") == 1
 
 
 def test_a_picture_of_another_shape_is_refused_and_half_the_size_is_not(road):

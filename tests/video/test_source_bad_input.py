@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from source_clips import picture, write_clip
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.source import open_source
 

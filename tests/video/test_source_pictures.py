@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from source_clips import level, picture
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import FormatError, SourceError
 from vidtrack.video.source import open_source
 

@@ -1,1 +1,1 @@
-
+"""Data association: the gate, clusters, and one file per association rule."""

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from vidtrack.amplitude.densities import RAYLEIGH, detection_probability
+from vidtrack.amplitude.threshold import ThresholdController
 from vidtrack.associate.problem import Problem
-from vidtrack.detection.amplitude import RAYLEIGH, detection_probability
-from vidtrack.detection.threshold import ThresholdController
 from vidtrack.errors import ScanError
 
 
 def thresholded(problem: Problem, controller: ThresholdController) -> Problem:
     """The problem with each track limited to the measurements that exceed its own threshold.
 
-    The controller sets P_F (T,) from S; P_D and clutter density (T,) become those of that threshold, P_F / V_c. The
-    scan holds what exceeded the controller's p_fa_max, with amplitudes in units of the noise.
+    The controller sets P_F (T,) from S. P_D (T,) follows from P_F, and the clutter density (T,) is P_F / V_c. The scan
+    must hold all measurements above the controller's p_fa_max, with amplitudes in units of the noise.
 
     Raises ScanError for a scan with measurements and without amplitudes.
     """
     scan = problem.scan
-    if scan.noise is None:  # an empty scan that does not say what it would have measured with
+    if scan.noise is None:  # an empty scan without measurement covariance
         return problem
     if scan.amplitude is None and len(scan):
         raise ScanError("the scan has no amplitudes, which a threshold of each track's own needs; leave it out")

@@ -1,11 +1,11 @@
-"""Optimal sparse assignment: each row takes one of its columns or none, each column serves one row."""
+"""Optimal sparse assignment: each row takes at most one of its columns, each column serves at most one row."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 
 @kernel
@@ -20,12 +20,12 @@ def assign(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) 
 
 @kernel
 def solve(start: Ints, column: Ints, cost: Floats, miss: Floats, columns: int) -> tuple[Ints, Floats, Floats]:
-    """The columns that `assign` gives, with the potentials u (T,) and v (columns,) that prove them best.
+    """The columns of `assign`, with the dual variables u (T,) and v (columns,) that prove them optimal.
 
-    No reduced cost, cost - u - v or miss - u, is negative; those of the assignment are zero. v is at most zero,
-    and zero where a column is left over. Shortest augmenting paths with potentials (Jonker and Volgenant 1987)
-    on the sparse graph; the rows a path touches are those of one cluster, so separate clusters cost
-    nothing extra. "None" is a private column of each row, number `columns` + t.
+    No reduced cost, cost - u - v or miss - u, is negative; the reduced costs of the assignment are zero. v is at most
+    zero, and zero for an unused column. Method: shortest augmenting paths with potentials (Jonker and Volgenant
+    1987) on the sparse graph. A path stays within one cluster, so separate clusters cost nothing extra. "None" is a
+    private column of each row, number `columns` + t.
     """
     rows = len(start) - 1
     u, v = np.empty(rows), np.zeros(columns + rows)

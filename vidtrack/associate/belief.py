@@ -1,29 +1,29 @@
-"""Loopy belief propagation for joint events too many to sum (Williams and Lau 2014)."""
+"""Loopy belief propagation, for clusters with too many joint events to sum (Williams and Lau 2014)."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.events import Side
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 CONVERGED = 1e-9
-"""Largest relative change of a message at the end."""
+"""The iteration stops when no message changes by more than this, relative to its value."""
 ITERATIONS, MESSAGES = 1000, 10**7
-"""Most rounds for a cluster, and most messages: a heap of hundreds of tracks and measurements converges slowly."""
+"""Limits for a cluster: iterations, and messages in all; hundreds of tracks that share gates converge slowly."""
 LEAST = 1e-100
-"""Floor of all factors: messages stay finite where the exact weights have a limit."""
+"""Lower limit of all factors, so that messages stay finite."""
 
 
 @kernel
 def propagate(
     tracks: Ints, measurements: Ints, rows: Side, columns: Side, factor: Floats, share: Floats, row_share: Floats
 ) -> None:
-    """Approximate probabilities of a cluster's pairs into `share`, of its tracks' misses into `row_share`.
+    """Write approximate probabilities of a cluster's pairs to `share`, and of its misses to `row_share`.
 
-    mu = w / (miss + sum of w nu over the track's other measurements) and nu = 1 / (unused + sum of mu over the
-    measurement's other tracks), in turns; the fixed point is unique.
+    Iterates mu = w / (miss + sum of w nu over the track's other measurements) and nu = 1 / (unused + sum of mu over
+    the measurement's other tracks). The fixed point is unique.
     """
     degree = 0
     for t in tracks:
@@ -65,7 +65,7 @@ def propagate(
             total += share[k]
         share[mine] /= total
         row_share[t] /= total
-    for j in measurements:  # short of the fixed point, without clutter, a measurement could be given away twice
+    for j in measurements:  # before convergence the weights of a measurement can sum to more than one
         of_one = columns.pair[columns.start[j] : columns.start[j + 1]]
         total = share[of_one].sum()
         if total > 1.0:
@@ -77,7 +77,7 @@ def propagate(
 
 @kernel
 def _others(value: Floats, n: int, base: float, rest: Floats) -> None:
-    """rest[e] = base + the sum of the first n values but the e-th, without a difference that would cancel."""
+    """rest[e] = base + the sum of the first n values except the e-th, without a subtraction (no cancellation)."""
     total = base
     for e in range(n):
         rest[e] = total

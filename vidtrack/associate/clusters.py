@@ -1,16 +1,16 @@
-"""Clusters: tracks and measurements that share no gated pair are separate problems."""
+"""Clusters: connected components of the graph of gated pairs. They can be solved separately."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Ints
 
 
 @kernel
 def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
-    """(rows,) smallest row of each row's connected component in the gate graph; union-find with path halving."""
+    """(rows,) smallest row of each row's connected component; union-find with path halving."""
     root = np.arange(rows)
     owner = np.full(measurements, -1)
     for k in range(len(row)):
@@ -30,7 +30,7 @@ def clusters(row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints
 
 @kernel
 def find(root: Ints, t: int) -> int:
-    """Representative of t."""
+    """Root of t."""
     while root[t] != t:
         root[t] = root[root[t]]
         t = root[t]

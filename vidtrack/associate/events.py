@@ -1,10 +1,10 @@
-"""Joint events of tracks and measurements, summed without listing them.
+"""Joint events of tracks and measurements, summed without enumeration.
 
 A joint event gives each track one of its measurements or none, and no measurement to two tracks. Its weight is the
-product of a factor for each pair in it, for each track without a measurement and for each measurement without a
-track. One side's members, tracks or measurements, are taken one after another; of the other side only those that
-are already met and still contested are remembered, as bits of a number (a frontier). The work is the number of
-steps times 2 to the most bits in use: small for long chains, and for short ends of lopsided clusters.
+product of one factor for each pair, for each unassigned track and for each unassigned measurement. The sum is dynamic
+programming over the members of one side (tracks or measurements). Its state is a bit mask, the frontier: of the other
+side's members with edges both to processed and to remaining members, which are taken. The work is the number of steps
+times 2^bits. It is small for long chains, and for clusters with few members on one side.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 WIDEST = 30
-"""Most bits of a frontier."""
+"""Largest number of bits of a frontier."""
 
 
 class Side(NamedTuple):
-    """One side of a bipartite graph, and what it meets on the other: tracks and measurements, or the reverse.
+    """One side of a bipartite graph and its edges to the other side: tracks and measurements, or the reverse.
 
     start (n + 1,)  member i has the edges start[i]..start[i + 1]
-    other (N,)      who is at the other end of each edge
-    pair (N,)       number of each edge's pair
-    alone (n,)      factor of each member without a partner
+    other (N,)      member at the other end of each edge
+    pair (N,)       index of each edge's pair
+    alone (n,)      factor of each member if it is unassigned
     """
 
     start: Ints
@@ -36,10 +36,11 @@ class Side(NamedTuple):
 
 
 class Frontier(NamedTuple):
-    """What is remembered of the members of the side that is not taken in turn, all (n,).
+    """Frontier bits of the members of the side that is not processed in order, all (n,).
 
-    left  edges still to come; bit: the bit that says whether the member is taken, last: the step after which that no
-    longer matters; both -1 before the member is met
+    left  remaining edges
+    bit   bit that stores whether the member is taken; -1 before its first edge
+    last  step of its last edge; -1 before its first edge
     """
 
     left: Ints
@@ -72,10 +73,10 @@ def reverse(start: Ints, other: Ints, count: int) -> tuple[Ints, Ints, Ints]:
 
 @kernel
 def plan(members: Ints, side: Side, other: Frontier, largest: int) -> tuple[Ints, int]:
-    """An order of the members that keeps few of the other side contested at a time, and the bits that takes.
+    """An order of the members that keeps the frontier small, and the number of bits that it needs.
 
-    The next member is the one that leaves the fewest more contested, or the first that leaves no more. The other
-    side is met on the way. The number of bits is -1 if steps times states would exceed `largest`.
+    The next member is the one that adds the fewest bits, or the first that adds none. `other` is filled in. The number
+    of bits is -1 if steps times states would exceed `largest`.
     """
     left, bit, last = other
     order, free, width = members.copy(), (1 << WIDEST) - 1, 0
@@ -115,10 +116,11 @@ def exact(
     order: Ints, width: int, side: Side, other: Frontier, other_alone: Floats,
     factor: Floats, share: Floats, side_share: Floats, other_share: Floats,
 ) -> None:  # fmt: skip
-    """Probabilities of the pairs, into `share`, and of being alone, into those of the two sides.
+    """Write probabilities of the pairs to `share`, and of being unassigned to `side_share` and `other_share`.
 
-    order, width and other are those of the plan. forward[k, s] sums the events of the first k members that leave the
-    set s taken; going back, `beyond` sums what the rest can add to each set. All terms are positive: nothing cancels.
+    order, width and other come from `plan`. forward[k, s] sums the events of the first k members in which the set s is
+    taken. In the backward pass `beyond` sums the events of the remaining members for each set. All terms are positive,
+    so nothing cancels.
     """
     _, bit, last = other
     steps, size = len(order), 1 << width
@@ -136,7 +138,7 @@ def exact(
                     then[taken | mask] += now[taken] * factor[side.pair[e]]
         for e in range(side.start[i], side.start[i + 1]):
             o = side.other[e]
-            if last[o] == k:  # settled: whether it was taken need not be remembered
+            if last[o] == k:  # its last edge: the bit is free again
                 mask = 1 << bit[o]
                 for taken in range(size):
                     if taken & mask:

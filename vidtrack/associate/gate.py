@@ -1,4 +1,4 @@
-"""The gate: which measurement could belong to which track."""
+"""The gate: pairs of tracks and measurements that are close enough to be associated."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
 from vidtrack.compiled import kernel, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.rows import starts
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 
 Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
 FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)
@@ -27,11 +28,11 @@ class Pairs:
     """Gated (track, measurement) pairs, sorted by track.
 
     row, measurement (N,)
-    d2     (N,) squared distance the gate compares: v' S^-1 v, eq. (8), largest v^2 / S of an axis, or |v|^2
-    nis    (N,) v' S^-1 v whatever the gate compares, and log_s (N,) ln|S|
-    log_l  (N,) log-likelihood of the pair, ln N(v; 0, S) plus what attributes add
-    cost   (N,) what an association minimises: d2, plus log_s but for the euclidean distance, so that pairs of
-           different tracks can be ranked, plus what attributes add
+    d2     (N,) squared distance that the gate compares: v' S^-1 v, eq. (8), largest v^2 / S of an axis, or |v|^2
+    nis    (N,) v' S^-1 v for every kind of distance, and log_s (N,) ln|S|
+    log_l  (N,) log-likelihood of the pair, ln N(v; 0, S) plus terms of attributes
+    cost   (N,) cost for association: d2 plus log_s (without log_s for the euclidean distance), so that pairs of
+           different tracks can be compared, plus terms of attributes
     limit  (T,) the gate: largest d2 admitted in each row
     start  (T + 1,) pairs of row t are start[t]..start[t+1]
     """
@@ -65,7 +66,7 @@ class Pairs:
         return self._as(np.repeat(np.arange(len(rows)), count), pair, self.limit[rows], start)
 
     def _as(self, row: Ints, pair: Ints, limit: Floats, start: Ints) -> Pairs:
-        """The pairs of these indices (N,), now of the rows `row` (N,), whose gates are `limit` (K,)."""
+        """The pairs of these indices (N,), renumbered to the rows `row` (N,), whose gates are `limit` (K,)."""
         return Pairs(
             row, self.measurement.take(pair), self.d2.take(pair), self.nis.take(pair),
             self.log_s.take(pair), self.log_l.take(pair), self.cost.take(pair), limit, start,
@@ -77,9 +78,9 @@ class Gate:
     """The confidence region of each predicted measurement (paper 004, section III).
 
     probability  share of true measurements inside; the limit on d2 is its chi-square quantile
-    distance     mahalanobis: v' S^-1 v with the full S; decoupled: per-axis variances only, eq. (8) with
-                 the innovation variance; box: each axis by itself, `probability` of each (.9973 is 3 sigma);
-                 euclidean: |v|^2, the baseline that ignores the confidence region
+    distance     mahalanobis: v' S^-1 v with the full S; decoupled: variances of the axes only, eq. (8) with the
+                 innovation variance; box: each axis separately, `probability` of each (.9973 is 3 sigma); euclidean:
+                 |v|^2, a baseline without confidence region
     radius       px or m, gate of the euclidean distance
     """
 
@@ -115,11 +116,11 @@ class Gate:
     def pairs(
         self, zhat: Floats, cov: Floats, scan: Scan, run: Ints | None = None, angles: tuple[int, ...] = ()
     ) -> Pairs:
-        """All pairs inside the gate; those of different Monte Carlo runs never meet.
+        """All pairs inside the gate, both sides of the same Monte Carlo run.
 
-        zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each
-        measurement's own R. Candidates come from a grid over the first two axes, so the cost follows
-        the number of pairs and not T times M. `angles` are components in -pi..pi that wrap.
+        zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each measurement's R.
+        `angles` are components in -pi..pi that wrap. Candidates come from a grid over the first two axes, so the time
+        grows with the number of pairs and not with T times M.
         """
         limit = self.limits(cov, scan)
         mode = _MODES[self.distance]
@@ -133,9 +134,9 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class LikelihoodGate(Gate):
-    """The maximum-likelihood gate: a pair is admitted if it is likelier than a miss and a new target (SPEC 001).
+    """The maximum-likelihood gate: a pair is admitted if it is likelier than a miss plus a new target (SPEC 001).
 
-    v' S^-1 v <= 2 ln(P_D / ((1 - P_D) new_density (2 pi)^(M/2) |S|^(1/2))), S of the scan's mean R.
+    v' S^-1 v <= 2 ln(P_D / ((1 - P_D) new_density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
 
     detection_probability, new_density [per unit of measurement space]   P_D and the density of new targets
     """
@@ -153,7 +154,7 @@ class LikelihoodGate(Gate):
             raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
 
     def limits(self, cov: Floats, scan: Scan) -> Floats:
-        """(T,) the gate of each row: zero where no measurement could be likely enough."""
+        """(T,) largest admitted squared distance of each row; zero where no measurement is likely enough."""
         dim = cov.shape[1]
         S = cov if scan.noise is None else cov + scan.noise
         with np.errstate(divide="ignore"):  # P_D of one: everything is likelier than a miss
@@ -162,7 +163,7 @@ class LikelihoodGate(Gate):
         return np.maximum(0.0, 2 * (odds - np.log(self.new_density)) - dim * np.log(TURN) - log_s)
 
     def inside(self, limit: Floats, dim: int) -> Floats:
-        """(T,) P_G, the share of a target's own measurements that gates of these limits admit."""
+        """(T,) P_G, the share of a target's own measurements that gates of these limits admit; chi-square."""
         return gammainc(dim / 2, limit / 2)
 
 
@@ -174,7 +175,7 @@ def quantile(probability: float, dim: int) -> float:
 
 @kernel
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
-    """(T, 2) half sides of the box around each gate, on the first two axes."""
+    """(T, 2) half sides of the bounding box of each gate, on the first two axes."""
     axes = min(2, cov.shape[1])
     widest = np.zeros(2)
     for j in range(len(R)):
@@ -192,10 +193,9 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 def _gated(
     m: int, mode: int, angles: tuple[int, ...]
 ) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
-    """The kernel that finds the pairs inside the gate, for m components, a mode and angles that are compiled in.
+    """The kernel that finds the pairs inside the gate; m, mode and angles are compile-time constants.
 
-    It returns row, measurement, d2, nis, log_s, log_l and start of the pairs, the measurements of each track in
-    ascending order.
+    It returns row, measurement, d2, nis, log_s, log_l and start of the pairs. The measurements of a row ascend.
     """
     wraps = tuple(a in angles for a in range(m))
     turns = 1 if any(a in angles for a in range(2)) else 0
@@ -232,7 +232,7 @@ def _gated(
                     base = (own[t] * shape[1] + line) * shape[0]
                     for at_point in range(first[base + low[0]], first[base + high[0] + 1]):
                         j = order[at_point]
-                        if turns:  # a gate wider than a turn meets a measurement from both sides
+                        if turns:  # a gate wider than a full turn finds a measurement from both sides
                             if seen[j] == t:
                                 continue
                             seen[j] = t
@@ -270,7 +270,7 @@ def _gated(
                         row[n], measurement[n], d2[n] = t, j, distance
                         nis[n], log_s[n] = whitened, 2.0 * np.log(det)
                         n += 1
-        # the grid's order depends on the cell size; results must not
+        # the order in the grid depends on the cell size; results must not
         place = _ascending(row[:n], measurement[:n], rows, len(z))
         nis, log_s = nis[place], log_s[place]
         log_l = -0.5 * (nis + log_s + m * np.log(TURN))
@@ -281,7 +281,7 @@ def _gated(
 
 @kernel
 def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
-    """(P,) the order by row, then measurement, of pairs that are ordered by row: two counting sorts."""
+    """(P,) order by row, then measurement, of pairs that are sorted by row; two counting sorts."""
     first, begin = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
     for p in range(len(row)):
         first[measurement[p] + 1] += 1
@@ -299,7 +299,7 @@ def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
 
 @kernel
 def _grown(array: np.ndarray, size: int) -> np.ndarray:
-    """The same numbers in a longer array of `size`."""
+    """A copy with room for `size` elements."""
     wider = np.empty(size, array.dtype)
     for i in range(len(array)):
         wider[i] = array[i]

@@ -1,4 +1,4 @@
-"""Generalized nearest neighbour: the gated measurements, weighted by nearness, as if they were one."""
+"""Generalized nearest neighbour: the mean of the gated measurements with weights 1 / distance."""
 
 from __future__ import annotations
 
@@ -6,25 +6,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
-from vidtrack.scan import Decision, Floats, Ints
+from vidtrack.decision import Decision
 
 
 @dataclass(frozen=True, slots=True)
 class GeneralizedNN:
     """Generalized nearest neighbour (SPEC 001): the mean of the gated measurements with weights 1 / d.
 
-    d is the square root of d2. The mean updates the filter as one measurement would: there is no weight for a miss
-    and no spread, so the covariance is too small where there is clutter.
+    d is the square root of d2. The filter is updated as by one measurement, without a weight for a miss and without
+    spread, so the covariance is too small in clutter.
 
-    gated_births  every measurement in a gate has been used; none may start a track
+    gated_births  off: every measurement in a gate is used, so none starts a track
     """
 
     gated_births: bool = False
 
     def decide(self, problem: Problem) -> Decision:
-        """alpha_i = (1 / d_i) / sum(1 / d_j); measurements at distance zero leave nothing to the others."""
+        """alpha_i = (1 / d_i) / sum(1 / d_j); measurements at distance zero take all the weight."""
         pairs = problem.pairs
         return Decision(
             parent=np.arange(problem.rows),
@@ -38,7 +39,7 @@ class GeneralizedNN:
 
 @kernel
 def _by_nearness(start: Ints, d2: Floats) -> Floats:
-    """(N,) weights of the pairs, relative to the nearest of each row so that none overflows."""
+    """(N,) weights of the pairs, scaled by the nearest of each row to avoid overflow."""
     alpha = np.empty(len(d2))
     for t in range(len(start) - 1):
         mine = slice(start[t], start[t + 1])

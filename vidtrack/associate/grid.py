@@ -1,11 +1,11 @@
-"""A grid over points: finds candidates for gating without testing every pair."""
+"""A grid over points, which finds candidates for gating without testing every pair."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 
 @kernel(error_model="numpy")
@@ -44,7 +44,7 @@ def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floa
 
 @kernel
 def _typical(reach: Floats) -> Floats:
-    """(2,) mean of the finite half sides (T, 2), ones without any."""
+    """(2,) mean of the finite half sides (T, 2); ones if there are none."""
     total, count = np.zeros(2), 0
     for t in range(len(reach)):
         if np.isfinite(reach[t, 0]) and np.isfinite(reach[t, 1]):

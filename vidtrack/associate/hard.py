@@ -1,4 +1,4 @@
-"""Hard association: each track takes one measurement or none."""
+"""Hard association: each track takes at most one measurement."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Decision, Floats, Ints
 
 
 class Associator(Protocol):
     """A rule that turns gated pairs into weights.
 
-    gated_births  whether a measurement in a track's gate that no track got may start one
+    gated_births  whether an unassigned measurement in a track's gate may start a track
     """
 
     @property
@@ -32,7 +33,7 @@ class Associator(Protocol):
 class NN:
     """Nearest neighbour: each track takes its nearest measurement; two tracks may take the same one.
 
-    gated_births  off: a measurement in a gate starts no track, because each redundant measurement would start one
+    gated_births  off: a measurement in a gate starts no track, else every redundant measurement would start one
     """
 
     gated_births: bool = False
@@ -47,13 +48,13 @@ class NN:
 class GNN:
     """Global nearest neighbour: the exclusive assignment of least summed cost, d2 + ln|S|.
 
-    ln|S| makes tracks of different certainty comparable.
+    ln|S| makes tracks with different covariances comparable.
 
-    convention    what a track without a measurement costs (SPEC 001, `gnn_nonassignment`). missed-track: as much as
-                  a measurement at the edge of its gate, so that two bad pairs never beat a good pair and a miss; it
-                  is priced with the largest ln|S| of the cluster, so that every gated pair beats a miss.
-                  maximum-cardinality: more than any pairs can save, so that as few tracks as possible miss
-    gated_births  whether a measurement in a track's gate that no track got may start one
+    convention    cost of an unassigned track (SPEC 001, `gnn_nonassignment`). missed-track: the cost of a measurement
+                  at the edge of its gate, with the largest ln|S| of the cluster. Every gated pair then costs less
+                  than a miss, and a good pair and a miss cost less than two bad pairs. maximum-cardinality: larger
+                  than any saving by pairs, so that as few tracks as possible are unassigned
+    gated_births  whether an unassigned measurement in a track's gate may start a track
 
     Raises ConfigError for another convention.
     """
@@ -76,11 +77,11 @@ class GNN:
 
 @dataclass(frozen=True, slots=True)
 class GreedyGNN:
-    """Sub-optimal global nearest neighbour (SPEC 001): exclusive, but a choice once made is never taken back.
+    """Sub-optimal global nearest neighbour (SPEC 001): exclusive and greedy.
 
-    order         cost: the pair of least cost in the whole scan comes first; track: the first track takes its
-                  nearest measurement, then the second takes what is left
-    gated_births  whether a measurement in a track's gate that no track got may start one
+    order         cost: pairs in order of cost; track: the first track takes its nearest measurement, then the second
+                  its nearest of the rest, and so on
+    gated_births  whether an unassigned measurement in a track's gate may start a track
 
     Raises ConfigError for another order.
     """
@@ -92,7 +93,7 @@ class GreedyGNN:
         _refuse_unknown("order", self.order, ("cost", "track"))
 
     def decide(self, problem: Problem) -> Decision:
-        """Pair after pair in that order, if both are still free."""
+        """Each pair in that order, if track and measurement are still free."""
         pairs = problem.pairs
         keys = (pairs.cost,) if self.order == "cost" else (pairs.cost, pairs.row)
         return one_hot(_first_come(np.lexsort(keys), pairs.row, pairs.measurement, problem.rows, problem.measurements))
@@ -104,7 +105,7 @@ def _refuse_unknown(name: str, value: str, known: tuple[str, ...]) -> None:
 
 
 HARD = (NN, GNN, GreedyGNN)
-"""Rules that give whole measurements by distance alone."""
+"""Rules that assign whole measurements by distance alone."""
 
 
 def one_hot(taken: Ints) -> Decision:
@@ -136,7 +137,7 @@ def _nearest(start: Ints, measurement: Ints, cost: Floats) -> Ints:
 
 @kernel
 def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measurements: int) -> Ints:
-    """(T,) measurement of each row if the pairs are served in this order, -1 for none."""
+    """(T,) measurement of each row, -1 for none, if pairs are taken in this order."""
     taken, free = np.full(rows, -1), np.ones(measurements, np.bool_)
     for k in order:
         if taken[row[k]] < 0 and free[measurement[k]]:
@@ -150,7 +151,7 @@ def _assigned(
     row: Ints, start: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats,
     measurements: int, cardinal: bool,
 ) -> Ints:  # fmt: skip
-    """(T,) measurement of each row, -1 for none; `cardinal`: as many rows as possible get one."""
+    """(T,) measurement of each row, -1 for none; `cardinal`: with as few unassigned rows as possible."""
     if cardinal:
         miss = np.full(len(limit), _never(cost, len(limit)))
     else:
@@ -160,7 +161,7 @@ def _assigned(
 
 @kernel
 def _never(cost: Floats, rows: int) -> float:
-    """A cost larger than anything that a choice of pairs can save."""
+    """A cost larger than any difference between two assignments."""
     most = 0.0
     for k in range(len(cost)):
         most = max(most, abs(cost[k]))
@@ -169,7 +170,7 @@ def _never(cost: Floats, rows: int) -> float:
 
 @kernel
 def _edge(row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, measurements: int) -> Floats:
-    """(T,) cost of a measurement at the edge of each row's gate (T,), if its ln|S| were the largest of the cluster."""
+    """(T,) cost of a measurement at the edge of each row's gate, with the largest ln|S| of the cluster."""
     cluster = clusters(row, measurement, len(limit), measurements)
     most = np.full(len(limit), -np.inf)
     for k in range(len(row)):

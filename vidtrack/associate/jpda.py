@@ -1,4 +1,4 @@
-"""Joint probabilistic data association: all tracks share out all measurements, each measurement once."""
+"""Joint probabilistic data association: weights from all joint events of tracks and measurements."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.assignment import solve
 from vidtrack.associate.belief import propagate
 from vidtrack.associate.clusters import clusters
@@ -14,7 +15,7 @@ from vidtrack.associate.events import Side, exact, frontier, plan, reverse
 from vidtrack.associate.jpda_star import likeliest_events
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
-from vidtrack.scan import Decision, Floats, Ints, Mask
+from vidtrack.decision import Decision
 
 log = logging.getLogger(__name__)
 
@@ -23,15 +24,15 @@ log = logging.getLogger(__name__)
 class JPDA:
     """Joint probabilistic data association (SPEC 001), exact, cluster by cluster.
 
-    The weight of a track and measurement is the probability of all joint events with that pair: each track takes one
-    gated measurement or none, no measurement serves two. A cluster whose exact solution would take more than
+    In a joint event each track takes at most one gated measurement, and each measurement belongs to at most one track.
+    The weight of a pair is the probability of all joint events that contain it. A cluster that needs more than
     `largest` steps times states gets the weights of loopy belief propagation; the decision marks its rows as
-    approximate, and the log says so.
+    approximate, and the log reports it.
 
-    largest       bounds the time for a cluster; with 2^16, 12 tracks that share 14 measurements are exact still
+    largest       bounds the time for a cluster; with 2^16, 12 tracks that share 14 measurements are still exact
     star          JPDA* (Blom and Bloem 2000): of the events that give the same measurements to the same tracks in
-                  another order, only the likeliest counts; targets side by side then do not coalesce
-    gated_births  a measurement in a gate may start a track if the tracks hardly claim it
+                  another order, only the likeliest counts; tracks of close targets then do not coalesce
+    gated_births  a measurement in a gate may start a track if its weights are small
     """
 
     largest: int = 2**16
@@ -41,8 +42,8 @@ class JPDA:
     def decide(self, problem: Problem) -> Decision:
         """Marginal probabilities of the joint events.
 
-        The factors are scaled by the potentials of the likeliest event. That leaves the probabilities as they are,
-        and makes that event weigh one and all others less: nothing overflows, and what underflows does not count.
+        The factors are scaled by the potentials of the likeliest event, which does not change the probabilities. That
+        event then has weight one and all others less: nothing overflows, and what underflows is negligible.
         """
         pairs = problem.pairs
         log_pair, log_miss = problem.log_ratio, problem.log_missed
@@ -116,7 +117,7 @@ def _marginals(
 
 @kernel
 def _met(tracks: Ints, rows: Side, met: Mask) -> Ints:
-    """The measurements that a cluster's tracks can take, in the order met."""
+    """The measurements that a cluster's tracks can take, in order of first occurrence."""
     found, n = np.empty(rows.start[tracks + 1].sum() - rows.start[tracks].sum(), np.int64), 0
     for t in tracks:
         for e in range(rows.start[t], rows.start[t + 1]):

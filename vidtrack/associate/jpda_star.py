@@ -1,12 +1,12 @@
-"""JPDA*: of joint events that differ by a permutation only the likeliest counts (Blom and Bloem 2000)."""
+"""JPDA*: of joint events that differ only by a permutation, the likeliest counts (Blom and Bloem 2000)."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.events import Side
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints
 
 
 @kernel
@@ -14,11 +14,11 @@ def likeliest_events(
     tracks: Ints, measurements: Ints, rows: Side, columns: Side, place: Ints,
     factor: Floats, share: Floats, row_share: Floats, largest: int,
 ) -> bool:  # fmt: skip
-    """Probabilities of a cluster's pairs into `share` and of its misses into `row_share`; False if it is too large.
+    """Write probabilities of a cluster's pairs to `share` and of its misses to `row_share`; False if it is too large.
 
-    best[d, m] is the weight of the likeliest way to give exactly the measurements of the set m, whose bits `place`
-    (M,) keeps, to exactly the tracks of the set d. Its track of the highest bit takes one of m and leaves a smaller
-    problem of the same kind. The weights of all (d, m) are then handed back along these choices.
+    best[d, m] is the weight of the likeliest assignment of all measurements of the set m to all tracks of the set d;
+    `place` (M,) holds the bit of each measurement. Recursion: the track of the highest bit of d takes one measurement
+    of m. A backward pass then adds the weights of all (d, m) to the pairs that they contain.
     """
     if len(tracks) + len(measurements) > 30 or 1 << len(tracks) + len(measurements) > largest:
         return False
@@ -62,7 +62,7 @@ def likeliest_events(
 
 @kernel
 def _alone(alone: Floats) -> Floats:
-    """(2^n,) product of the factors of those that are not in each set."""
+    """(2^n,) product of the factors of the members outside each set."""
     product = np.ones(1 << len(alone))
     for s in range(len(product)):
         for i in range(len(alone)):
@@ -73,7 +73,7 @@ def _alone(alone: Floats) -> Floats:
 
 @kernel
 def _by_size(sets: int) -> tuple[Ints, Ints]:
-    """All sets, the smaller first, and where those of each size begin; no size beyond the whole set has any."""
+    """All sets in order of size, and the index at which each size begins."""
     size = np.empty(sets, np.int64)
     for s in range(sets):
         size[s] = size[s >> 1] + (s & 1) if s else 0

@@ -1,4 +1,4 @@
-"""The k best assignments of several problems at once, best first (Murty 1968, Cox and Hingorani 1996)."""
+"""The k best assignments over several problems, best first (Murty 1968, Cox and Hingorani 1996)."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ from heapq import heapify, heappop, heappush
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.assignment import solve
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask
 
 IMPOSSIBLE, FEASIBLE = 1e12, 1e11
-"""Cost of a row that has no choice left, and what everything else stays below."""
+"""Cost of a row without an admissible choice; every other cost is lower."""
 
 
 @kernel
 def k_best(
     offset: Floats, held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats, most: int, slack: float
 ) -> tuple[Ints, Ints, Floats]:
-    """The `most` cheapest assignments over all problems, without those costlier than the cheapest by over `slack`.
+    """The `most` cheapest assignments over all problems; those over `slack` costlier than the cheapest are left out.
 
-    All problems h have the same rows; row i takes edge k (start[i] <= k < start[i + 1]), that is column[k] at
-    cost[k], or its own alternative a at alone[i, a], infinite where it has none. A column serves one row. Problem h
-    adds offset[h] and has only the columns held[h]. Returns problem (S,), choice (S, rows) and cost (S,); a choice is
-    an edge, or -1 - a.
+    All problems h have the same rows. Row i takes edge k (start[i] <= k < start[i + 1]), column[k] at cost[k],
+    or an alternative a of its own at alone[i, a], infinite if it does not exist. At most one row takes a column.
+    Problem h adds offset[h] and has only the columns held[h]. Returns problem (S,), choice (S, rows) and cost (S,); a
+    choice is an edge, or -1 - a.
 
-    A node of the search is a problem whose first rows are fixed as in its parent's solution and whose next row
-    may not choose what its ancestors chose. It is solved only when its bound, its parent's cost plus the smallest
-    reduced cost left to that row, comes up as the least.
+    A node of the search is a problem whose first rows are fixed as in its parent's solution, and whose next row may
+    not make its ancestors' choices. Its bound is its parent's cost plus the smallest remaining reduced cost of that
+    row. It is solved only when its bound is the smallest.
     """
     rows, cheapest = len(start) - 1, 0.0
     for i in range(rows):
@@ -37,7 +37,7 @@ def k_best(
         cheapest += least
     problem = list(range(len(offset)))
     parent, depth = [-1 for _ in problem], [0 for _ in problem]
-    banned, elder = [0 for _ in problem], [-1 for _ in problem]  # a node's own ban, and the node with those before it
+    banned, elder = [0 for _ in problem], [-1 for _ in problem]  # own ban; node of the earlier bans
     solution = [-1 for _ in problem]
     choices, gaps, solved = np.empty((8, rows), np.int64), np.empty((8, rows)), 0
     heap = [(offset[h] + cheapest, h) for h in problem]
@@ -89,9 +89,9 @@ def _complete(
     held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats,
     depth: int, fixed: Ints, bans: list[int], choice: Ints, gap: Floats,
 ) -> float:  # fmt: skip
-    """Best completion of the first `depth` rows of `fixed`; returns its cost, at least IMPOSSIBLE if there is none.
+    """Best completion of the first `depth` rows of `fixed`; returns its cost, IMPOSSIBLE or more if there is none.
 
-    Writes choice (rows,) and gap (rows,): how much costlier, at least, every other choice of a row is.
+    Writes choice (rows,) and gap (rows,), a lower bound on the extra cost of every other choice of a row.
     """
     rows, alternatives = alone.shape
     free = held.copy()
@@ -141,7 +141,7 @@ def _complete(
 
 @kernel
 def _doubled(array: np.ndarray) -> np.ndarray:
-    """The same rows with room for as many again."""
+    """A copy with room for twice as many rows."""
     wider = np.empty((2 * len(array), array.shape[1]), array.dtype)
     wider[: len(array)] = array
     return wider

@@ -19,7 +19,7 @@ METHODS: dict[str, Callable[[], Associator]] = {
     "pda": PDA,
     "jpda": JPDA,
 }
-"""What an associator needs to know comes with each problem."""
+"""They take no arguments: each problem holds all data."""
 
 STRENGTH = ("sn", "psn")
-"""Those that choose by amplitude or score, and refuse scans with neither."""
+"""Methods that choose by amplitude or score. They refuse scans with neither."""

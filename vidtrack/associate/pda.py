@@ -1,4 +1,4 @@
-"""Probabilistic data association: all measurements in the gate, each by its probability."""
+"""Probabilistic data association: all measurements in the gate, weighted by their probabilities."""
 
 from __future__ import annotations
 
@@ -6,21 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.widening import widening
 from vidtrack.compiled import kernel
-from vidtrack.scan import Decision, Floats, Ints
+from vidtrack.decision import Decision
 
 
 @dataclass(frozen=True, slots=True)
 class PDA:
     """Probabilistic data association (paper 000, eqs. 9 to 14), parametric: the clutter density is known.
 
-    Each track shares out one detection among "missed" and its gated measurements, whatever other tracks do.
+    The weights of "missed" and of the gated measurements sum to one for each track, independent of other tracks.
 
-    inflate       widen the missed branch by what the gate cuts off (SPEC 000, correction 8); it matters for small
-                  gates: at 2 sigma the filter is 15 % optimistic without, at 4 sigma 0.2 %
-    gated_births  a measurement in a gate may start a track if the tracks hardly claim it
+    inflate       widen the missed branch for targets outside the gate (SPEC 000, correction 8); without it the filter
+                  is 15 % optimistic with a gate of 2 sigma, 0.2 % with 4 sigma
+    gated_births  a measurement in a gate may start a track if its weights are small
     """
 
     inflate: bool = False
@@ -42,7 +43,7 @@ class PDA:
 
 @kernel
 def _shared_out(start: Ints, log_pair: Floats, log_miss: Floats) -> tuple[Floats, Floats]:
-    """(N,) and (T,) weights of the pairs and misses, which sum to one in each row."""
+    """(N,) weights of the pairs and (T,) of the misses; they sum to one in each row."""
     beta, beta0 = np.empty(len(log_pair)), np.empty(len(log_miss))
     for t in range(len(log_miss)):
         mine = slice(start[t], start[t + 1])

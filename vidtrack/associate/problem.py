@@ -1,4 +1,4 @@
-"""One scan's association problem: what every associator is given."""
+"""The association problem of one scan: the input of every associator."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from functools import cached_property
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate, Pairs
+from vidtrack.associate.mixture import mixture_pairs
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.estimate.bank import Modes
+from vidtrack.scan import Scan
 
 VANISHING = 2000.0
-"""A factor that is zero in a limit (no clutter; P_D P_G of one) is taken as exp(-2000) or less: against it no
-likelihood counts, so that weights are those of the limit, yet one impossibility still differs from two."""
+"""Minus the logarithm that stands for ln 0 (no clutter; P_D P_G of one): exp(-2000) is negligible, so the
+weights are those of the limit, and events with one such factor still rank above events with two."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Which of M measurements belongs to which of T tracks.
+    """The possible pairs of T tracks and M measurements, with their probabilities.
 
     pairs      gated (row, measurement) pairs
     scan       the measurements, with their amplitudes and scores
@@ -48,13 +51,18 @@ class Problem:
         run: Ints | None = None,
         label: Ints | None = None,
         angles: tuple[int, ...] = (),
+        modes: Modes | None = None,
     ) -> Problem:
         """The problem of the pairs inside a gate, of predicted measurements zhat (T, m), cov (T, m, m) and a scan.
 
         run (T,) Monte Carlo runs, label (T,) classes, -1 unknown: both sides of a pair are of one run, and of one class
-        where both classes are known. angles: components of z that wrap.
+        where both classes are known. angles: components of z that wrap. modes: the predicted measurements are a
+        mixture of these, with moments zhat and cov.
         """
-        pairs = gate.pairs(zhat, cov, scan, run, angles)
+        if modes is None:
+            pairs = gate.pairs(zhat, cov, scan, run, angles)
+        else:
+            pairs = mixture_pairs(gate, modes, scan, run, angles)
         if label is not None and scan.label is not None:
             mine, theirs = label[pairs.row], scan.label[pairs.measurement]
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))
@@ -84,7 +92,7 @@ class Problem:
 
     @property
     def log_ratio(self) -> Floats:
-        """(N,) ln(P_D N(v; 0, S) / clutter density) of each pair: a target's measurement against a false one.
+        """(N,) ln(P_D N(v; 0, S) / clutter density) of each pair: target against false measurement.
 
         Without clutter the density is VANISHING; -inf for a target that is never detected.
         """
@@ -97,17 +105,17 @@ class Problem:
         return _bounded(missed, detection, clutter, self.pairs.row, self.pairs.log_l)
 
     def only(self, mask: Mask) -> Problem:
-        """The same with the pairs of a mask (N,)."""
+        """The problem with the pairs of a mask (N,)."""
         return self.having(self.pairs.only(mask))
 
     def having(self, pairs: Pairs) -> Problem:
-        """The same with other pairs of the same rows."""
+        """The problem with other pairs of the same rows."""
         if pairs is self.pairs:
             return self
         return Problem(pairs, self.scan, self.cov, self.detection, self.clutter, self.inside)
 
     def of(self, rows: Ints) -> Problem:
-        """The same for these rows (K,), which may repeat: successors have the pairs of their parents."""
+        """The problem of these rows (K,), which may repeat: successors have the pairs of their parents."""
         return replace(
             self,
             pairs=self.pairs.of(rows),
@@ -120,7 +128,7 @@ class Problem:
 
 @kernel
 def _bounded(missed: Floats, detection: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
-    """(T,) log_missed and (N,) log_ratio from the logarithms of the factors (T,); VANISHING for those of zero."""
+    """(T,) log_missed and (N,) log_ratio from the logarithms of the factors (T,); VANISHING for ln 0."""
     most = 0.0
     for k in range(len(log_l)):
         most = max(most, abs(log_l[k]))

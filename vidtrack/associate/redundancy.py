@@ -1,4 +1,4 @@
-"""Redundant measurements: several of one target in one scan become one, before the association."""
+"""Redundant measurements: several measurements of one target in a scan are combined before the association."""
 
 from __future__ import annotations
 
@@ -6,23 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.clusters import find
 from vidtrack.associate.gate import Gate
 from vidtrack.compiled import kernel
 from vidtrack.estimate.sensor import wrapped
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 BLOCK = 256
-"""Measurements that are compared with all others at a time, which bounds the memory that a heap of them takes."""
+"""Measurements that are compared with all others at a time; this bounds the memory."""
 
 
 def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
-    """The scan with the measurements of each target combined, and (M,) the index of each old one's combination.
+    """The scan with the measurements of each target combined, and (M,) the new index of each old measurement.
 
-    a and b are of one target if (za - zb)' (Ra + Rb)^-1 (za - zb) is at most the chi-square quantile of
-    `probability`, or if a chain of such pairs leads from one to the other. They become z = R sum(Ri^-1 zi) with
-    R = (sum Ri^-1)^-1 (SPEC 001, redundancy elimination), with the box around their boxes, the largest amplitude and
-    score, and the label and lasting errors of the first. Measurements of different runs stay apart.
+    Measurements a and b are linked if (za - zb)' (Ra + Rb)^-1 (za - zb) is at most the chi-square quantile of
+    `probability`; linked measurements of one run form a group (single linkage). A group becomes z = R sum(Ri^-1 zi)
+    with R = (sum Ri^-1)^-1 (SPEC 001, redundancy elimination), with the bounding box of its boxes, its largest
+    amplitude and score, and the label and lasting errors of its first measurement.
 
     Raises ConfigError for a probability outside 0..1.
     """
@@ -54,7 +55,7 @@ def combined(scan: Scan, probability: float = 0.95) -> tuple[Scan, Ints]:
 
 
 def linked(scan: Scan, gate: Gate) -> Ints:
-    """(M,) the first measurement of each one's group; groups are linked by pairs inside a gate (single linkage).
+    """(M,) first measurement of each measurement's group; pairs inside a gate are linked (single linkage).
 
     Measurements of different runs are never linked.
     """
@@ -68,7 +69,7 @@ def linked(scan: Scan, gate: Gate) -> Ints:
 
 
 def _around(box: Floats, place: Floats, z: Floats, order: Ints, begin: Ints) -> Floats:
-    """Boxes (K, 4) relative to z (K, m) around the boxes (M, 4) relative to their places (M, m)."""
+    """Bounding boxes (K, 4), relative to z (K, m), of groups of boxes (M, 4), relative to their places (M, m)."""
     low = box[:, :2] + place[:, :2]
     high = low + box[:, 2:]
     near = np.minimum.reduceat(low[order], begin, axis=0)
@@ -78,7 +79,7 @@ def _around(box: Floats, place: Floats, z: Floats, order: Ints, begin: Ints) -> 
 
 @kernel
 def _join(root: Ints, a: Ints, b: Ints) -> None:
-    """Both ends of each pair get the smaller root."""
+    """Give both members of each pair the smaller of their roots."""
     for k in range(len(a)):
         i, j = find(root, a[k]), find(root, b[k])
         root[max(i, j)] = min(i, j)
@@ -86,5 +87,5 @@ def _join(root: Ints, a: Ints, b: Ints) -> None:
 
 @kernel
 def _roots(root: Ints) -> Ints:
-    """(M,) representative of each."""
+    """(M,) root of each element."""
     return np.array([find(root, i) for i in range(len(root))], np.int64)

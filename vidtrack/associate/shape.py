@@ -1,4 +1,4 @@
-"""The size of a box as evidence: a lorry's box is not a motorcycle's, however near it lies."""
+"""Box size as a feature in the association."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Pairs, quantile
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints, Mask
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Boxes of a vehicle keep their size from scan to scan.
+    """Gate and likelihood of box sizes, which change little from scan to scan.
 
     sigma        standard deviation of the logarithm of width and height between a track and its measurement
-    probability  share of a vehicle's own boxes that position and size together admit
-    overlap      least intersection over union of a box with the prediction: nothing jumps clear of it
+    probability  share of a vehicle's own boxes that the joint gate of position and size admits
+    overlap      smallest admitted intersection over union of a box with the predicted box
     """
 
     sigma: float = 0.15
@@ -34,11 +34,11 @@ class Shape:
             raise ConfigError(f"shape probability is {self.probability}; it must lie between 0 and 1")
 
     def weigh(self, pairs: Pairs, predicted: Floats, boxes: Floats) -> Pairs:
-        """The pairs that size allows, with the size's distance in their cost and likelihood.
+        """The pairs that the size admits, with its distance added to their cost and likelihood.
 
-        predicted (T, 4) and boxes (M, 4) in the picture. A pair stays if its d2 and its size distance
-        |ln(w h ratios)|^2 / sigma^2 together are below the gate plus the size's own chi-square quantile,
-        and if the boxes overlap enough.
+        predicted (T, 4) and boxes (M, 4) in the picture. A pair stays if d2 plus the size distance
+        |ln(w h ratios)|^2 / sigma^2 is below the gate plus the chi-square quantile of the size, and if the boxes
+        overlap enough.
         """
         most = pairs.limit + quantile(self.probability, 2)
         size2, stays = _compare(
@@ -58,7 +58,7 @@ def _compare(
 ) -> tuple[Floats, Mask]:  # fmt: skip
     """(N,) the pairs' size distances, and which of them stay.
 
-    A track without a box yet takes any size; a box of no size fits nothing.
+    A track without a box admits any size; a box of size zero is never admitted.
     """
     size2, stays = np.zeros(len(row)), np.ones(len(row), np.bool_)
     for k in range(len(row)):

@@ -1,4 +1,4 @@
-"""Strongest neighbour: each track takes the strongest echo in its gate, for certain or by probability."""
+"""Strongest neighbour: each track takes the strongest measurement in its gate, with or without a probability."""
 
 from __future__ import annotations
 
@@ -7,27 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull, log_ratio, swerling1
+from vidtrack.amplitude.reduction import gate_volume
+from vidtrack.amplitude.strongest import Strongest
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.hard import one_hot
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.widening import widening
 from vidtrack.compiled import kernel
-from vidtrack.detection.amplitude import RAYLEIGH, Weibull, log_ratio, swerling1
-from vidtrack.detection.reduction import gate_volume
-from vidtrack.detection.strongest import Strongest
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError, ScanError
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 TINY = 1e-300
 MOST = 0.999
-"""No score says that all of a target's detections are weaker: that would be an infinite amplitude."""
+"""Upper limit of scores: a score of one would be an infinite amplitude."""
 
 
 @dataclass(frozen=True, slots=True)
 class StrongestNeighbour:
-    """Strongest neighbour: the strongest measurement in the gate updates the track, as if it were certain.
+    """Strongest neighbour: the strongest measurement in the gate updates the track with weight one.
 
-    Strength is the scan's amplitude, or its score where there is none. Two tracks may take the same measurement.
-    Overconfident in clutter: PSN is not.
+    Strength is the amplitude, or the score if there are no amplitudes. Two tracks may take the same measurement. The
+    filter is overconfident in clutter; PSN is not.
 
     gated_births  whether a weaker measurement in a gate may start a track
     """
@@ -45,16 +47,16 @@ class StrongestNeighbour:
 @dataclass(frozen=True, slots=True)
 class PSN:
     """Probabilistic strongest neighbour (paper 002, eqs. 21 to 26): the strongest measurement in the gate is the
-    target's with a probability that its amplitude and its place tell.
+    target's with a probability that follows from its amplitude and position.
 
-    P_D of the tracker and the SNR give the detection threshold, the clutter density then the size of a resolution
-    cell, the only other number that counts. A scan without amplitudes may have scores from 0 to 1 instead, which
-    are taken for the share of the target's detections that are weaker.
+    The tracker's P_D and the SNR give the detection threshold, and with the clutter density the size of a resolution
+    cell. A scan without amplitudes may have scores from 0 to 1 instead. A score is read as the share of the target's
+    detections that are weaker.
 
     snr           linear SNR of a Swerling I target; 10 is 10 dB
     clutter       the clutter's amplitudes, in the same units
-    printed       widen by the average over amplitudes, as the paper prints eq. (24), and not by what the amplitude
-                  at hand tells; slow, for comparison
+    printed       widen by the average over amplitudes, as eq. (24) is printed, and not by the measured amplitude; slow,
+                  for comparison
     gated_births  whether a weaker measurement in a gate may start a track
 
     Raises ConfigError for an SNR that is not above zero.
@@ -70,7 +72,7 @@ class PSN:
             raise ConfigError(f"the linear SNR of the strongest-neighbour filter is {self.snr}; it must be above zero")
 
     def decide(self, problem: Problem) -> Decision:
-        """P_T of the strongest of each gate; the rest is the weight of a miss, which widens the row.
+        """P_T of the strongest measurement in each gate; 1 - P_T is the weight of a miss, which widens the row.
 
         Raises ScanError for a scan without amplitudes and scores.
         """
@@ -98,14 +100,14 @@ class PSN:
         )
 
     def _amplitude(self, scan: Scan, j: Ints, p_d: Floats) -> Floats:
-        """(B,) amplitudes of measurements j that P_D `p_d` of their tracks lets pass; scores in their place."""
+        """(B,) amplitudes of measurements j, or those that match their scores at the tracks' P_D `p_d`."""
         if scan.amplitude is not None:
             return np.maximum(scan.amplitude[j], TINY)
         weaker = np.clip(_strength(scan)[j], 0.0, MOST)
         return swerling1(self.snr).threshold(p_d * (1 - weaker))
 
     def _average(self, problem: Problem, row: Ints, threshold: Floats) -> Floats:
-        """(B,) P_A of rows: a detected target is the strongest, given that the gate has false measurements.
+        """(B,) P_A of rows: the probability that a detected target is the strongest, given clutter in the gate.
 
         (I_A / P_D - exp(-n)) / (1 - exp(-n)) for n = density times gate volume (paper 002, eqs. 16 to 19).
         """
@@ -122,7 +124,7 @@ class PSN:
 
 
 def _strength(scan: Scan) -> Floats:
-    """(M,) what tells strong from weak."""
+    """(M,) amplitudes, or scores without amplitudes."""
     strength = scan.score if scan.amplitude is None else scan.amplitude
     if strength is None:
         if len(scan):
@@ -136,7 +138,7 @@ def _strength(scan: Scan) -> Floats:
 
 @kernel
 def _strongest(start: Ints, measurement: Ints, strength: Floats) -> Ints:
-    """(T,) number of the pair with the strongest measurement of each row, the first of equals; -1 without."""
+    """(T,) index of the pair with the strongest measurement of each row, the first of equals; -1 for none."""
     best = np.full(len(start) - 1, -1)
     for t in range(len(best)):
         for k in range(start[t], start[t + 1]):

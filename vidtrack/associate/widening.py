@@ -1,16 +1,16 @@
-"""How much a miss widens a row: a target that was detected, but not in the gate, is farther off than predicted."""
+"""Inflation of the covariance by a miss: the target may have been detected outside the gate."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Floats
 
 
 def widening(problem: Problem, seen: Floats) -> Floats:
-    """(T,) X (1 - c1) / (1 - X), a factor of K S K', for the probability X = `seen` that the gate shows the target.
+    """(T,) factor X (1 - c1) / (1 - X) of K S K', with X = `seen` the probability that the target is in the gate.
 
     c1 S is the covariance of the innovations within the gate; c1 = P(chi2 of m + 2 < g^2) / P_G (SPEC 000,
     correction 8, where X = P_D P_G; SPEC 002, kappa).

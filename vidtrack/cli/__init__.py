@@ -1,4 +1,4 @@
-"""What the user types. Each command is a module of its own, imported when it is called."""
+"""The command line. Each command is a module, imported when it is called."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
     "live": "Tracks from a camera or a stream, until stopped.",
     "calibrate": "Check what a site's calibration is worth.",
+    "measure": "Traffic figures of a site from finished runs.",
+    "report": "A site's report as a page, pictures and spreadsheets.",
     "doctor": "Look at a source, and say which setting will hurt.",
     "radar": "Tracks from a table of radar plots.",
     "simulate": "Draw a traffic video or radar plots with exact truth.",
@@ -23,6 +25,8 @@ COMMANDS = {
     "predict": "Track error of a radar filter in clutter, before there is a plot.",
     "threshold": "The detection threshold that suits a tracker best.",
     "reproduce": "Figures and tables of the papers, ours beside theirs.",
+    "export": "Tracks in metres for other programs: GeoJSON, SUMO, SSAM and more.",
+    "validate": "Compare counted crossings with a count by hand.",
     "view": "Look at a finished run in rerun.",
     "repair": "Make a killed run's files whole.",
     "config": "Show the settings and what each one does.",
@@ -30,7 +34,7 @@ COMMANDS = {
 
 
 class _Commands(click.Group):
-    """Imports only the command that is called, so that help answers at once."""
+    """Imports only the called command, so that --help is fast."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -70,20 +74,20 @@ def main() -> None:
     try:
         code = cli.main(prog_name="vidtrack", standalone_mode=False)
     except Error as error:
-        code = _complain(str(error), error.exit_code)
+        code = _report_error(str(error), error.exit_code)
     except click.ClickException as error:
         error.show()
         code = 2
     except (KeyboardInterrupt, click.Abort):
-        code = _complain("interrupted", 130)
+        code = _report_error("interrupted", 130)
     except Terminated:
-        code = _complain("terminated", 143)
-    except OSError as error:  # a full disk or a read-only folder where no module gave a better message
+        code = _report_error("terminated", 143)
+    except OSError as error:  # for example a full disk or a read-only folder, without a more specific error
         place = f" {error.filename}" if error.filename else ""
-        code = _complain(f"cannot read or write{place}: {error.strerror or error}", 1)
+        code = _report_error(f"cannot read or write{place}: {error.strerror or error}", 1)
     sys.exit(code)
 
 
-def _complain(message: str, code: int) -> int:
+def _report_error(message: str, code: int) -> int:
     click.echo(f"vidtrack: {message}", err=True)
     return code

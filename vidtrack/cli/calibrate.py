@@ -1,4 +1,4 @@
-"""`vidtrack calibrate`: what the calibration of a site is worth."""
+"""`vidtrack calibrate`: the accuracy of a site's calibration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateOptions(Options):
-    """What `vidtrack calibrate` is told."""
+    """Options of `vidtrack calibrate`."""
 
     site: Path
     picture: str | None
@@ -56,7 +56,7 @@ def command(options: CalibrateOptions) -> int:
     drawn = read_site(options.site)
     if drawn.calibration is None:
         raise ConfigError(f"{options.site} has no section [calibration]; give it points, picture and ground")
-    background = None if options.picture is None else _first_picture(options.picture)
+    background = None if options.picture is None else first_picture(options.picture)
     if background is not None:
         drawn = drawn.scaled(background.shape[1], background.shape[0])
     result = examined(drawn)
@@ -71,9 +71,9 @@ def command(options: CalibrateOptions) -> int:
     return 1 if result.report["contradiction"] else 0
 
 
-def _first_picture(source: str) -> Image:
-    """(H, W, 3) of an image, or the first of a video."""
-    from vidtrack.config import SourceSettings
+def first_picture(source: str) -> Image:
+    """(H, W, 3) an image, or the first frame of a video."""
+    from vidtrack.config.settings import SourceSettings
     from vidtrack.video.source import open_source
 
     with open_source(source, SourceSettings()) as frames:

@@ -11,7 +11,7 @@ from vidtrack.cli.options import WithSettings, common, receives, settings_option
 
 @dataclass(frozen=True, kw_only=True)
 class ConfigOptions(WithSettings):
-    """What `vidtrack config` is told."""
+    """Options of `vidtrack config`."""
 
     explain: bool
 
@@ -30,7 +30,7 @@ Examples:
 @receives(ConfigOptions)
 def command(options: ConfigOptions) -> None:
     """Print the effective settings as TOML, ready for --config. Settings that are None are commented out."""
-    from vidtrack.explain import as_toml
+    from vidtrack.config.explain import as_toml
     from vidtrack.output.folder import writing
 
     start_log(options.verbose, options.quiet)

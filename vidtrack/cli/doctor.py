@@ -1,4 +1,4 @@
-"""`vidtrack doctor`: what a source is like, and which setting will hurt."""
+"""`vidtrack doctor`: measures a source and advises on settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FAILED = 1
 
 @dataclass(frozen=True, kw_only=True)
 class DoctorOptions(WithSettings):
-    """What `vidtrack doctor` is told."""
+    """Options of `vidtrack doctor`."""
 
     source: str
     seconds: float
@@ -64,7 +64,7 @@ def command(options: DoctorOptions) -> int:
     from vidtrack.video.live.address import secrets
 
     hide_arguments(secrets(options.source))
-    start_log(options.verbose, quiet=not options.verbose)  # what is worth a warning is among the advice
+    start_log(options.verbose, quiet=not options.verbose)  # the advice contains the warnings
     settings = options.settings(kind_of(options.source))
     announce_compiling(options.quiet)
     folder = options.folder("doctor")
@@ -101,7 +101,7 @@ def _print_report(findings: Findings, advice: Sequence[Advice]) -> None:
 
 
 def _rows(findings: Findings) -> Iterator[tuple[str, str]]:
-    """What was measured, in words."""
+    """Name and text of each measurement."""
     yield "picture", f"{findings.width} x {findings.height} px"
     if (timing := findings.timing) is not None:
         yield "rate", f"{timing.rate:.4g} frames/s over {timing.pictures} pictures"

@@ -68,7 +68,7 @@ SECTIONS = {
 
 @dataclass(frozen=True, kw_only=True)
 class EvalOptions(Options):
-    """What `vidtrack eval` is told."""
+    """Options of `vidtrack eval`."""
 
     result: Path
     truth: Path

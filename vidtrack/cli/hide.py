@@ -1,4 +1,4 @@
-"""Takes secrets out of what `ps` shows of this process."""
+"""Hides secrets in the command line that `ps` shows."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ _ARG_START, _ARG_END = 48, 49  # fields of /proc/PID/stat, counted from 1 (proc(
 
 
 def hide_arguments(secrets: Iterable[str]) -> None:
-    """Overwrite each secret in the process's own argument list by stars; Linux only, elsewhere nothing happens."""
+    """Overwrite each secret in this process's argument list with stars. Linux only; no effect elsewhere."""
     stat = Path("/proc/self/stat")
     if not stat.exists():
         return
-    fields = stat.read_text().rpartition(")")[2].split()  # the name before it may hold spaces
+    fields = stat.read_text().rpartition(")")[2].split()  # the name before it may contain spaces
     start, end = (int(fields[number - 3]) for number in (_ARG_START, _ARG_END))
     shown = ctypes.string_at(start, end - start)
     for secret in secrets:

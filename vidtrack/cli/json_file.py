@@ -1,4 +1,4 @@
-"""--json: one object for a machine."""
+"""--json: a report as one JSON object."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def json_option(function: Function) -> Function:
 
 
 def deliver(content: Mapping[str, Any], json_to: str | None, file: Path | None, quiet: bool) -> bool:
-    """Write a report where --json and -o (file) ask for it; whether it is to be shown as a table too."""
+    """Write a report to the files of --json and -o; returns whether to print it as a table too."""
     if file is not None:
         write_json(content, str(file))
     if json_to is not None:
@@ -31,7 +31,7 @@ def deliver(content: Mapping[str, Any], json_to: str | None, file: Path | None, 
 
 
 def write_json(content: Mapping[str, Any], path: str) -> None:
-    """Into a file, or to stdout for "-". Raises OutputError where the file cannot be written."""
+    """Write to a file, or to stdout for "-". Raises OutputError if the file cannot be written."""
     text = json.dumps(content, indent=2) + "\n"
     if path == "-":
         click.echo(text, nl=False)

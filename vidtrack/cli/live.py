@@ -1,4 +1,4 @@
-"""`vidtrack live`: a camera or a stream becomes tracks until it is stopped."""
+"""`vidtrack live`: tracks a camera or stream until stopped."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from vidtrack.cli.options import announce_compiling, common, receives, settings_
 from vidtrack.cli.tracking import PictureOptions, picture_options
 
 if TYPE_CHECKING:
-    from vidtrack.config import Settings
+    from vidtrack.config.settings import Settings
     from vidtrack.output.status import LiveStatus
     from vidtrack.run.live.outputs import LiveExtras
     from vidtrack.serve.page import Page
 
-_TELL_S = 60.0
+_REPORT_S = 60.0
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
 
 
 @dataclass(frozen=True, kw_only=True)
 class LiveOptions(PictureOptions):
-    """What `vidtrack live` is told."""
+    """Options of `vidtrack live`."""
 
     sources: tuple[str, ...]
     every_frame: bool | None
@@ -40,7 +40,7 @@ class LiveOptions(PictureOptions):
     http_token: str | None
 
     def given(self) -> list[str | tuple[str, Any]]:
-        """As ever, and --roll and --keep, whose units say what they are. Raises click.BadParameter."""
+        """The settings on the command line, with --roll and --keep in seconds or bytes. Raises click.BadParameter."""
         given = super().given()
         if self.roll is not None:
             given.append(amount("--roll", self.roll, {"live.roll_s": _SECONDS}))
@@ -48,14 +48,14 @@ class LiveOptions(PictureOptions):
         return [*given, *(amount("--keep", text, units) for text in self.keeps)]
 
     def extras(self) -> LiveExtras:
-        """What is written beside the tables."""
+        """The optional outputs."""
         from vidtrack.run.live.outputs import LiveExtras
 
         return LiveExtras(self.rerun, self.video, self.save_masks, self.decisions, self.state, self.record)
 
 
 def amount(option: str, text: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, float]:
-    """The setting that the unit belongs to, and the amount in seconds or bytes. Raises click.BadParameter."""
+    """The setting of the unit, and the amount in seconds or bytes. Raises click.BadParameter."""
     match = re.fullmatch(r"(\d+\.?\d*) ?([a-zA-Z]+)", text)
     for setting, factors in units.items():
         if match and match[2] in factors:
@@ -108,7 +108,7 @@ def command(options: LiveOptions) -> int:
     try:
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_many import are_many, track_many
-        from vidtrack.config import Input
+        from vidtrack.config.inputs import Input
         from vidtrack.video.live.address import secrets
 
         hidden = [text for source in options.sources for text in secrets(source)]
@@ -139,10 +139,10 @@ def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> N
     ):
         if page is not None:
             page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
-        told_s = time.monotonic()
+        reported_s = time.monotonic()
         for _ in run:
-            if not options.quiet and time.monotonic() - told_s > _TELL_S:
-                told_s = time.monotonic()
+            if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
+                reported_s = time.monotonic()
                 click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
         if not options.quiet:
             click.echo(f"{run.name}: {_line(run.board.now())}", err=True)
@@ -150,7 +150,7 @@ def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> N
 
 
 def _page(http: str | None, token: str | None) -> AbstractContextManager[Page | None]:
-    """The live page with its port taken, before any camera is opened."""
+    """The live page, with its port bound before any camera is opened."""
     if http is None:
         return nullcontext()
     from vidtrack.serve.page import Page
@@ -159,7 +159,7 @@ def _page(http: str | None, token: str | None) -> AbstractContextManager[Page | 
 
 
 def _line(status: LiveStatus) -> str:
-    """The run in one line."""
+    """The status of the run in one line."""
     reading = status.reading
     latency = reading["latency_ms"]
     return (

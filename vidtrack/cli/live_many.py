@@ -1,4 +1,4 @@
-"""`vidtrack live` with several cameras: one line for each now and then, one table at the end."""
+"""`vidtrack live` with several cameras: a status line for each at intervals, a table at the end."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from vidtrack.run.live.many import Many, Supervisor
     from vidtrack.serve.page import Page
 
-_TELL_S = 60.0
+_REPORT_S = 60.0
 _LOOK_S = 0.2
 
 
 def are_many(sources: Sequence[str]) -> bool:
-    """Whether these are several cameras, or a list of them."""
+    """Whether the sources are several cameras, or a file that lists cameras."""
     return len(sources) > 1 or sources[0].lower().endswith(".toml")
 
 
 def track_many(options: LiveOptions, page: Page | None) -> int:
-    """Track all until a signal; the exit code is 0 unless every camera failed by itself."""
+    """Track all cameras until a signal; the exit code is 0 unless every camera failed."""
     from vidtrack.cli.signals import stopping
     from vidtrack.output.folder import open_run, usable
     from vidtrack.run.live.cameras import extras_of, listed, named, settings_of
@@ -50,10 +50,10 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     with Many(jobs, folder) as many, stopping(many.stop):
         if page is not None:
             _show(page, many)
-        told_s = time.monotonic()
+        reported_s = time.monotonic()
         while many.running(_LOOK_S):
-            if not options.quiet and time.monotonic() - told_s > _TELL_S:
-                told_s = time.monotonic()
+            if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
+                reported_s = time.monotonic()
                 for name, supervisor in many.supervisors.items():
                     click.echo(f"{name}: {_line(supervisor)}", err=True)
     if not options.quiet:
@@ -75,7 +75,7 @@ def _show(page: Page, many: Many) -> None:
 
 
 def _line(supervisor: Supervisor) -> str:
-    """A camera in one line."""
+    """The status of a camera in one line."""
     if supervisor.error is not None:
         return f"ended: {supervisor.error}"
     status = supervisor.status()

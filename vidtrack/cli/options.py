@@ -1,4 +1,4 @@
-"""Options that commands share, and the objects in which commands receive them."""
+"""Options common to several commands, and the dataclasses that hold them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from vidtrack.config import Input, Settings
+    from vidtrack.config.inputs import Input
+    from vidtrack.config.settings import Settings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Received = TypeVar("Received")
@@ -36,12 +37,12 @@ SETTING = {
     "site": "output.site",
     "every_frame": "live.every_frame",
 }
-"""Options that stand for a setting, in all commands."""
+"""Options that set a setting, in all commands."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What every command is told: see `common`."""
+    """Options of every command, see `common`."""
 
     output: Path | None
     force: bool
@@ -49,7 +50,7 @@ class Options:
     verbose: int
 
     def folder(self, name: str) -> Path | None:
-        """The folder that -o asks for, ready to write into; None without -o. Raises OutputError."""
+        """The folder of -o, checked to be writable; None without -o. Raises OutputError."""
         from vidtrack.output.folder import open_folder
 
         return None if self.output is None else open_folder(self.output, name, self.force)
@@ -57,27 +58,27 @@ class Options:
 
 @dataclass(frozen=True, kw_only=True)
 class WithSettings(Options):
-    """A command that takes settings: --config, --set, and options that stand for one."""
+    """Options of commands with settings: --config, --set, and options that set a setting."""
 
     config_file: Path | None
     assignments: tuple[str, ...]
 
     def given(self) -> list[str | tuple[str, Any]]:
-        """The settings on the command line: those of --set, then those that have an option of their own."""
+        """The settings on the command line: those of --set, then those of single options."""
         own = {field.name for field in fields(self)} & SETTING.keys()
         chosen = [(setting, getattr(self, name)) for name, setting in SETTING.items() if name in own]
         listed = [(setting, list(value) if isinstance(value, tuple) else value) for setting, value in chosen]
         return [*self.assignments, *((setting, value) for setting, value in listed if value not in (None, []))]
 
     def settings(self, kind: Input | None = None, base: Mapping[str, Any] | None = None) -> Settings:
-        """All settings: see `config.load`. Raises ConfigError."""
-        from vidtrack.config import load
+        """The effective settings, see `config.load`. Raises ConfigError."""
+        from vidtrack.config.load import load
 
         return load(self.config_file, self.given(), base, kind)
 
 
 def receives(kind: type[Received]) -> Callable[[Callable[[Received], Any]], Callable[..., Any]]:
-    """Hand a command all its parameters as one object, of a dataclass with their names."""
+    """Pass all parameters to a command as one object of a dataclass with their names."""
 
     def decorate(function: Callable[[Received], Any]) -> Callable[..., Any]:
         @wraps(function)
@@ -90,7 +91,7 @@ def receives(kind: type[Received]) -> Callable[[Callable[[Received], Any]], Call
 
 
 def common(output_help: str) -> Callable[[Function], Function]:
-    """-o, --force, --quiet, -v: the same words in every command that writes results."""
+    """-o, --force, --quiet, -v, for every command that writes results."""
 
     def decorate(function: Function) -> Function:
         for option in (
@@ -116,7 +117,7 @@ def settings_options(function: Function) -> Function:
 
 
 def seed_option(function: Function) -> Function:
-    """--seed, where something is random."""
+    """--seed, for commands with random numbers."""
     return click.option(
         "--seed",
         type=click.IntRange(min=0),
@@ -127,7 +128,7 @@ def seed_option(function: Function) -> Function:
 
 
 def start_log(verbose: int, quiet: bool, who: str = "") -> None:
-    """Warnings of the library to stderr, in the form of our own messages; `who`: the camera that they are about."""
+    """Log the library's warnings to stderr in the form of our messages; `who` names the camera."""
     level = logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
     handler = logging.StreamHandler()
     about = f"{who}: " if who else ""
@@ -138,12 +139,12 @@ def start_log(verbose: int, quiet: bool, who: str = "") -> None:
     logger = logging.getLogger("vidtrack")
     handler.setLevel(level)
     logger.handlers = [handler]
-    os.environ.setdefault("RUST_LOG", "off")  # rerun's log: what matters in it reaches the user as our own error
+    os.environ.setdefault("RUST_LOG", "off")  # rerun's log: its errors are raised as OutputError
     logger.setLevel(min(level, logging.WARNING))
 
 
 def announce_compiling(quiet: bool) -> None:
-    """Say why the first run takes longer, before it does."""
+    """Report before the first run that it compiles the kernels."""
     from vidtrack.compiled import first_run
 
     if not quiet and first_run():

@@ -1,4 +1,4 @@
-"""`vidtrack predict`: how good a radar track will be in clutter."""
+"""`vidtrack predict`: the expected error of a radar track in clutter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vidtrack.cli.options import common, receives, seed_option, start_log
 from vidtrack.cli.radar_problem import ProblemOptions, problem_options
 
 if TYPE_CHECKING:
-    from vidtrack.radar.forecast import Forecast, Trial
+    from vidtrack.radar.performance.forecast import Forecast, Trial
 
 NAMES = {
     "paper": "eq. (33) of the paper, a lower bound",
@@ -27,7 +27,7 @@ NAMES = {
 
 @dataclass(frozen=True, kw_only=True)
 class PredictOptions(ProblemOptions):
-    """What `vidtrack predict` is told."""
+    """Options of `vidtrack predict`."""
 
     kind: Literal["psn", "pda"]
     pfa: float
@@ -67,8 +67,8 @@ def command(options: PredictOptions) -> None:
     With --runs a track counts as lost if its last error is above 20 (pda: 10), or the target was outside the gate
     in each of the last five scans.
     """
-    from vidtrack.detection.amplitude import RAYLEIGH
-    from vidtrack.radar.forecast import forecast, trial
+    from vidtrack.amplitude.densities import RAYLEIGH
+    from vidtrack.radar.performance.forecast import forecast, trial
 
     start_log(options.verbose, options.quiet)
     folder = options.folder("predict")
@@ -98,7 +98,7 @@ def _content(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
 
 
 def _columns(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
-    """Name and numbers of each curve there is."""
+    """Name and values of each curve."""
     columns = {name: error for name, error in outlook.error.items() if error is not None}
     if tried is not None:
         columns["actual_all"] = tried.actual_all

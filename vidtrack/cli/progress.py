@@ -1,4 +1,4 @@
-"""Progress of a run, a bar on a terminal and a plain line now and then otherwise, and what came of it."""
+"""Progress of a run, as a bar on a terminal and as lines at intervals otherwise, and its outcome."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LINE_EVERY_S = 10.0
 def progress(
     items: Iterable[Item], expected: int | None, name: str, quiet: bool, unit: str = "frame"
 ) -> Iterator[Item]:
-    """The items, while stderr tells how far they are; `unit` is the word for one of them."""
+    """Yields the items and shows the progress on stderr; `unit` is the name of an item."""
     if quiet:
         return iter(items)
     return _bar(items, expected, name, unit) if sys.stderr.isatty() else _lines(items, expected, name, unit)
@@ -59,8 +59,8 @@ def _lines(items: Iterable[Item], expected: int | None, name: str, unit: str) ->
     click.echo(f"{name}: {done} {unit}s in {time.monotonic() - began:.1f} s", err=True)
 
 
-def tell_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
-    """Say on stderr how many tracks and crossings a finished run found; `none` is said where there are no tracks."""
+def report_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:
+    """Print the number of tracks and crossings of a finished run to stderr; `none` is the text without tracks."""
     if quiet:
         return
     from vidtrack.traffic.lines import counted

@@ -1,4 +1,4 @@
-"""`vidtrack radar`: a table of radar plots becomes tracks."""
+"""`vidtrack radar`: tracks a table of radar plots."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import click
 
 from vidtrack.cli.options import announce_compiling, common, receives, seed_option, settings_options, start_log
 from vidtrack.cli.tracking import TrackingOptions, association_options, choice, finish, smooth_option
-from vidtrack.settings import names
+from vidtrack.config import names
 
 
 @dataclass(frozen=True, kw_only=True)
 class RadarOptions(TrackingOptions):
-    """What `vidtrack radar` is told."""
+    """Options of `vidtrack radar`."""
 
     plots: str
     seed: int
@@ -56,7 +56,7 @@ def command(options: RadarOptions) -> None:
     y north, z up. The results' folder is printed; it holds tracks.csv, tracks.parquet, summary.json and tracks.png.
     Ctrl-C ends with complete results up to then.
     """
-    from vidtrack.config import Input
+    from vidtrack.config.inputs import Input
     from vidtrack.run.radar import run_plots
     from vidtrack.run.run import Extras
 

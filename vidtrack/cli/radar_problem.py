@@ -1,4 +1,4 @@
-"""Options that state a radar problem: the target, its surroundings, and how clutter is distributed."""
+"""Options that define a radar problem: the target, its noise and gate, and the distribution of clutter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.cli.options import Options
 from vidtrack.errors import ConfigError
 
 if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
+    from vidtrack.amplitude.densities import Weibull
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -23,7 +23,7 @@ class _Clutter(click.ParamType):
     name = "B,C"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Weibull:
-        from vidtrack.detection.amplitude import Weibull
+        from vidtrack.amplitude.densities import Weibull
 
         try:
             shape, rate = map(float, str(value).split(","))
@@ -50,10 +50,10 @@ class ProblemOptions(Options):
     weibull: Weibull | None
 
     def snr(self) -> float:
-        """The linear SNR. Raises ConfigError for one that is no number, or too high to mean anything."""
+        """The linear SNR. Raises ConfigError if it is not a number or is too high."""
         from math import isfinite
 
-        from vidtrack.detection.amplitude import linear
+        from vidtrack.amplitude.densities import linear
 
         if not (isfinite(self.snr_db) and self.snr_db <= 100):
             raise ConfigError(f"--snr-db is {self.snr_db:g}; it must be a number of at most 100")
@@ -61,7 +61,7 @@ class ProblemOptions(Options):
 
 
 def problem_options(function: Function) -> Function:
-    """--q, --gate, --cell, --weibull: what both radar commands ask about the target and its surroundings."""
+    """--q, --gate, --cell, --weibull, common to both radar commands."""
     for option in (
         weibull_option,
         click.option("--cell", default=0.1, show_default=True, help="Volume of a resolution cell, units of r."),

@@ -1,4 +1,4 @@
-"""`vidtrack repair`: makes the folder of a killed run whole."""
+"""`vidtrack repair`: repairs the folder of a killed run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.cli.options import Options, common, receives, start_log
 
 @dataclass(frozen=True, kw_only=True)
 class RepairOptions(Options):
-    """What `vidtrack repair` is told."""
+    """Options of `vidtrack repair`."""
 
     source: Path
 
@@ -38,18 +38,18 @@ def command(options: RepairOptions) -> None:
     from shutil import Error, copytree
 
     from vidtrack.errors import StoppedEarly
-    from vidtrack.output.folder import open_run, spare
+    from vidtrack.output.folder import open_run, refuse_overwriting
     from vidtrack.output.repair import repair
-    from vidtrack.run.live.retention import parts_of
+    from vidtrack.recording.retention import parts_of
 
     start_log(options.verbose, options.quiet)
     folder = options.source
     if options.output is not None and folder.is_dir():
-        spare(folder, options.output)
+        refuse_overwriting(folder, options.output)
         copy = open_run(options.output, "repair", options.force)
         try:
             copytree(folder, copy, dirs_exist_ok=True)
-        except Error as error:  # of all files that were not copied
+        except Error as error:  # lists all files that could not be copied
             raise StoppedEarly(f"cannot copy {folder} to {copy}: {error.args[0][0][-1]}") from None
         folder = copy
     for part in parts_of(folder) or [folder]:

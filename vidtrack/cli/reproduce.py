@@ -12,7 +12,7 @@ from vidtrack.cli.options import Options, common, receives, seed_option, start_l
 
 @dataclass(frozen=True, kw_only=True)
 class ReproduceOptions(Options):
-    """What `vidtrack reproduce` is told."""
+    """Options of `vidtrack reproduce`."""
 
     names: tuple[str, ...]
     seed: int

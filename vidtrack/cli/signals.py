@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM between two frames, so that every result ends with a whole one."""
+"""Handles Ctrl-C and SIGTERM between two frames, so that all results end with a whole frame."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from typing import Any, TypeVar
 
 Item = TypeVar("Item")
 _WATCHED = (signal.SIGINT, signal.SIGTERM)
-_PATIENCE_S = 0.8  # that a frame may take to end by itself: the first one waits for the compiler
+_PATIENCE_S = 0.8  # for the current frame to end; the first one may wait for the compiler
 
 
 class Terminated(BaseException):
-    """SIGTERM, raised where the main thread stands."""
+    """SIGTERM, raised in the main thread."""
 
 
 def terminate(number: int, frame: FrameType | None) -> None:
-    """Signal handler that ends the program by an exception, so that files are closed."""
+    """Signal handler that raises an exception, so that files are closed."""
     raise Terminated
 
 
 def stoppable(items: Iterable[Item]) -> Iterator[Item]:
-    """The items; a signal that comes while one is made or used is raised after it, a second one at once."""
+    """Yields the items; the first signal is raised after the current item, a second one at once."""
     caught: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -36,7 +36,7 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
     before: dict[int, Any] = {}
     try:
         for item in items:
-            if not before:  # until the first item nothing is at stake, and opening may take long
+            if not before:  # before the first item, which may take long, signals act at once
                 before = {number: signal.signal(number, note) for number in _WATCHED}
             yield item
             if caught:
@@ -48,7 +48,7 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
 
 @contextmanager
 def stopping(stop: Callable[[], None]) -> Iterator[None]:
-    """The first signal calls `stop`; a second one, or waiting in vain, is raised where the program stands."""
+    """The first signal calls `stop`; a second signal, or a time-out after the first, interrupts the main thread."""
     stopped, over = Event(), Event()
 
     def note(number: int, frame: FrameType | None) -> None:

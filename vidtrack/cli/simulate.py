@@ -1,4 +1,4 @@
-"""`vidtrack simulate`: a traffic video or radar plots whose truth is known exactly."""
+"""`vidtrack simulate`: a traffic video or radar plots with exact truth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vidtrack.cli.options import Options, common, receives, seed_option, start_l
 from vidtrack.cli.radar_problem import weibull_option
 
 if TYPE_CHECKING:
-    from vidtrack.detection.amplitude import Weibull
+    from vidtrack.amplitude.densities import Weibull
 
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
 ROADS = ("road", "junction-3d", "roundabout", "motorway")
@@ -26,7 +26,7 @@ OPTIONS = {
     ROADS: (*PICTURE, "seconds", "flow", "camera_height", "tilt_deg", "lens", "click_sigma"),
     RADAR: ("snr_db", "pfa", "weibull", "glint"),
 }
-"""Which options the scenarios of each kind have."""
+"""The options of each kind of scenario."""
 
 
 class _Size(click.ParamType):
@@ -45,7 +45,7 @@ class _Size(click.ParamType):
 
 @dataclass(frozen=True, kw_only=True)
 class SimulateOptions(Options):
-    """What `vidtrack simulate` is told."""
+    """Options of `vidtrack simulate`."""
 
     scenario: str
     seed: int
@@ -71,7 +71,7 @@ class SimulateOptions(Options):
     glint: float | None
 
     def chosen(self, names: tuple[str, ...]) -> dict[str, Any]:
-        """The options of these names."""
+        """The values of these options."""
         return {name: getattr(self, name) for name in names}
 
 
@@ -186,7 +186,7 @@ def _draw_plots(options: SimulateOptions) -> None:
 
 
 def _refuse_others_than(options: tuple[str, ...], scenario: str) -> None:
-    """An option that the scenario's kind does not have is a mistake."""
+    """Raise an error for an option that the scenario's kind does not have."""
     context = click.get_current_context()
     for name in sorted({name for kind in OPTIONS.values() for name in kind} - set(options)):
         if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:

@@ -1,4 +1,4 @@
-"""`vidtrack threshold`: where to set a radar's detection threshold."""
+"""`vidtrack threshold`: the best detection threshold of a radar."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MEANING = {
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdOptions(ProblemOptions):
-    """What `vidtrack threshold` is told."""
+    """Options of `vidtrack threshold`."""
 
     kind: str
     cells: float | None
@@ -73,9 +73,9 @@ def command(options: ThresholdOptions) -> None:
 
 
 def _of_psn(options: ThresholdOptions, snr: float) -> Numbers:
-    from vidtrack.detection.amplitude import RAYLEIGH
-    from vidtrack.radar.prediction import normalised
-    from vidtrack.radar.psn_threshold import best_psn_threshold
+    from vidtrack.amplitude.densities import RAYLEIGH
+    from vidtrack.radar.performance.prediction import normalised
+    from vidtrack.radar.performance.psn_threshold import best_psn_threshold
 
     problem = normalised(options.q, options.gate, options.cell)
     best = best_psn_threshold(problem, snr, options.weibull or RAYLEIGH, options.pfa_max)
@@ -89,9 +89,9 @@ def _of_psn(options: ThresholdOptions, snr: float) -> Numbers:
 
 
 def _of_pda(options: ThresholdOptions, snr: float) -> Numbers:
-    from vidtrack.detection.amplitude import detection_probability
-    from vidtrack.detection.reduction import KE_GATE, q2
-    from vidtrack.detection.threshold import closed_form, optimum
+    from vidtrack.amplitude.densities import detection_probability
+    from vidtrack.amplitude.reduction import KE_GATE, q2
+    from vidtrack.amplitude.threshold import closed_form, optimum
     from vidtrack.errors import ConfigError
 
     cells = options.cells

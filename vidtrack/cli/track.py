@@ -1,4 +1,4 @@
-"""`vidtrack track`: a video, an image folder or stored detections become tracks."""
+"""`vidtrack track`: tracks a video, an image folder or stored detections."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.cli.tracking import PictureOptions, finish, picture_options, smoot
 
 @dataclass(frozen=True, kw_only=True)
 class TrackOptions(PictureOptions):
-    """What `vidtrack track` is told."""
+    """Options of `vidtrack track`."""
 
     source: str
     smooth: bool | None
@@ -46,11 +46,11 @@ def command(options: TrackOptions) -> None:
     The results' folder is printed. It holds tracks.csv, tracks.parquet, mot.txt, summary.json and
     tracks.png. Ctrl-C ends with complete results up to then.
     """
-    from vidtrack.config import Input
+    from vidtrack.config.inputs import Input
+    from vidtrack.detections.stored import is_detections
+    from vidtrack.recording.source import is_recording, recorded_settings
     from vidtrack.run.files import run_file
     from vidtrack.run.run import Extras
-    from vidtrack.video.detections import is_detections
-    from vidtrack.video.recording import is_recording, recorded_settings
 
     start_log(options.verbose, options.quiet)
     source = options.source

@@ -1,4 +1,4 @@
-"""Options of all commands that track."""
+"""Options common to all commands that track."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args
 import click
 
 from vidtrack.cli.options import WithSettings
-from vidtrack.settings import names
+from vidtrack.config import names
 
 if TYPE_CHECKING:
     from vidtrack.run.run import Run
@@ -44,26 +44,26 @@ class PictureOptions(TrackingOptions):
 
 
 def _recording(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
-    """Check the value of --rerun: a misspelt "spawn" must not become the name of a file."""
+    """Check the value of --rerun: a misspelt "spawn" must not become a file name."""
     if value is None or value in ("spawn", "serve") or value.endswith(".rrd"):
         return value
     raise click.BadParameter(f"{value!r} is not FILE.rrd, spawn or serve.")
 
 
 def _mp4(_context: click.Context, _option: click.Parameter, value: Path | None) -> Path | None:
-    """Check the value of --video: players take a file for what its name says."""
+    """Check the value of --video: players rely on the extension."""
     if value is None or value.suffix.lower() == ".mp4":
         return value
     raise click.BadParameter(f"the annotated video is an MP4; name it {value.stem or 'FILE'}.mp4, not {value}.")
 
 
 def choice(kind: Any) -> click.Choice:
-    """One of the names in a Literal."""
+    """A choice among the names in a Literal."""
     return click.Choice(get_args(kind))
 
 
 def association_options(function: Function) -> Function:
-    """--method, --distance, --rerun, --decisions: what tracking pictures and tracking plots have in common."""
+    """--method, --distance, --rerun, --decisions, for pictures and plots."""
     for option in (
         click.option("--decisions", is_flag=True, help="Write why each track got what it got."),
         click.option(
@@ -127,23 +127,23 @@ def picture_options(function: Function) -> Function:
 
 
 def smooth_option(function: Function) -> Function:
-    """--smooth, for sources that end."""
+    """--smooth, for files."""
     return click.option(
         "--smooth", is_flag=True, default=None, help="Let each row know what came after it; rows appear later."
     )(function)
 
 
 def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") -> None:
-    """Let a run over a file go to its end, and tell what it found; `none` is said where there are no tracks."""
-    from vidtrack.cli.progress import progress, tell_outcome
+    """Complete a run over a file and print its outcome; `none` is the text without tracks."""
+    from vidtrack.cli.progress import progress, report_outcome
     from vidtrack.cli.signals import Terminated, stoppable
 
     with run:
         try:
             for _ in stoppable(progress(run, run.count, run.name, quiet, unit)):
-                pass  # the sinks have seen it
+                pass  # the run has passed the step to its sinks
         except (KeyboardInterrupt, Terminated):
             click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
             raise
-    tell_outcome(run.folder, quiet, none)
+    report_outcome(run.folder, quiet, none)
     click.echo(run.folder)

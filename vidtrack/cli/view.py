@@ -1,4 +1,4 @@
-"""`vidtrack view`: a finished run in rerun."""
+"""`vidtrack view`: shows a finished run in rerun."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.cli.options import Options, common, receives, start_log
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions(Options):
-    """What `vidtrack view` is told."""
+    """Options of `vidtrack view`."""
 
     run: Path
     save: str | None
@@ -40,13 +40,13 @@ def command(options: ViewOptions) -> None:
     What the table does not hold is not shown: masks, blobs, and the reasons of decisions. Record these
     while tracking, with --rerun.
     """
-    start_log(options.verbose, options.quiet)  # before rerun, which starts its own log
+    start_log(options.verbose, options.quiet)  # before importing rerun, which starts its own log
     from contextlib import ExitStack, closing
 
     from vidtrack.errors import SourceError
     from vidtrack.output import replay
-    from vidtrack.output.rerun import RerunSink
-    from vidtrack.output.rerun_radar import RadarRerun
+    from vidtrack.output.rerun.pictures import RerunSink
+    from vidtrack.output.rerun.plots import RadarRerun
     from vidtrack.traffic.lines import parse_lines
     from vidtrack.video.source import open_source
 

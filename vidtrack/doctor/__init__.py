@@ -1,1 +1,1 @@
-"""Looks at a source before it is tracked, and says which setting will hurt."""
+"""Measures a source before it is tracked, and advises on settings."""

@@ -1,4 +1,4 @@
-"""What a run can be told, or a user, about a source."""
+"""Advice about a source: problem, explanation and options."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """One finding in words.
+    """One piece of advice.
 
-    name     of the trouble
-    problem  it hurts; otherwise it is only worth knowing
-    text     what was measured, why it hurts, what to do
+    name     of the finding
+    problem  whether it degrades tracking; otherwise it is information
+    text     measurement, effect and remedy
     options  of the command line that help
     """
 
@@ -28,5 +28,5 @@ def set_option(name: str, value: float | bool) -> str:
 
 
 def scale_option(step: int) -> str:
-    """--scale for so many source pixels per processed pixel."""
+    """--scale for `step` source pixels per processed pixel."""
     return f"--scale {1 / step:.3g}"

@@ -1,4 +1,4 @@
-"""Looks at a source for some seconds and measures what a tracker will meet. Read this file first in `doctor`."""
+"""Measures a source for some seconds. Read this file first in `doctor`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from time import perf_counter
 
 import numpy as np
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import is_detections, open_detections
 from vidtrack.doctor.findings import Findings, Reception, Speed
 from vidtrack.doctor.objects import ObjectMeter, finer
 from vidtrack.doctor.opening import is_live, looked_at, open_pictures
@@ -16,7 +17,6 @@ from vidtrack.errors import SourceError
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.tracking.tracker import Tracker
-from vidtrack.video.detections import is_detections, open_detections
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import redact
 from vidtrack.video.live.stats import LiveStats
@@ -28,17 +28,17 @@ from vidtrack.video.quality.shake import ShakeMeter
 from vidtrack.video.quality.timing import timing
 from vidtrack.video.stats import SourceStats
 
-_PATIENCE = 6.0  # times the seconds asked for: pictures may be large and the machine slow
-_QUIET = 2.0  # time-outs without a picture: one to give it up, one to connect again
+_PATIENCE = 6.0  # limit of the duration, times the requested seconds
+_QUIET = 2.0  # live time-outs without a picture: one to give up, one to reconnect
 _BLOCKS_EVERY = 25  # frames
 
 
 def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
-    """What `seconds` of a source are like.
+    """Measure `seconds` of a source.
 
-    A live source is only read for half of the time, for its pace, and watched for the other half; a file is read
-    first and watched then. Raises SourceError if it cannot be opened, yields nothing or falls silent before it is
-    watched, FormatError for a bad line of detections.
+    A live source is only read for half of the time, for its timing, and tracked for the other half. A file is read
+    twice. Raises SourceError if the source cannot be opened, yields no picture or stops before it is tracked,
+    FormatError for a bad line of detections.
     """
     if is_detections(source):
         return _of_detections(source, settings)
@@ -55,7 +55,7 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
             opened = stack.enter_context(closing(open_pictures(source, settings)))
         watch = Watch(settings, (opened.height, opened.width))
         watch.all(looked_at(opened, span, patience_s, quiet_s))
-        reception = _reception(stats, dropped)  # before it is closed, and therefore gone
+        reception = _reception(stats, dropped)  # before closing, which changes the state
     if not watch.track_s:
         raise SourceError(f"{redact(source)} gave pictures, and then nothing for {quiet_s:g} s; look at the network")
     pace = timing(times, watch.samples.repeats) if len(times) > 1 else None
@@ -77,7 +77,7 @@ def examine(source: str, settings: Settings, seconds: float = 10.0) -> Findings:
 
 
 class Watch:
-    """Everything that is measured on the pictures, and on their tracks."""
+    """All measurements on the pictures and their tracks."""
 
     def __init__(self, settings: Settings, shape: tuple[int, int]) -> None:
         self.samples = Samples()
@@ -89,13 +89,13 @@ class Watch:
         self._bounds = (shape[1], shape[0])
 
     def all(self, frames: Iterable[Frame]) -> None:
-        """Watch the frames: as the settings see them, and as finer ones do."""
+        """Measure the frames, tracked with the settings and with finer ones."""
         fine = finer(self._settings, self._bounds[::-1])
         for step in video_steps(self._seen(frames), build_detector(fine), self._tracker(fine), fine):
             self.objects.take_fine(step)
 
     def _seen(self, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """The same frames, after they were tracked and measured."""
+        """Yields the frames after tracking and measuring them."""
         settings = self._settings
         for step in video_steps(frames, build_detector(settings), self._tracker(settings), settings):
             frame = step.frame
@@ -104,7 +104,7 @@ class Watch:
             self.objects.take(step)
             self.samples.take(frame)
             self.shake.take(frame)
-            if len(self.track_s) % _BLOCKS_EVERY == 1:  # the first one, however few there are
+            if len(self.track_s) % _BLOCKS_EVERY == 1:  # includes the first frame
                 self.blockiness.append(blockiness(frame.y))
             yield frame
 
@@ -127,7 +127,7 @@ def _reception(stats: SourceStats, dropped: int = 0) -> Reception:
 
 
 def _of_detections(source: str, settings: Settings) -> Findings:
-    """Stored detections tell their size and rate; they have no pictures."""
+    """Findings of stored detections: size and rate, no pictures."""
     opened = open_detections(source, settings)
     return Findings(
         source=source,

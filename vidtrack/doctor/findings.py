@@ -1,4 +1,4 @@
-"""What the doctor found out about a source, as plain data."""
+"""The measurements of a source, as plain data."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from vidtrack.video.quality.timing import Timing
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """What went wrong while the source was read.
+    """Faults while reading the source.
 
-    header_fps     rate that it states; None if it states none
-    fps_assumed    nothing tells the rate
-    truncated      a file without its end
-    decode_errors  damaged pictures
-    dropped        pictures that came too fast to be decoded
+    header_fps     rate in the header [1/s]; None without one
+    fps_assumed    whether the rate is unknown
+    truncated      whether the file lacks its end
+    decode_errors  number of damaged pictures
+    dropped        number of pictures dropped because decoding was too slow
     reconnects, stalls   of a live source
-    gone           it was not there any more at the end
+    gone           whether a live source was lost at the end
     """
 
     header_fps: float | None
@@ -35,10 +35,10 @@ class Reception:
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """What this machine can do.
+    """Processing times on this machine.
 
-    decode_s  seconds to read and decode a picture; None where the camera sets the pace
-    track_s   seconds to find and track what moves in it
+    decode_s  time to read and decode a picture [s]; None for a live source
+    track_s   time to detect and track in a picture [s]
     """
 
     decode_s: float | None
@@ -52,16 +52,16 @@ class Speed:
 
 @dataclass(frozen=True, slots=True)
 class Objects:
-    """What moves. Sizes are the longer side of a box, in source pixels.
+    """Moving objects. Sizes are the longer side of a box, in source pixels.
 
-    tracks         that went somewhere
-    missed         more of them that finer settings find
-    median_px, smallest_px   size of both; the smallest one in ten; None without any
-    least_px       size that the settings can see
+    tracks         number of tracks that travelled
+    missed         number of further tracks that only finer settings find
+    median_px, smallest_px   median and 10th percentile of the sizes of both; None without any
+    least_px       least size that the settings can detect
     step           source pixels per pixel of the processed picture
-    motion_share   of the picture, in motion in the average frame
-    restless_share of the picture: it moves often, and no track explains it
-    restless_box   left, top, width, height of the largest such place [source px]; None without one
+    motion_share   mean share of the picture that moves
+    restless_share share of the picture that often moves outside tracks
+    restless_box   left, top, width, height of the largest such region [source px]; None without one
     """
 
     tracks: int
@@ -77,15 +77,16 @@ class Objects:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """A source at a glance.
+    """All measurements of a source.
 
-    source, kind   as it may be shown; "video", "live" or "detections"
+    source         without credentials
+    kind           "video", "live" or "detections"
     width, height  px
-    fps            rate that a run would take for nominal [1/s]
+    fps            nominal rate of a run [1/s]
     timing         None with fewer than two pictures
-    blockiness     1 without blocks of compression
+    blockiness     1 without visible blocks of compression
 
-    What follows `timing` is None for stored detections, which have no pictures.
+    The fields after `timing` are None for stored detections, which have no pictures.
     """
 
     source: str

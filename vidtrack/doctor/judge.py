@@ -1,11 +1,11 @@
-"""What the measurements mean for a run.
+"""Derives advice from the measurements.
 
-The limits are from simulated junctions with each trouble in growing strength, tracked with and without the advice.
+The limits are from simulated junctions with each problem in increasing strength, tracked with and without the advice.
 """
 
 from __future__ import annotations
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.doctor.advice import Advice
 from vidtrack.doctor.findings import Findings
 from vidtrack.doctor.on_motion import on_camera, on_objects
@@ -14,9 +14,9 @@ from vidtrack.doctor.on_time import on_time
 
 
 def judge(findings: Findings, settings: Settings) -> list[Advice]:
-    """Everything to say about a source that will be tracked with these settings, problems first.
+    """Advice for tracking a source with these settings, problems first.
 
-    Causes hide consequences: noise seems to shake the camera, and where the camera shakes, edges seem to drive.
+    A cause suppresses its consequences: noise looks like a shaking camera, and shaking edges look like vehicles.
     """
     noisy = list(on_noise(findings, settings))
     pictures = noisy or [*on_pictures(findings, settings), *on_camera(findings, settings)]

@@ -1,4 +1,4 @@
-"""What moves in the picture: how large it is, how much of it there is, and where it goes nowhere."""
+"""Measures moving objects: their sizes, the share of the picture that moves, and motion without travel."""
 
 from __future__ import annotations
 
@@ -8,28 +8,30 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.config import BlobSettings, Settings
+from vidtrack.arrays.types import Floats, Mask
+from vidtrack.config.settings import Settings
+from vidtrack.config.video import BlobSettings
 from vidtrack.doctor.findings import Objects
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE, Floats, Mask
 from vidtrack.tracking.boxes import best_cover, longer, widened
+from vidtrack.tracks import TENTATIVE
 from vidtrack.video.background.picture import reduction
-from vidtrack.video.blobs import find_blobs
+from vidtrack.video.blobs.blobs import find_blobs
 from vidtrack.video.foreground import Foreground
 
-_SETTLE_S = 2.0  # in which what stood in the first picture comes out of the scene
-_GOES = 0.2  # sizes; what has moved on by that is not restless
+_SETTLE_S = 2.0  # for the ghosts of the first picture to disappear
+_GOES = 0.2  # object sizes; least travel of an object
 _OFTEN = 0.2  # share of the frames
-_ENOUGH_S = 3.0  # of frames to say so: in less, a vehicle that is not confirmed yet moves as often as a tree
+_ENOUGH_S = 3.0  # least duration: in less, an unconfirmed vehicle moves as often as a tree
 _SMALL = 10  # percentile
-_PIECE = 0.3  # share of a box that lies in another one, of which it is a piece
-_LASTING_S = 1.0  # that a small object has to be seen; noise is not
+_PIECE = 0.3  # share of a box inside another one, of which it is then a piece
+_LASTING_S = 1.0  # least duration of a small object; noise is shorter
 _FINE_MAJORITY_PX, _FINE_AREA_PX = 3, 6  # of the finer detector
-_MARGIN = 0.25  # of a box's size, around it: what moves there is the vehicle's shadow or glare
+_MARGIN = 0.25  # of a box's size, around it: motion there is the vehicle's shadow or glare
 
 
 def least_px(settings: Settings, shape: tuple[int, int]) -> float:
-    """Longer side [source px] of the smallest square that survives the majority and the least area of a blob."""
+    """Side [source px] of the smallest square that passes the majority filter and the least area of a blob."""
     step = reduction(shape[0], settings.source.scale)
     area = settings.blobs.min_area_share * shape[0] * shape[1] / step**2
     if settings.detector.kind == "disturbance":
@@ -38,7 +40,7 @@ def least_px(settings: Settings, shape: tuple[int, int]) -> float:
 
 
 def finer(settings: Settings, shape: tuple[int, int]) -> Settings:
-    """Settings that see smaller objects, in a picture twice as fine where it is reduced now."""
+    """Settings that detect smaller objects, at twice the resolution if the picture is reduced."""
     step = max(1, reduction(shape[0], settings.source.scale) // 2)
     disturbance = settings.detector.disturbance.model_copy(update={"majority_px": _FINE_MAJORITY_PX})
     detector = settings.detector.model_copy(update={"kind": "disturbance", "disturbance": disturbance})
@@ -53,7 +55,7 @@ def finer(settings: Settings, shape: tuple[int, int]) -> Settings:
 
 
 class ObjectMeter:
-    """Watches the steps of a run, and of one with finer settings over the same frames."""
+    """Measures the steps of a run, and of one with finer settings over the same frames."""
 
     def __init__(self, settings: Settings, shape: tuple[int, int]) -> None:
         self._least_px = least_px(settings, shape)
@@ -62,13 +64,13 @@ class ObjectMeter:
         self._missed_sizes: dict[int, list[float]] = defaultdict(list)
         self._boxes: Floats = np.empty((0, 4))  # of all tracks of the newest frame
         self._begun_s: float | None = None
-        self._frames = 0  # after the scene has settled, which were so long:
+        self._frames = 0  # since the scene has settled, and their duration:
         self._watched_s = 0.0
         self._motion = 0.0
         self._restless: NDArray[np.int32] = np.empty((0, 0), np.int32)
 
     def take(self, step: Step) -> None:
-        """Add a frame as the settings see it."""
+        """Add a step of the run."""
         assert step.foreground is not None
         self._boxes = widened(step.tracks.box, _MARGIN)
         self._collect(step, np.ones(len(step.tracks), bool), self._sizes)
@@ -85,14 +87,14 @@ class ObjectMeter:
         self._restless += moving
 
     def take_fine(self, step: Step) -> None:
-        """Add the same frame as finer settings see it: what is small, and no piece of what was seen anyway."""
+        """Add the step of the finer run: its small objects that are not pieces of objects in the run."""
         box = step.tracks.box
         cover = best_cover(box, self._boxes)[1]
         small = longer(box) < 2 * self._least_px
         self._collect(step, small & (cover < _PIECE), self._missed_sizes)
 
     def result(self) -> Objects:
-        """Of all frames so far."""
+        """The measurements of all frames so far."""
         seen = [float(np.median(sizes)) for sizes in self._sizes.values()]
         lasting = _LASTING_S * self._frames / max(self._watched_s, _LASTING_S)
         missed = [float(np.median(sizes)) for sizes in self._missed_sizes.values() if len(sizes) >= lasting]
@@ -111,7 +113,7 @@ class ObjectMeter:
         )
 
     def _collect(self, step: Step, among: Mask, sizes: dict[int, list[float]]) -> None:
-        """Sizes of those confirmed tracks, among (T,), that went somewhere."""
+        """Add the sizes of the confirmed tracks, `among` (T,), that have travelled."""
         tracks = step.tracks
         size = longer(tracks.box)
         confirmed = among & tracks.seen & (tracks.status != TENTATIVE)
@@ -131,7 +133,7 @@ class ObjectMeter:
 
 
 def _covered(step: Step, shape: tuple[int, int]) -> Mask:
-    """(h, w) the boxes of tracks that are confirmed or go somewhere, with a margin."""
+    """(h, w) the boxes of tracks that are confirmed or have travelled, with a margin."""
     assert step.foreground is not None
     going = (step.tracks.status != TENTATIVE) | (step.tracks.travel > _GOES * longer(step.tracks.box))
     boxes = widened(step.shown.box[going], _MARGIN) / step.foreground.step

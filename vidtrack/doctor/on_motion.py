@@ -1,26 +1,26 @@
-"""Advice on the camera's motion, on the size of what moves, and on what moves in vain."""
+"""Advice on the camera's motion, the size of objects, and motion without travel."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.doctor.advice import Advice, scale_option, set_option
 from vidtrack.doctor.findings import Findings, Objects
 from vidtrack.video.background.picture import reduction
 
 _THRESHOLD, _MAJORITY = "detector.disturbance.luma_threshold", "detector.disturbance.majority_px"
 _SHAKE_PX, _STRONG_SHAKE_PX = 1.0, 3.5  # processed pixels from one frame to the next
-_SHAKE_THRESHOLD = 25  # most edges that shake by a pixel change less
+_SHAKE_THRESHOLD = 25  # grey levels; most edges that shake by a pixel change less
 _PAN = 0.05  # of the picture's width
-_TINY = 2.2  # times the least size that can be seen
+_TINY = 2.2  # times the least detectable size
 _TINY_MAJORITY_PX = 5
 _RESTLESS = 0.005  # of the picture
 _CROWDED = 0.4  # of the picture
 
 
 def on_camera(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """Whether it stands still."""
+    """Advice on shake and pan."""
     shake, step = findings.shake, reduction(findings.height, settings.source.scale)
     if shake is None:
         return
@@ -41,7 +41,7 @@ def on_camera(findings: Findings, settings: Settings) -> Iterator[Advice]:
 
 
 def on_objects(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """What moves, of a camera that stands still and sees well."""
+    """Advice on moving objects, for a still camera with good pictures."""
     if findings.objects is not None:
         yield from _on_sizes(findings.objects, settings)
         yield from _on_unrest(findings.objects, settings)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vidtrack.config import DisturbanceSettings, Settings
+from vidtrack.config.settings import Settings
+from vidtrack.config.video import DisturbanceSettings
 from vidtrack.doctor.advice import Advice, scale_option, set_option
 from vidtrack.doctor.findings import Findings
 from vidtrack.video.background.picture import reduction
@@ -12,18 +13,18 @@ from vidtrack.video.quality.flicker import Flicker
 from vidtrack.video.quality.light import Light
 
 _THRESHOLD = "detector.disturbance.luma_threshold"
-_DIM, _BLACK = 100.0, 25.0  # level that 5 % of the picture are above
-_DAYLIGHT = 165.0  # the same where the default threshold fits
+_DIM, _BLACK = 100.0, 25.0  # 95th percentile of the grey level
+_DAYLIGHT = 165.0  # the same in daylight, where the default threshold is right
 _LEAST_THRESHOLD = 5
-_NOISE = 18.0  # grey levels in a processed pixel; from 20 on it is taken for traffic
+_NOISE = 18.0  # grey levels in a processed pixel; from 20 on it becomes foreground
 _FLICKER, _BANDS = 0.1, 0.08  # amplitudes
-_BAND_THRESHOLDS = 25, 40  # below, edges of bands pass; above, vehicles do not
+_BAND_THRESHOLDS = 25, 40  # below, edges of bands become foreground; above, vehicles are missed
 _CLIPPED = 0.15  # of the picture
 _BLOCKS = 1.3
 
 
 def on_noise(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """The sensor's noise."""
+    """Advice on the sensor's noise."""
     step = reduction(findings.height, settings.source.scale)
     if findings.light is not None and findings.light.noise / step > _NOISE:
         text = f"each pixel varies by {findings.light.noise:.0f} grey levels: noise is taken for traffic"
@@ -31,7 +32,7 @@ def on_noise(findings: Findings, settings: Settings) -> Iterator[Advice]:
 
 
 def on_pictures(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """Light, lamps and compression."""
+    """Advice on light, flicker and compression."""
     if findings.light is not None:
         yield from _on_light(findings.light, settings)
         if findings.flicker is not None:

@@ -1,26 +1,26 @@
-"""Advice on rate and regularity, on what was lost on the way, and on what this machine can do."""
+"""Advice on the frame rate and its regularity, on losses, and on the speed of this machine."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.doctor.advice import Advice, scale_option, set_option
 from vidtrack.doctor.findings import Findings, Speed
 from vidtrack.video.background.picture import reduction
 from vidtrack.video.quality.timing import Timing
 
-_DISAGREEMENT = 0.1  # relative, between two statements of a rate
+_DISAGREEMENT = 0.1  # relative, between two sources of a rate
 _JITTER = 0.1  # usual intervals
 _MISSING, _REPEATED = 0.02, 0.05  # shares of the pictures
 _SLOW = 5.0  # pictures/s
-_WEAK = 0.7  # of the rate that a camera promises
+_WEAK = 0.7  # of the rate that the camera states
 _RESERVE = 0.8  # of the machine
 
 
 def on_time(findings: Findings, settings: Settings) -> Iterator[Advice]:
-    """Everything that has to do with time."""
+    """Advice on time."""
     yield from _on_reception(findings)
     if findings.timing is not None:
         yield from _on_rate(findings, findings.timing)

@@ -1,4 +1,4 @@
-"""Opens whatever a run could read, to look at it for some seconds."""
+"""Opens any source of a run, for some seconds."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import monotonic
 
-from vidtrack.config import Input, Settings
-from vidtrack.video.detections import is_detections
+from vidtrack.config.inputs import Input
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import is_detections
+from vidtrack.recording.source import Recording, is_recording
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.source import LiveSource
-from vidtrack.video.recording import Recording, is_recording
 from vidtrack.video.source import Source, open_source
 
 
 def is_live(source: str) -> bool:
-    """Whether this is a camera or a stream, not a file."""
+    """Whether the source is a camera or a stream, not a file."""
     return "://" in source or source.isdecimal() or Path(source).is_char_device()
 
 
 def kind_of(source: str) -> Input:
-    """What the source is."""
+    """The kind of the source."""
     if is_detections(source):
         return Input.DETECTIONS
     return Input.CAMERA if is_live(source) else Input.VIDEO
@@ -39,9 +40,9 @@ def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Reco
 def looked_at(
     frames: Source | LiveSource | Recording, seconds: float, patience_s: float, quiet_s: float
 ) -> Iterator[Frame]:
-    """The frames of so many seconds of the source's own time.
+    """Yields the frames of `seconds` of the source's time.
 
-    Ends early after `patience_s` by the clock, or when a live source gives nothing for `quiet_s`.
+    Ends early after `patience_s` of the clock, or when a live source yields no frame for `quiet_s`.
     """
     began_s: float | None = None
     heard_s = monotonic()

@@ -1,23 +1,25 @@
-"""The interface of an estimator: one filter per row, all rows as arrays."""
+"""The interface of an estimator: a bank of filters, one row per track."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vidtrack.estimate.model import Motion
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.decision import Decision
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 
 class Estimator(Protocol):
-    """Filters in rows.
+    """A bank of filters, one per row.
 
-    model  the motion model, whose columns position and velocity the moments have
+    model  the motion model; x has its columns `position` and `velocity`
     x, P   (T, n), (T, n, n) moments of all rows
     hits   (T,) updates so far
-    scale  (T,) size of each object where the model works per size, one elsewhere
+    scale  (T,) size of each object if the model is `per_size`, else one
     """
 
     model: Motion
@@ -36,16 +38,16 @@ class Estimator(Protocol):
         """x, P after dt seconds; changes nothing."""
 
     def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) or (T, n, n) derivative of what `ahead` makes of means x (T, n)."""
+        """(1, n, n) or (T, n, n) derivative of `ahead` by the means x (T, n)."""
 
     def predict(self, dt: float) -> None:
-        """Move all rows dt seconds on."""
+        """Predict all rows by dt seconds."""
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
-        """zhat (T, m) and its covariance (T, m, m); the innovation covariance is that plus R."""
+        """zhat (T, m) and its covariance (T, m, m) without R."""
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows from the weights of a decision."""
+        """Replace the rows by their successors, updated with the weights of a decision."""
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
         """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
@@ -55,3 +57,22 @@ class Estimator(Protocol):
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
+
+
+class Modes(NamedTuple):
+    """Predicted measurements as Gaussian mixtures.
+
+    weight (r, T) probability, zhat (r, T, m) mean and cov (r, T, m, m) covariance of each mode
+    """
+
+    weight: Floats
+    zhat: Floats
+    cov: Floats
+
+
+@runtime_checkable
+class Mixture(Protocol):
+    """An estimator with several modes."""
+
+    def modes(self, sensor: Sensor) -> Modes:
+        """The predicted measurement of each mode; S adds R."""

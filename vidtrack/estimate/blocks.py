@@ -1,4 +1,4 @@
-"""Rows of a bank in blocks, processed in parallel."""
+"""Parallel work on blocks of rows."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 
 def in_blocks(rows: int, size: int, work: Callable[[slice], None]) -> None:
-    """Call work on slices of `size` rows that cover all rows, in threads if there are several slices.
+    """Call work on slices of `size` rows that cover all rows; several slices run in threads.
 
-    Kernels release the interpreter's lock. The slices do not depend on the number of threads; results must not either.
+    Kernels release the interpreter's lock. Slices, and so results, do not depend on the number of threads.
     """
     blocks = [slice(first, min(first + size, rows)) for first in range(0, rows, size)]
     if len(blocks) < 2:
@@ -19,4 +19,4 @@ def in_blocks(rows: int, size: int, work: Callable[[slice], None]) -> None:
         return
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for _ in pool.map(work, blocks):
-            pass  # raises what the work raised
+            pass  # raises the work's exception

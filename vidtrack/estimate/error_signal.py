@@ -1,28 +1,30 @@
-"""The particle filter of paper 003, whose particles must be near the measurement."""
+"""The particle filter of paper 003, which keeps only particles near the measurement."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle import NO_GLINT, Glint, ParticleBank
 from vidtrack.estimate.particle_kernels import copy, normalise
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 
 
 class ErrorSignalBank(ParticleBank):
     """Particle filters with the resampling of paper 003, fig. 3, after each measurement.
 
-    Particles nearer than alpha to the measurement stay, with their weights, and are copied over and over until there
-    are N again. Where none is near, all are thrown anew, uniformly within alpha of it and with equal weights; they keep
-    their velocities. With several measurements it is enough to be near one; a row with none keeps all its particles.
+    Particles nearer than alpha to a measurement stay, with their weights, and are copied in turn until there are N. If
+    none is near, all are drawn again, uniformly within alpha of the measurement and with equal weights; they keep their
+    velocities. A row without measurements keeps all its particles.
 
-    The weights are not evened out, so this does not cure degeneracy, and it uses the measurement twice. What that
-    costs: `vidtrack reproduce 003-table2`.
+    Copies keep their weights, so this does not cure degeneracy, and it uses the measurement twice.
+    `vidtrack reproduce 003-table2` measures the cost.
 
     alpha  in standard deviations of each component of the measurement; the paper's 25 m and 0.2 degrees are five
     """
@@ -68,10 +70,10 @@ def keep_near(
     z: Floats, limit: Floats, wraps: Mask, seen: Floats, x: Floats, parent: Ints, start: Ints,
     measurement: Ints, log_weight: Floats, new: Floats,
 ) -> Ints:  # fmt: skip
-    """Survivors of each row (K,); new (K, N, n) particles and log_weight (K, N), normalised.
+    """Number of particles kept in each row (K,); fills new (K, N, n) and log_weight (K, N), normalised.
 
     z (M, m), limit (M, m), wraps (m,) which components are angles, seen (T, N, m), x (T, N, n), parent (K,), start
-    (K + 1,), measurement (B,). Rows without survivors and rows without measurements keep all.
+    (K + 1,), measurement (B,). Rows without near particles and rows without measurements keep all.
     """
     number = log_weight.shape[1]
     near, chosen, weight = np.empty(number, np.bool_), np.empty(number, np.int64), np.empty(number)
@@ -96,9 +98,9 @@ def keep_near(
 
 @kernel
 def cycle(near: Mask, chosen: Ints) -> int:
-    """Indices of the near (N,) particles in their order, over and over until chosen (N,) is full; how many are near.
+    """Fill chosen (N,) with the indices of the near (N,) particles in turn; returns how many are near.
 
-    With none, chosen stays as it is. The fill loop printed in fig. 3 begins one too early and would lose the last one.
+    With none, chosen is unchanged. The loop printed in fig. 3 begins one too early and would lose the last particle.
     """
     survivors = 0
     for i in range(len(near)):

@@ -7,22 +7,24 @@ from functools import lru_cache
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 START = 3
-"""Updates for which a new row runs as a Kalman filter, because its velocity is hardly known at first."""
+"""A new row runs as a Kalman filter for so many updates, because its velocity is unknown at first."""
 
 
 class FixedGainBank(KalmanBank):
     """Filters with the steady-state gain of their motion model: alpha-beta for constant velocity (Kalata 1984),
     alpha-beta-gamma for constant acceleration.
 
-    sigma  standard deviation of a position measurement, one for all, px or m; the gain depends on it and on the time
-           step, not on the measurements' own covariances
+    sigma  standard deviation of all position measurements, px or m; the gain depends on it and on the time step, not
+           on R
     """
 
     def __init__(self, model: Motion, sigma: float) -> None:
@@ -34,23 +36,23 @@ class FixedGainBank(KalmanBank):
         self.sigma = sigma
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
-        """x, P after dt seconds, P that of the settled filter; changes nothing."""
+        """x, P after dt seconds, with the steady-state P; changes nothing."""
         x, P = super().ahead(dt)
         if dt > 0:
             P[self.hits >= START] = steady_prediction(self.model, dt, self.sigma)
         return x, P
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows: x + K v with the settled gain K."""
+        """Successor rows: x + K v with the steady-state gain K."""
         R = self.sigma**2 * np.eye(scan.z.shape[1])
         super().update(decision, replace(scan, R=R, noise=R), sensor)
 
 
 @lru_cache(maxsize=64)
 def steady_prediction(model: Motion, dt: float, sigma: float) -> Floats:
-    """P (n, n) that a filter of positions every dt seconds settles to before each update; solves the Riccati equation.
+    """Steady-state P (n, n) before an update, for positions every dt seconds; solves the Riccati equation.
 
-    Raises ConfigError for a model whose filter does not settle.
+    Raises ConfigError for a model without a steady state.
     """
     from scipy.linalg import solve_discrete_are
 

@@ -1,4 +1,4 @@
-"""Interacting multiple models: a bank for each way to move, and how probable each way is."""
+"""Interacting multiple models: one bank per motion model, and the probability of each model."""
 
 from __future__ import annotations
 
@@ -9,24 +9,27 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
+from vidtrack.estimate.bank import Modes
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor, wrapped
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 LEAST = 1e-9
-"""Smallest probability of a mode: none is ever ruled out for good."""
+"""Smallest probability of a mode, so that every mode can recover."""
 
 
 class IMMBank:
-    """IMM filters in rows (Blom and Bar-Shalom 1988).
+    """IMM filters, one per row (Blom and Bar-Shalom 1988).
 
     models  motion models, the first the usual one; all have the same dim
-    stay_s  mean time [s] for which each model holds before another takes over
+    stay_s  mean sojourn time [s] of each model
 
-    Models may have more components than position and velocity; what another model does not know keeps its own
-    values in the mixing. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
+    Models may have components beyond position and velocity. In the mixing, a component that the other model lacks
+    keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
     """
 
     def __init__(self, models: Sequence[Motion], stay_s: Sequence[float]) -> None:
@@ -49,32 +52,35 @@ class IMMBank:
         return len(self.x)
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
-        """x, P after dt seconds; changes nothing."""
         return self._moments(*self._moved(dt))
 
     def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) derivative that all modes have in common: positions go on with their velocities."""
+        """(1, n, n) derivative of constant velocity, which all modes share."""
         J = np.eye(x.shape[1])
         J[self.model.position, self.model.velocity] = dt
         return J[None]
 
     def predict(self, dt: float) -> None:
-        """Mix the modes and move all rows dt seconds on."""
+        """Mix the modes and predict all rows by dt seconds."""
         self.banks, self.mode = self._moved(dt)
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance (T, m, m) over all modes; the innovation covariance is that plus R."""
+        weight, zhat, cov = self.modes(sensor)
+        off = np.stack([wrapped(mean - zhat[0], sensor.angles) for mean in zhat])
+        mean, over_all = _mixture(weight, off, cov)
+        return wrapped(zhat[0] + mean, sensor.angles), over_all
+
+    def modes(self, sensor: Sensor) -> Modes:
+        """The predicted measurement of each mode, by which a measurement is gated and weighed."""
         each = [bank.predicted_measurement(sensor) for bank in self.banks]
-        first = each[0][0]
-        off = np.stack([wrapped(zhat - first, sensor.angles) for zhat, _ in each])
-        mean, cov = _mixture(self.mode.T, off, np.stack([cov for _, cov in each]))
-        return wrapped(first + mean, sensor.angles), cov
+        return Modes(self.mode.T, np.stack([zhat for zhat, _ in each]), np.stack([cov for _, cov in each]))
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows of each mode, with the weights as that mode sees them, and the modes' new probabilities.
+        """Update each mode with its own weights, and the probabilities of the modes.
 
-        P(mode, measurement) = beta P(mode) N_mode / sum over modes of P(mode) N_mode; a miss tells nothing of modes.
+        P(mode, measurement) = beta P(mode) N_mode / sum over modes of P(mode) N_mode; a miss leaves P(mode) unchanged.
         """
         parent, row = decision.parent, decision.row
         before = self.mode[parent].T
@@ -96,7 +102,6 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
-        """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
         for bank in self.banks:
             bank.append(position, cov, scale)
         self._enter(len(position), scale)
@@ -111,7 +116,6 @@ class IMMBank:
         self._enter(len(x), scale)
 
     def keep(self, rows: np.ndarray) -> None:
-        """Drop all rows but these indices."""
         for bank in self.banks:
             bank.keep(rows)
         self.mode, self.hits, self.scale = self.mode[rows], self.hits[rows], self.scale[rows]
@@ -124,7 +128,7 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def _moved(self, dt: float) -> tuple[list[KalmanBank], Floats]:
-        """The banks after mixing and dt seconds, and the modes' probabilities then."""
+        """The banks after mixing and a prediction by dt seconds, and the probabilities of the modes then."""
         switch = self._switching(dt)
         mode = self.mode @ switch
         moved = []
@@ -138,7 +142,7 @@ class IMMBank:
         return moved, mode
 
     def _switching(self, dt: float) -> Floats:
-        """(r, r) probability to go from one model to another within dt seconds."""
+        """(r, r) transition probabilities of the models over dt seconds."""
         stay = np.exp(-dt / self.stay_s)
         r = len(stay)
         leave = np.repeat(((1 - stay) / (r - 1))[:, None], r, axis=1)
@@ -152,7 +156,7 @@ class IMMBank:
 
 
 def _lifted(source: KalmanBank, target: KalmanBank, shared: int) -> tuple[Floats, Floats]:
-    """Moments of one mode in the state of another: what the source does not hold, the target keeps (Yuan 2012)."""
+    """Moments of one mode in the state of another; components that the source lacks are the target's (Yuan 2012)."""
     if source.model.states == target.model.states:
         return source.x, source.P
     x, P = target.x.copy(), target.P.copy()

@@ -1,20 +1,22 @@
-"""The Kalman bank: all tracks' filters as arrays, one row a track."""
+"""The Kalman bank: the filters of all tracks as arrays, one row per track."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.estimate.kernels import mixture_update, projection, propagation
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 
 class KalmanBank:
-    """Kalman filters in rows; extended ones where motion or sensor are not linear.
+    """Kalman filters, one per row; extended Kalman filters if motion or sensor are not linear.
 
-    x (T, n), P (T, n, n) means and covariances; hits (T,) updates so far; scale (T,) size of each
-    object where the model works per size, one elsewhere.
+    x (T, n), P (T, n, n) means and covariances; hits (T,) updates so far; scale (T,) size of each object if the model
+    is `per_size`, else one.
     """
 
     STATE = ("x", "P", "hits", "scale")
@@ -42,7 +44,6 @@ class KalmanBank:
         return self.model.jacobian(dt, x, self.model.transition(dt, x))
 
     def predict(self, dt: float) -> None:
-        """Move all rows dt seconds on."""
         self.x, self.P = self.ahead(dt)
 
     def linearised(self, sensor: Sensor) -> tuple[Floats, Floats, Floats]:
@@ -52,7 +53,7 @@ class KalmanBank:
         return sensor.h(self.x, position), H, np.zeros((1, H.shape[1], H.shape[1]))
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
-        """zhat (T, m) and its covariance H P H' (T, m, m); the innovation covariance is that plus R."""
+        """zhat (T, m) and its covariance H P H' plus the excess (T, m, m)."""
         zhat, H, excess = self.linearised(sensor)
         return zhat, projection(*H.shape[1:])(self.P, H, excess)
 
@@ -71,7 +72,6 @@ class KalmanBank:
         self.scale = self.scale[decision.parent]
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
-        """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
         self.insert(*self.model.birth(position, cov, scale), scale)
 
     def insert(self, x: Floats, P: Floats, scale: Floats) -> None:
@@ -82,7 +82,6 @@ class KalmanBank:
         self.scale = np.concatenate([self.scale, scale])
 
     def keep(self, rows: np.ndarray) -> None:
-        """Drop all rows but these indices."""
         rows = np.arange(len(self))[rows]
         for name in self.STATE:
             setattr(self, name, getattr(self, name).take(rows, axis=0))

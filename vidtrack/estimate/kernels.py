@@ -1,7 +1,7 @@
 """Compiled Kalman equations for all rows at once.
 
-The numbers of state and measurement components are constants of each kernel, so that the compiler unrolls the
-small matrix products; that makes them about four times as fast as loops over sizes known at run time only.
+The numbers of state and measurement components are compile-time constants of each kernel. The compiler then unrolls
+the small matrix products, which makes them about four times as fast.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import specialised
-from vidtrack.rows import starts
-from vidtrack.scan import Floats, Ints
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats, Floats], Floats]
@@ -83,17 +83,17 @@ def projection(m: int, n: int) -> Projection:
 
 @lru_cache
 def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
-    """The moment-matched mixture of the missed branch (weight beta0) and one Kalman update per weight.
+    """The moment-matched mixture of the missed branch (weight beta0) and one Kalman update per measurement.
 
     The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m), zhat (T, m),
     z (M, m), R (M, m, m), and of the decision parent (K,), row (B,), measurement (B,), beta (B,), beta0 (K,),
-    inflation (K,) and spread; it gives x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
-    `angles` are components whose innovation is taken the short way round.
+    inflation (K,) and spread; it returns x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
+    Innovations of the components `angles` are wrapped to -pi..pi.
 
-    S = H P H' + excess + R; the excess is what the linearisation H leaves out of the measurement's spread.
-    K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance is Joseph's
-    (I - K H) P (I - K H)' + K R K', positive definite whatever the rounding, as A = P - K H P and then
-    A - (A H' - K R) K'. The missed branch is widened by inflation * K S K', with S of `noise` (m, m).
+    S = H P H' + excess + R; the excess is the part of the predicted measurement's covariance that H P H' lacks.
+    K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance has Joseph's form
+    (I - K H) P (I - K H)' + K R K', which rounding keeps positive definite, computed as A = P - K H P and then
+    A - (A H' - K R) K'. The missed branch is widened by inflation * K S K', with S from `noise` (m, m).
     """
     wraps = tuple(a in angles for a in range(m))
 

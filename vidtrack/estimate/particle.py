@@ -1,4 +1,4 @@
-"""The particle bank: states as clouds of weighted samples, for errors that no covariance describes."""
+"""The particle bank: states as weighted samples, for distributions that are not normal."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.blocks import in_blocks
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
-from vidtrack.rows import starts
-from vidtrack.scan import Decision, Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 BLOCK = 50_000
-"""Particles in a block: enough that a thread of its own pays."""
+"""Particles in a block; smaller blocks do not repay a thread."""
 
 
 class Glint(NamedTuple):
-    """Errors of a measurement's components are `factor` times as large with a probability."""
+    """With this probability the error of a measurement's component is `factor` times as large."""
 
     probability: float
     factor: float = 5.0
@@ -30,17 +32,17 @@ NO_GLINT = Glint(0.0)
 
 
 class ParticleBank:
-    """Particle filters in rows, with the motion model as proposal (Gordon, Salmond and Smith 1993).
+    """Particle filters, one per row, with the motion model as proposal (Gordon, Salmond and Smith 1993).
 
-    number      N, particles a row
-    resampling  how particles are resampled; see `Resampling`
-    threshold   they are when the effective number 1 / sum of w^2 falls below this share of N
-    glint       the measurements' errors, where they are not normal
+    number      N, particles per row
+    resampling  scheme of resampling
+    threshold   a row is resampled when the effective number 1 / sum of w^2 falls below this share of N
+    glint       distribution of the measurement errors, if not normal
     seed        of all random numbers, which do not depend on the number of threads
 
-    particles (T, N, n), log_weight (T, N), the weights of a row summing to one; hits (T,) updates so far; scale (T,)
-    size of each object where the model works per size, one elsewhere. What a miss tells (inflation) is not used: the
-    particles outside the gate stay as they are.
+    particles (T, N, n), log_weight (T, N), the weights of a row sum to one; hits (T,) updates so far; scale (T,) size
+    of each object if the model is `per_size`, else one. A decision's inflation is not used: the particles outside the
+    gate represent it already.
     """
 
     def __init__(
@@ -83,23 +85,22 @@ class ParticleBank:
         return self._known()[1]
 
     def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) or (T, n, n) derivative of what `ahead` makes of means x (T, n), but for the particles' spread."""
+        """(1, n, n) or (T, n, n) derivative of the motion at means x (T, n), without the particles' spread."""
         return self.model.jacobian(dt, x, self.model.transition(dt, x))
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
-        """x, P after dt seconds; changes nothing."""
         moved = self.particles.copy()
         self._move(moved, self._transition(dt), np.zeros_like(self.P))
         x, P = self._mean_and_cov(moved)
         return x, P + self._process_noise(dt)
 
     def predict(self, dt: float) -> None:
-        """Move all particles dt seconds on, each with a process noise of its own."""
+        """Predict all particles by dt seconds, each with its own sample of the process noise."""
         self._move(self.particles, self._transition(dt), self._process_noise(dt))
         self._moments = None
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
-        """zhat (T, m) and covariance (T, m, m) of h(particles); the innovation covariance is that plus R."""
+        """Mean zhat (T, m) and covariance (T, m, m) of h(particles), without R."""
         seen, weight = self._seen(sensor), np.exp(self.log_weight)
         centre = np.zeros((len(self), seen.shape[2]))
         for a in sensor.angles:
@@ -110,7 +111,7 @@ class ParticleBank:
         return wrapped(centre + mean, sensor.angles), cov
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows from the weights of a decision; x, P are those before the particles are chosen anew."""
+        """Successor rows from the weights of a decision; x, P are the moments before resampling."""
         parent, rows = decision.parent, len(decision.parent)
         seen = self._seen(sensor)
         start = starts(decision.row, rows)
@@ -133,11 +134,10 @@ class ParticleBank:
         self.scale = self.scale[parent]
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
-        """New rows from located measurements: position (B, d), cov (B, d, d), scale (B,)."""
         self.insert(*self.model.birth(position, cov, scale), scale)
 
     def insert(self, x: Floats, P: Floats, scale: Floats) -> None:
-        """New rows drawn from normal distributions of means x (B, n) and covariances P (B, n, n); scale (B,)."""
+        """New rows, drawn from normal distributions with means x (B, n) and covariances P (B, n, n); scale (B,)."""
         new = np.repeat(np.asarray(x, float)[:, None], self.number, axis=1)
         self._move(new, np.eye(self.model.states)[None], P)
         before = self.x, self.P
@@ -148,7 +148,6 @@ class ParticleBank:
         self.scale = np.concatenate([self.scale, scale])
 
     def keep(self, rows: np.ndarray) -> None:
-        """Drop all rows but these indices."""
         self._moments = self.x[rows], self.P[rows]
         self.particles, self.log_weight = self.particles[rows], self.log_weight[rows]
         self.hits, self.scale = self.hits[rows], self.scale[rows]
@@ -163,7 +162,7 @@ class ParticleBank:
         weight: Floats,
         log_weight: Floats,
     ) -> Floats:
-        """Particles (K, N, n) of the successors, chosen anew where need be; log_weight (K, N) is changed along."""
+        """Particles (K, N, n) of the successors, resampled where necessary; log_weight (K, N) changes in place."""
         if self.resampling == Resampling.NONE:
             return self.particles[decision.parent]
         chosen = np.empty((len(weight), *self.particles.shape[1:]))
@@ -193,25 +192,25 @@ class ParticleBank:
         return self.model.process_noise(dt, self.x, self.P, self.hits, self.scale)
 
     def _move(self, particles: Floats, F: Floats, Q: Floats) -> None:
-        """Particles (T, N, n) by F (1, n, n) or (T N, n, n), with noise of Q (T, n, n), in place."""
+        """Move particles (T, N, n) by F (1, n, n) or (T N, n, n) and noise of covariance Q (T, n, n), in place."""
         rows, n = len(particles), self.model.states
         each = np.broadcast_to(F.reshape(-1, 1 if len(F) == 1 else self.number, n, n), (rows, self.number, n, n))
         stream = self._streams(rows)
         in_blocks(rows, self._block, lambda block: move(n)(particles[block], each[block], Q[block], stream[block]))
 
     def _seen(self, sensor: Sensor) -> Floats:
-        """(T, N, m) what the sensor would see of each particle."""
+        """(T, N, m) expected measurement h(x) of each particle."""
         seen = sensor.h(self.particles.reshape(-1, self.model.states), self.model.position)
         return seen.reshape(len(self), self.number, seen.shape[1])
 
     def _known(self) -> tuple[Floats, Floats]:
-        """x, P, computed when they are asked for the first time."""
+        """x, P, computed on first use."""
         if self._moments is None:
             self._moments = self._mean_and_cov(self.particles)
         return self._moments
 
     def _mean_and_cov(self, particles: Floats) -> tuple[Floats, Floats]:
-        """Moments (T, c), (T, c, c) of what the particles are, (T, N, c), under their weights."""
+        """Weighted mean (T, c) and covariance (T, c, c) of `particles` (T, N, c)."""
         rows, c = len(particles), particles.shape[2]
         mean, cov = _empty(rows, c)
         everyone = np.arange(rows)

@@ -1,6 +1,6 @@
-"""Compiled steps of particle filters: each goes over rows of N particles.
+"""Compiled steps of particle filters, over rows of N particles.
 
-The numbers of components are constants of a kernel, as in `kernels`. Rows may be parts of a bank, in a thread each.
+The numbers of components are compile-time constants, as in `kernels`. Blocks of rows may run in threads.
 """
 
 from __future__ import annotations
@@ -10,27 +10,27 @@ from functools import lru_cache
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel, specialised
 from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.resampling import choose
 from vidtrack.estimate.stream import normal
-from vidtrack.scan import Floats, Ints
 
 Kernel = Callable[..., None]
 
 FARTHEST = 1e12
-"""Half the squared distance, in standard deviations, beyond which all is equally unlikely; logarithms stay exact."""
+"""Upper limit of half the squared distance in standard deviations; logarithms stay exact below it."""
 
 NOTHING = -300.0
-"""Logarithm of a weight that adds nothing to the largest; still smaller ones are slow to compute with."""
+"""Logarithm below which weights are zero: negligible against the largest, and denormal numbers are slow."""
 
 
 @lru_cache
 def move(n: int) -> Kernel:
     """x <- F x + L xi in place, with L L' = Q and xi standard normal.
 
-    x (T, N, n), F (T, N, n, n), Q (T, n, n), stream (T,) counts. Q may be singular: one number is drawn for each of
-    its directions that are not.
+    x (T, N, n), F (T, N, n, n), Q (T, n, n), stream (T,) counts. Q may be singular: rank(Q) numbers are drawn for each
+    particle.
     """
 
     def move(x: Floats, F: Floats, Q: Floats, stream: Ints) -> None:
@@ -56,12 +56,11 @@ def move(n: int) -> Kernel:
 
 @lru_cache
 def weigh(m: int, angles: tuple[int, ...] = ()) -> Kernel:
-    """Weights of successors' particles: Bayes with each measurement alone, mixed by the decision's weights.
+    """Weights of successors' particles: Bayes' rule with each measurement, mixed by the decision's weights.
 
     w_i = beta0 w_i + sum over j of beta_j w_i N(z_j; h(x_i), R_j) / sum over i of the same; without `spread` the
-    measurements act as one, w_i ~ w_i prod over j of N(z_j; h(x_i), R_j)^beta_j. Sums are relative to their largest
-    term. With glint a measurement's errors are `factor` times as large with probability `glint`, in each component
-    of the whitened innovation by itself.
+    measurements act as one, w_i ~ w_i prod over j of N(z_j; h(x_i), R_j)^beta_j. Sums are scaled by their largest
+    term. Each component of the whitened innovation is, independently, `factor` times as large with probability `glint`.
 
     log_weight (T, N), seen (T, N, m) = h(x), z (M, m), R (M, m, m), and of the decision parent (K,), start (K + 1,),
     measurement (B,), beta (B,), beta0 (K,), spread -> weight (K, N), summing to one, and log_new (K, N).
@@ -115,7 +114,7 @@ def weigh(m: int, angles: tuple[int, ...] = ()) -> Kernel:
 
 @lru_cache
 def moments(n: int) -> Kernel:
-    """Mean (K, n) and covariance (K, n, n) of particles x (T, N, n) under weight (K, N); row k is of x[parent[k]]."""
+    """Mean (K, n) and covariance (K, n, n) of particles x (T, N, n) with weight (K, N); row k uses x[parent[k]]."""
 
     def moments(weight: Floats, x: Floats, parent: Ints, mean: Floats, cov: Floats) -> None:
         off = np.empty(n)
@@ -142,7 +141,7 @@ def moments(n: int) -> Kernel:
 def resample(
     kind: int, threshold: float, weight: Floats, x: Floats, parent: Ints, stream: Ints, log_weight: Floats, new: Floats
 ) -> None:
-    """Particles new (K, N, n) of rows whose effective number 1 / sum of w^2 is below threshold N; others are copied.
+    """Fill new (K, N, n): rows whose effective number 1 / sum of w^2 is below threshold N are resampled, others copied.
 
     weight (K, N), x (T, N, n); log_weight (K, N) of resampled rows becomes -ln N.
     """
@@ -180,7 +179,7 @@ def _log_density(v: float, glint: float, factor: float) -> float:
 
 @kernel
 def normalise(log_weight: Floats, weight: Floats) -> None:
-    """Scale weights (N,), given by their logarithms, so that they sum to one; fill weight with them."""
+    """Normalise weights (N,), given as logarithms, to sum to one; fill `weight` with them."""
     largest = -np.inf
     for i in range(len(log_weight)):
         largest = max(largest, log_weight[i])
@@ -197,7 +196,7 @@ def normalise(log_weight: Floats, weight: Floats) -> None:
 
 @kernel
 def _root(Q: Floats, L: Floats) -> int:
-    """Fill columns of L with L L' = Q (n, n), positive semidefinite; how many there are."""
+    """Fill columns of L with L L' = Q (n, n), positive semidefinite; returns their number, the rank."""
     n = len(Q)
     rest, rank = Q.copy(), 0
     for p in range(n):

@@ -1,7 +1,7 @@
-"""Resampling: which particles go on, and how often each.
+"""Resampling schemes of particle filters.
 
-All four schemes choose particle i w_i N times on average and differ in how far the number strays from that (Douc,
-Cappe and Moulines 2005): least in `systematic`, most in `multinomial`.
+All four schemes choose particle i w_i N times on average. They differ in the variance of that number (Douc, Cappe and
+Moulines 2005): smallest in `systematic`, largest in `multinomial`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from enum import IntEnum
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
 from vidtrack.estimate.stream import exponential, uniform
-from vidtrack.scan import Floats, Ints
 
 
 class Resampling(IntEnum):
-    """The schemes; with NONE particles are never chosen anew, only weighted (sequential importance sampling)."""
+    """The schemes; with NONE particles are only weighted (sequential importance sampling)."""
 
     NONE = 0
     MULTINOMIAL = 1
@@ -32,7 +32,7 @@ MULTINOMIAL, RESIDUAL, STRATIFIED = (
 
 @kernel
 def choose(kind: int, weight: Floats, chosen: Ints, count: np.uint64) -> np.uint64:
-    """Fill chosen (N,) with indices of particles of weight (N,) by one of the four schemes; the stream's next count."""
+    """Fill chosen (N,) with indices of particles of weight (N,) by a scheme; returns the stream's next count."""
     number = len(chosen)
     u = np.empty(number)
     if kind == MULTINOMIAL:
@@ -52,10 +52,10 @@ def choose(kind: int, weight: Floats, chosen: Ints, count: np.uint64) -> np.uint
 
 @kernel
 def _one_in_each(weight: Floats, u: Floats, chosen: Ints) -> None:
-    """The particle at (k + u_k) / N for each k when all lie one after the other in [0, 1), as long as their weights.
+    """The particle at (k + u_k) / N for each k, on [0, 1) divided into intervals as long as the weights.
 
-    Point k belongs to particle i when i particles end before it: ends are counted, then summed up. No branch has to be
-    guessed by the processor, which is three times as fast as a walk along the points.
+    Point k belongs to particle i if the intervals of i particles end before it: ends are counted, then accumulated.
+    Without branches this is three times as fast as `_walk`.
     """
     number = len(chosen)
     stretch = number / weight.sum()
@@ -72,7 +72,7 @@ def _one_in_each(weight: Floats, u: Floats, chosen: Ints) -> None:
 
 @kernel
 def _walk(weight: Floats, point: Floats, chosen: Ints) -> None:
-    """The same at any ascending points of [0, 1)."""
+    """The particle at each of any ascending points of [0, 1)."""
     i, reached, total = 0, weight[0], weight.sum()
     for k in range(len(point)):
         while reached <= point[k] * total and i < len(weight) - 1:
@@ -83,7 +83,7 @@ def _walk(weight: Floats, point: Floats, chosen: Ints) -> None:
 
 @kernel
 def _sorted_uniforms(point: Floats, count: np.uint64) -> np.uint64:
-    """Fill point with ascending uniform numbers: partial sums of exponential ones over their total."""
+    """Fill point with ascending uniform numbers: partial sums of exponential numbers over their total."""
     total = 0.0
     for i in range(len(point)):
         gap, count = exponential(count)
@@ -98,7 +98,7 @@ def _sorted_uniforms(point: Floats, count: np.uint64) -> np.uint64:
 
 @kernel
 def _residual(weight: Floats, u: Floats, chosen: Ints, count: np.uint64) -> np.uint64:
-    """floor(w N) of each particle, and the rest multinomially from what that leaves."""
+    """floor(w N) copies of each particle, and the rest multinomially from the remaining weights."""
     left = weight * (len(chosen) / weight.sum())
     filled = 0
     for i in range(len(weight)):

@@ -1,4 +1,4 @@
-"""Measurement models: what a sensor would see of a state."""
+"""Measurement models: the expected measurement of a state."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 
 class Sensor(Protocol):
     """A measurement model z = h(x) + noise.
 
-    angles  components of z that are angles: their differences are taken the short way round. At most one of
-            the first two may be one; its values lie in -pi..pi.
+    angles  components of z that are angles, in -pi..pi; their differences are wrapped. At most one of the first two
+            components may be an angle.
     """
 
     @property
@@ -28,12 +28,12 @@ class Sensor(Protocol):
         """(T, m, n) or (1, m, n) Jacobians of h."""
 
     def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
-        """Positions (M, d) and covariances (M, d, d) that single measurements give."""
+        """Positions (M, d) and covariances (M, d, d) from single measurements."""
 
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """The measurement is the position itself, in the state's own coordinates."""
+    """The measurement is the position, in the state's coordinates."""
 
     angles: ClassVar[tuple[int, ...]] = ()
 
@@ -42,7 +42,7 @@ class Position:
         return x.take(position, axis=1)
 
     def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
-        """(1, d, n): picks the position columns, the same for all rows."""
+        """(1, d, n) selection of the position columns, the same for all rows."""
         return _selection(position, x.shape[1])
 
     def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
@@ -55,12 +55,12 @@ POSITION = Position()
 
 @lru_cache
 def _selection(columns: tuple[int, ...], n: int) -> Floats:
-    """(1, d, n) the matrix that picks these columns of n; it is cached, so do not write into it."""
+    """(1, d, n) selection matrix of these columns of n; cached: do not write to it."""
     return np.eye(n)[None, list(columns)]
 
 
 def wrapped(difference: Floats, angles: tuple[int, ...]) -> Floats:
-    """The differences (N, m) of measurements, changed in place so that their angles lie in -pi..pi."""
+    """The differences (N, m) of measurements, with angles wrapped to -pi..pi in place."""
     for a in angles:
         difference[:, a] -= 2 * np.pi * np.round(difference[:, a] / (2 * np.pi))
     return difference

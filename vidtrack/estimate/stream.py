@@ -1,8 +1,8 @@
-"""Random numbers inside compiled kernels: streams that begin at a key, the same whatever thread draws from them.
+"""Random numbers inside compiled kernels: streams that start from a key and do not depend on threads.
 
-SplitMix64 (Steele, Lea and Flood 2014) counts up and scrambles the count; normal numbers by the ziggurat of Marsaglia
-and Tsang (2000) with 256 layers, about five nanoseconds each. Every function takes a stream's count and returns the
-next one with what was drawn.
+SplitMix64 (Steele, Lea and Flood 2014) hashes a counter; normal numbers by the ziggurat of Marsaglia and Tsang (2000)
+with 256 layers, about five nanoseconds each. Every function takes a stream's count and returns the number drawn and
+the next count.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import erfc
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 
 STEP, MIX1, MIX2 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 SHIFT1, SHIFT2, SHIFT3, LAYER = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(255)
 
 LAYERS = 256
 TAIL = 3.6541528853610088
-"""Where the lowest layer of 256 equal areas under exp(-x^2 / 2) turns into the tail (Marsaglia and Tsang 2000)."""
+"""Start of the tail in the lowest of 256 layers of equal area under exp(-x^2 / 2) (Marsaglia and Tsang 2000)."""
 
 
 def _edges() -> Floats:
-    """(257,) half widths of the layers from the lowest, whose width includes its tail, to the peak."""
+    """(257,) half widths of the layers from the lowest, which includes the tail, to the peak."""
     area = TAIL * np.exp(-(TAIL**2) / 2) + np.sqrt(np.pi / 2) * erfc(TAIL / np.sqrt(2))
     edge = np.zeros(LAYERS + 1)
     edge[:2] = area / np.exp(-(TAIL**2) / 2), TAIL
@@ -76,7 +76,7 @@ def normal(count: np.uint64) -> tuple[float, np.uint64]:
 
 @kernel
 def _tail(side: float, count: np.uint64) -> tuple[float, np.uint64]:
-    """Normal beyond TAIL on the side of a number's sign."""
+    """Normal number beyond TAIL, with the sign of `side`."""
     while True:
         a, count = exponential(count)
         b, count = exponential(count)

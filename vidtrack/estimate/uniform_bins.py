@@ -1,4 +1,4 @@
-"""The particle filter of paper 003, table 1: uniform particles in the bin of the measurement, each scan by itself."""
+"""The particle filter of paper 003, table 1: uniform particles in the measurement's bin, without memory."""
 
 from __future__ import annotations
 
@@ -6,25 +6,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import Sensor
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 RANGE_M = (10e3, 30e3, 50e3, 70e3, 100e3)
 """m; edges of the range bins of paper 003, table 1."""
 
 
 class UniformBinsBank(KalmanBank):
-    """Filters in rows without a memory: N uniform particles in the bin of the measurement, weighed by it.
+    """Filters without memory, one per row: N uniform particles in the measurement's bin, weighted by its likelihood.
 
-    The literal reading of paper 003, table 1. The particles stand for one component of one measurement; their mean and
-    variance take the measurement's place, and nothing of the past is used but for the rows' association: a row's
-    state is that of a new one, with its velocity unknown. Between scans rows move as their model says.
+    The literal reading of paper 003, table 1. The particles represent one component of a measurement; their mean and
+    variance replace it. After each update a row's state is that of a new row, with unknown velocity; earlier states
+    count for the association only. Between scans rows move by the motion model.
 
-    edges  for each component of a measurement the edges of its bins, in its own unit; beyond the outermost the next bin
-           is taken, so that the estimate stays within the table; angles count from 0 to a full turn
+    edges  bin edges of each component of a measurement, in its unit; values outside use the nearest bin, so that the
+           estimate stays within the table; angles are in 0..2 pi
     """
 
     def __init__(self, model: Motion, edges: Sequence[Sequence[float]], number: int = 2000, *, seed: int = 0) -> None:
@@ -36,7 +38,7 @@ class UniformBinsBank(KalmanBank):
         self.rng = np.random.default_rng(seed)
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows: new states from each measurement's particles, mixed with the prediction where missed."""
+        """Successor rows: new states from the particles of each measurement, mixed with the prediction by beta0."""
         parent, row, beta = decision.parent, decision.row, decision.beta
         z = scan.z[decision.measurement]
         z[:, sensor.angles] %= 2 * np.pi
@@ -57,7 +59,7 @@ class UniformBinsBank(KalmanBank):
         self.scale = self.scale[parent]
 
     def _estimate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
-        """Mean (B, m) and variance (B, m) of uniform particles in the bins of z (B, m), weighed by N(z; x, R_aa)."""
+        """Mean (B, m) and variance (B, m) of uniform particles in the bins of z (B, m), weighted by N(z; x, R_aa)."""
         mean, variance = np.empty_like(z), np.empty_like(z)
         for a, edges in enumerate(self.edges):
             bin_ = np.clip(np.searchsorted(edges, z[:, a], side="right") - 1, 0, len(edges) - 2)
@@ -68,7 +70,7 @@ class UniformBinsBank(KalmanBank):
             mean[:, a] = (weight * x).sum(axis=1)
             spread = (weight * (x - mean[:, a, None]) ** 2).sum(axis=1)
             spacing = (edges[bin_ + 1] - edges[bin_]) / self.number
-            variance[:, a] = spread + spacing**2  # often a single particle has all the weight, and is this far off
+            variance[:, a] = spread + spacing**2  # often a single particle has all the weight: its error
         return mean, variance
 
 

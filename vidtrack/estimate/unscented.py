@@ -1,24 +1,24 @@
-"""The unscented bank: sensors and motion seen through sigma points instead of derivatives."""
+"""The unscented bank: sensor and motion by sigma points in place of derivatives."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.sensor import Sensor, wrapped
-from vidtrack.scan import Floats
 
 
 class UnscentedBank(KalmanBank):
-    """Unscented Kalman filters in rows (Julier and Uhlmann 2004).
+    """Unscented Kalman filters, one per row (Julier and Uhlmann 2004).
 
     2 n + 1 points: the mean, and the mean plus and minus the columns of sqrt((n + k) P), weights k / (n + k) and
-    1 / (2 n + 2 k), with k = max(0, 3 - n), so that no weight is negative. The predicted measurement is linearised
-    statistically, H = P_zx P^-1; what H P H' lacks of the points' own spread is the excess.
+    1 / (2 n + 2 k), with k = max(0, 3 - n), so that no weight is negative. Statistical linearisation: H = P_zx P^-1,
+    and the excess is the covariance of the points' measurements minus H P H'.
     """
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
-        """x, P after dt seconds, from the points moved each by its own motion; changes nothing."""
+        """x, P after dt seconds, from the points, each moved by its own F; changes nothing."""
         n = self.x.shape[1]
         points, weight = sigma_points(self.x, self.P)
         flat = points.reshape(-1, n)
@@ -29,12 +29,12 @@ class UnscentedBank(KalmanBank):
         return x, _spread(weight, moved - x[:, None], moved - x[:, None]) + Q
 
     def linearised(self, sensor: Sensor) -> tuple[Floats, Floats, Floats]:
-        """zhat (T, m), H (T, m, n), excess (T, m, m) from the points as the sensor would see them."""
+        """zhat (T, m), H (T, m, n), excess (T, m, m) from the expected measurements of the points."""
         rows, n = self.x.shape
         points, weight = sigma_points(self.x, self.P)
         seen = sensor.h(points.reshape(-1, n), self.model.position)
         seen = seen.reshape(rows, len(weight), seen.shape[1])
-        off = seen - seen[:, :1]  # about the middle point, so that angles near +-pi are averaged the short way round
+        off = seen - seen[:, :1]  # relative to the middle point, so that angles near +-pi average correctly
         off = wrapped(off.reshape(-1, off.shape[2]), sensor.angles).reshape(off.shape)
         mean = np.einsum("s,tsa->ta", weight, off)
         off -= mean[:, None]

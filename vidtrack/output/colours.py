@@ -1,4 +1,4 @@
-"""One colour for an identity, in every picture of it."""
+"""Colours of track ids, the same in all outputs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Colour = tuple[int, ...]
 
 
 def colour(track_id: int) -> Colour:
-    """Blue, green, red of an identity; neighbouring numbers are far apart in hue."""
+    """Blue, green, red of a track id; consecutive ids differ strongly in hue."""
     return _hue(track_id % 256)
 
 

@@ -1,4 +1,4 @@
-"""Rows of tracks that turn out to be real: scans wait until each tentative track in them is confirmed or gone."""
+"""Delays steps until each tentative track in them is confirmed or deleted, and passes on the confirmed ones."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.scan import TENTATIVE
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.threaded import close_together
+from vidtrack.tracks import TENTATIVE
 
 
 @dataclass(slots=True)
@@ -19,16 +20,16 @@ class _Held:
 
 
 HOLD_S = 2.0
-"""How long rows wait for their track to be confirmed."""
+"""s; longest time that rows wait for the confirmation of their track."""
 LIVE_HOLD_S = 0.7
-"""The same in live runs, and when their recordings are repeated: what waits is lost in a kill."""
+"""s; the same in live runs and their repetitions: a kill loses the waiting rows."""
 
 
 class Confirmed:
-    """Passes steps on to `sinks`, without pictures and with confirmed tracks only, from their first measurement.
+    """Passes steps on to `sinks` without pictures and with confirmed tracks only, from their first measurement.
 
-    Steps arrive late but in order. A track that is still tentative after `hold_s` loses its earlier rows:
-    memory stays bounded whatever the tracker does.
+    Steps are delayed, in order. A track that is still tentative after `hold_s` loses its earlier rows, which bounds
+    the memory.
     """
 
     def __init__(self, *sinks: Sink, hold_s: float = HOLD_S) -> None:
@@ -38,7 +39,7 @@ class Confirmed:
         self._undecided: set[int] = set()
 
     def step(self, step: Step) -> None:
-        """Take a frame's results; pass on those that are decided."""
+        """Receive a step; pass on the steps without undecided tracks."""
         tentative = step.tracks.status == TENTATIVE
         undecided = set(step.tracks.id[tentative].tolist())
         decided = self._undecided - undecided
@@ -53,7 +54,7 @@ class Confirmed:
             self._release(self._held.popleft())
 
     def close(self) -> None:
-        """Pass on what waits, without the tracks that nobody confirmed."""
+        """Pass on the waiting steps, without unconfirmed tracks."""
         try:
             while self._held:
                 self._release(self._held.popleft())

@@ -1,4 +1,4 @@
-"""counts.csv: the evidence for each count."""
+"""counts.csv: one row per line crossing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ HEADER = "time_s,frame,line,direction,track_id\n"
 
 
 class CountsFile:
-    """Sink that steps `counter` and writes its crossings; `close` sorts them by time."""
+    """Sink that runs `counter` and writes its crossings; `close` sorts them by time."""
 
     def __init__(self, path: Path, counter: LineCounter) -> None:
         self._counter = counter
@@ -24,7 +24,7 @@ class CountsFile:
         self._file.add(crossing_lines(self._counter.step(step.index, step.tracks)))
 
     def close(self) -> None:
-        """Count tracks that were last seen beyond a line."""
+        """Count tracks whose last position is beyond a line, and sort."""
         try:
             self._file.add(crossing_lines(self._counter.close()))
         finally:
@@ -33,5 +33,5 @@ class CountsFile:
 
 
 def crossing_lines(crossings: Iterable[Crossing]) -> str:
-    """Rows of counts.csv under HEADER."""
+    """Rows of counts.csv, in the columns of HEADER."""
     return "".join(f"{c.time_s:.6f},{c.frame},{c.line},{c.direction},{c.track_id}\n" for c in crossings)

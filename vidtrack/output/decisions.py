@@ -1,20 +1,20 @@
-"""decisions.csv: why each track did what it did."""
+"""decisions.csv: the reasons of each association and of each change of status."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from vidtrack.decision import Choices, Event
 from vidtrack.output.linefile import LineFile
 from vidtrack.output.sink import Step
-from vidtrack.scan import Choices, Event
 
 HEADER = "time_s,track_id,event,measurement,weight,d2,gate,runner_up,runner_up_d2,candidates,reason\n"
 
 
 class DecisionLog:
-    """Sink that writes one row per track and scan (event "update" or "miss") and one per event of a track's life.
+    """Sink that writes one row per track and scan (event "update" or "miss") and one per change of status.
 
-    Tentative tracks are included: the reasons for their deaths are what one looks for.
+    Tentative tracks are included, with the reasons of their deletion.
 
     index  name of the first column, "frame" or "scan"
     """
@@ -23,14 +23,14 @@ class DecisionLog:
         self._file = LineFile(path, f"{index},{HEADER}")
 
     def step(self, step: Step) -> None:
-        """Write what was decided in one scan."""
+        """Write the decisions of one scan."""
         start = f"{step.index},{step.time_s:.6f}"
         choices = () if step.tracks.choices is None else _choice_rows(step.tracks.choices)
         rows = [*choices, *map(_event_row, step.tracks.events)]
         self._file.add("".join(f"{start},{row}\n" for row in rows))
 
     def close(self) -> None:
-        """Write what waits."""
+        """Write the rest and close the file."""
         self._file.close()
 
 
@@ -62,7 +62,7 @@ def _event_row(event: Event) -> str:
 
 
 def _candidates(measurements: list[int], weights: list[float], d2: list[float]) -> str:
-    """measurement:weight:d2 of each."""
+    """Candidates as measurement:weight:d2, separated by semicolons."""
     found = zip(measurements, weights, d2, strict=True)
     return ";".join(f"{j}:{_real(weight)}:{_real(distance)}" for j, weight, distance in found if j >= 0)
 

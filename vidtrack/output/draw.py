@@ -1,4 +1,4 @@
-"""Tracks drawn on pictures: one colour for an identity, dashes where nothing was measured."""
+"""Draws tracks on pictures: one colour per track id, dashed without a measurement."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vidtrack import plane
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats
 from vidtrack.output.colours import Colour, colour
-from vidtrack.scan import Floats, Status, Tracks
+from vidtrack.tracks import Status, Tracks
 from vidtrack.traffic.lines import Line, counted
 from vidtrack.video.frame import Image
 
@@ -28,7 +29,7 @@ Patch = tuple[slice, slice]
 
 
 class Pen:
-    """Draws on one picture, with strokes and letters in proportion to it."""
+    """Draws on one picture, with strokes and letters scaled to its size."""
 
     def __init__(self, picture: Image) -> None:
         self.picture = picture
@@ -60,7 +61,7 @@ class Pen:
         return width + 4, height + 2
 
     def label(self, text: str, left: float, bottom: float, ink: Colour) -> Patch:
-        """Black or white text on a patch of colour, kept inside the picture; returns the patch."""
+        """Black or white text on a coloured patch inside the picture; returns the patch."""
         width, height = self.size(text)
         x = int(np.clip(left, 0, max(0, self.picture.shape[1] - width)))
         y = int(np.clip(bottom, height, self.picture.shape[0]))
@@ -71,13 +72,13 @@ class Pen:
 
 
 def draw_trails(pen: Pen, paths: Mapping[int, Floats]) -> None:
-    """The recent way of each track."""
+    """The recent path of each track."""
     for track_id, path in paths.items():
         pen.path(path, colour(track_id))
 
 
 def draw_tracks(pen: Pen, tracks: Tracks) -> None:
-    """Boxes and numbers: thin grey tentative, dashed coasting, one common label for tracks that share a blob."""
+    """Boxes and ids: tentative thin and grey, coasting dashed, one label for tracks that share a blob."""
     boxes = np.where(np.isnan(tracks.box), np.hstack([tracks.xy[:, :2] - 3, np.full((len(tracks), 2), 6)]), tracks.box)
     for track_id, status, box, group in zip(tracks.id.tolist(), tracks.status, boxes, tracks.group, strict=True):
         if status == Status.TENTATIVE:
@@ -95,21 +96,21 @@ def draw_tracks(pen: Pen, tracks: Tracks) -> None:
 
 
 def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str, int]] | None = None) -> list[Patch]:
-    """Counting lines with their names and, given totals, their counts; returns where these stand."""
+    """Counting lines with their names and, given totals, their counts; returns the patches of the labels."""
     for line in lines:
         pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE)
     return [pen.label(counted(k.name, (totals or {}).get(k.name, {})), k.x1, k.y1, LINE) for k in lines]
 
 
 def moved_lines(lines: Sequence[Line], motion: Floats | None) -> list[Line]:
-    """The lines where the road is in a picture; motion (2, 3) from the scene to it, None: where it was."""
+    """The lines in the current picture; motion (2, 3) from the scene to the picture, None: identity."""
     if motion is None:
         return list(lines)
-    ends = [plane.points(motion, np.array([[k.x1, k.y1], [k.x2, k.y2]])).ravel().tolist() for k in lines]
+    ends = [affine.points(motion, np.array([[k.x1, k.y1], [k.x2, k.y2]])).ravel().tolist() for k in lines]
     return [Line(k.name, *end) for k, end in zip(lines, ends, strict=True)]
 
 
 def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:
-    """Time of the picture and other facts in its lower left corner."""
+    """Time and other text in the lower left corner."""
     minutes, seconds = divmod(time_s, 60)
     pen.label("  ".join([f"{int(minutes)}:{seconds:06.3f}", *facts]), 0, pen.picture.shape[0], GREY)

@@ -1,4 +1,4 @@
-"""The folder of one run: made before anything is computed, so that a wrong place costs no time."""
+"""The folder of one run, checked before the computation, and safe writing of its files."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ RESULTS = (
     "tracks.png",
     "decisions.csv",
 )
-"""Everything a run writes into its folder; `--force` replaces these and leaves other files alone."""
+"""All files of a run's folder; `--force` replaces these and keeps other files."""
 
 
 def open_folder(path: Path | None, name: str, force: bool) -> Path:
-    """A folder to write into.
+    """A writable folder, made if necessary.
 
-    path    the folder asked for; None: `runs/<name>`, then `runs/<name>-2`, ...
-    force   `path` may hold other files
+    path    the requested folder; None: `runs/<name>`, then `runs/<name>-2`, ...
+    force   `path` may contain other files
 
-    Raises OutputError when the folder cannot be made or written, or `path` is not empty and `force` is off.
+    Raises OutputError if the folder cannot be made or written, or if `path` is not empty and `force` is False.
     """
     return usable(_next_free(name) if path is None else _asked_for(path, force))
 
 
 def open_run(path: Path | None, source_name: str, force: bool) -> Path:
-    """The folder for a run's results as `open_folder`; with `force` those of an earlier run in it are deleted."""
+    """A folder for a run's results, see `open_folder`; `force` deletes the results of an earlier run in it."""
     folder = open_folder(path, source_name, force)
     if force:
         try:
@@ -51,9 +51,9 @@ def open_run(path: Path | None, source_name: str, force: bool) -> Path:
 
 @contextmanager
 def begun(path: Path | None, source_name: str, force: bool) -> Iterator[Path]:
-    """The folder for a run's results; what was put there is taken away again if the block, the run's start, fails.
+    """A folder for a run's results; if the `with` block, the run's start, fails, the results are deleted.
 
-    Raises OutputError as open_run.
+    Raises OutputError as `open_run`.
     """
     folder = open_run(path, source_name, force)
     try:
@@ -64,21 +64,21 @@ def begun(path: Path | None, source_name: str, force: bool) -> Iterator[Path]:
 
 
 def withdraw(folder: Path) -> None:
-    """Take a run's results away again, and the folder if nothing else is in it."""
+    """Delete a run's results, and the folder if it is then empty."""
     with suppress(OSError):
         _remove_results(folder)
         folder.rmdir()
 
 
-def spare(read: Path, *written: Path | None) -> None:
-    """Raise OutputError if one of the places to write to is the file, or the folder, that is read."""
+def refuse_overwriting(read: Path, *written: Path | None) -> None:
+    """Raise OutputError if an output path is the input path."""
     for path in written:
         if path is not None and path.resolve() == read.resolve():
             raise OutputError(f"{path} is what is to be read; choose another place for the results")
 
 
 def usable(folder: Path) -> Path:
-    """The folder, made if there is none, when files can be written into it. Raises OutputError."""
+    """The folder, made if necessary. Raises OutputError if no file can be written into it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -89,7 +89,7 @@ def usable(folder: Path) -> Path:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn a failing disk into StoppedEarly, naming the file: full, unplugged, deleted meanwhile."""
+    """Turn a write error of this file into StoppedEarly: disk full, unplugged, file deleted."""
     try:
         yield
     except OSError as error:
@@ -101,7 +101,7 @@ def writing(path: Path) -> Iterator[None]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path to write the new content of `path` to: a reader sees the old file or the new one, never half of it."""
+    """A temporary path that replaces `path` atomically when the block ends: readers see the old or the new content."""
     new = path.with_name(path.name + ".new")
     with writing(path):
         try:
@@ -113,14 +113,14 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def append(file: FileIO, block: bytes) -> None:
-    """Write all of `block` at the end of an unbuffered file; when the disk refuses, raise OSError and write none."""
+    """Append `block` to an unbuffered file; on a write error remove the partial block and raise OSError."""
     start = file.tell()
     rest = memoryview(block)
     try:
         while rest:
             rest = rest[file.write(rest) :]
     except OSError:
-        with suppress(OSError):  # the disk may be gone altogether; the first error says more
+        with suppress(OSError):  # the disk may be gone; report the first error
             file.truncate(start)
             file.seek(start)
         raise

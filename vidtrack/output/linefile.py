@@ -1,4 +1,4 @@
-"""Text files that stay readable whatever happens: whole lines only, on disk about every second."""
+"""Text files that stay readable after a crash or kill: they are written in whole lines, about once a second."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vidtrack.output.folder import append, replacing, writing
 
 
 class Every:
-    """True once per `seconds` of the monotonic clock."""
+    """Returns True at most once per `seconds` of the monotonic clock."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
@@ -25,37 +25,37 @@ class Every:
 
 
 class LineFile:
-    """A growing text file. Raises StoppedEarly when the disk refuses, cut back to its last whole line."""
+    """A growing text file. On a write error it is cut back to its last whole line and raises StoppedEarly."""
 
     def __init__(self, path: Path, header: str = "") -> None:
         self.path = path
         self._due = Every(1.0)
         self._waiting: list[str] = []
-        replace_text(path, header)  # never without it, not even for a moment
+        replace_text(path, header)  # atomically with its header
         with writing(path):
-            # Unbuffered: what a failed write left in a buffer would fail again on closing.
+            # Unbuffered: a buffer left by a failed write would fail again on closing.
             self._file = open(path, "ab", buffering=0)  # noqa: SIM115
 
     def add(self, lines: str) -> None:
-        """Take whole lines; call it for every scan, also with none, so that earlier ones reach the disk in time."""
+        """Append whole lines; call it for every scan, also without lines, so that earlier ones are written in time."""
         self._waiting.append(lines)
         if self._due():
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything to the operating system."""
+        """Pass all lines to the operating system."""
         block = "".join(self._waiting).encode()
         self._waiting.clear()
         with writing(self.path):
             append(self._file, block)
 
     def sync(self) -> None:
-        """Wait until everything handed over is on the disk, safe from a power cut."""
+        """Wait until all flushed lines are on the disk."""
         with writing(self.path):
             os.fdatasync(self._file.fileno())
 
     def close(self) -> None:
-        """Write what waits."""
+        """Write the rest and close the file."""
         try:
             self.flush()
         finally:
@@ -63,7 +63,7 @@ class LineFile:
 
 
 def drop_partial_line(path: Path) -> None:
-    """Cut a line that was being written when the process was killed."""
+    """Remove an incomplete last line, left by a killed process."""
     with writing(path), open(path, "r+b") as file:
         content = file.read()
         file.truncate(content.rfind(b"\n") + 1)
@@ -80,6 +80,6 @@ def sort_rows(path: Path, columns: int, header: bool) -> None:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write a whole file at once."""
+    """Write a whole file atomically."""
     with replacing(path) as new:
         new.write_text(text)

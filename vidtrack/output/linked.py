@@ -1,4 +1,4 @@
-"""Broken tracks made whole: a track that ends and one that begins a little later are one if motion and size fit."""
+"""Links broken tracks: joins a track that ends with one that begins soon after if motion and size agree."""
 
 from __future__ import annotations
 
@@ -8,33 +8,35 @@ from typing import Any
 
 import numpy as np
 
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.gate import quantile
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError
-from vidtrack.estimate.model import Motion
-from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.rows import starts
-from vidtrack.scan import COASTING, Floats, Ints, Tracks
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.threaded import close_together
 from vidtrack.tracking.boxes import absolute, longer
+from vidtrack.tracks import COASTING, Tracks
 
 PROBABILITY = 0.999
-"""Share of broken tracks whose motion and size are within the gate."""
+"""Probability that the parts of a broken track agree within the gate."""
 SIZE_SIGMA = 0.2
 """Standard deviation of the logarithm of a width or height across a gap."""
 ODDS = 5.0
-"""One object must be this many times as likely as one that begins there by chance."""
+"""Least likelihood ratio of one object against a new object that begins there by chance."""
 SETTLED = 6
-"""Measurements after which a new track's state is taken back to its beginning: by then its velocity is known."""
+"""Measurements after which a new track's velocity is known; its state is then retrodicted to its beginning."""
 
 
 class Linked:
-    """Passes steps on to `sinks` with broken tracks joined under the first one's id, and the gaps filled.
+    """Passes steps on to `sinks` with broken tracks joined under the first id, and the gaps filled.
 
-    motion     the tracker's model, by which a track is taken on across a gap, and the next one back
-    longest_s  s; longest gap between the last measurement of the one and the first of the other
+    motion     the tracker's motion model, which predicts across a gap from both sides
+    longest_s  s; longest gap between the last measurement of one track and the first of the next
 
-    Steps with confirmed tracks wait until no track is there, or could be found again, or the end.
+    Steps wait until no track exists or could continue, or until the end.
     """
 
     def __init__(self, *sinks: Sink, motion: Motion, longest_s: float) -> None:
@@ -45,7 +47,7 @@ class Linked:
         self._there_s = -np.inf
 
     def step(self, step: Step) -> None:
-        """Take a step with confirmed tracks."""
+        """Receive a step with confirmed tracks."""
         if len(step.tracks):
             self._there_s = step.time_s
         elif step.time_s - self._there_s > self._longest_s:
@@ -53,7 +55,7 @@ class Linked:
         self._waiting.append(step)
 
     def close(self) -> None:
-        """Pass on what waits."""
+        """Pass on the waiting steps."""
         try:
             self._release()
         finally:
@@ -68,13 +70,13 @@ class Linked:
 
 
 def refuse_link(settings: OutputSettings, where: str) -> None:
-    """Raise ConfigError where tracks cannot be linked although the settings ask for it."""
+    """Raise ConfigError if output.link is set for a kind of input `where` tracks cannot be linked."""
     if settings.link:
         raise ConfigError(f"output.link has no effect in {where}: tracks are linked off line, by their boxes")
 
 
 def linked(steps: list[Step], motion: Motion, longest_s: float) -> list[Step]:
-    """The steps with broken tracks joined, gaps of at most longest_s [s] filled."""
+    """The steps with broken tracks joined, and gaps of at most longest_s [s] filled."""
     if not any(step.tracks.seen.any() for step in steps):
         return steps
     ends = Ends(steps, motion)
@@ -83,7 +85,7 @@ def linked(steps: list[Step], motion: Motion, longest_s: float) -> list[Step]:
 
 
 class Ends:
-    """Where the tracks of some steps begin and end; rows are tracks in the order of their ids.
+    """First and last states of the tracks of some steps; rows are tracks, sorted by id.
 
     id (T,), first and last (T,) steps with a measurement; head and tail: states x (T, n), P (T, n, n) there, and boxes
     (T, 4) relative to the position
@@ -112,9 +114,9 @@ class Ends:
             self.head_x[rows], self.head_P[rows] = moved
 
     def links(self, longest_s: float) -> tuple[Ints, Ints]:
-        """Rows (L,) that end, and rows (L,) that go on with them at most longest_s [s] later.
+        """Rows (L,) of tracks that end, and rows (L,) of their continuations at most longest_s [s] later.
 
-        One to one, of the largest summed log-likelihood ratio: one object, against another that begins by chance.
+        The one-to-one assignment of largest summed log-likelihood ratio: one object, against a new one by chance.
         """
         before, after, gap = _within(self.time[self.last], self.time[self.first], longest_s)
         ratio = np.log(self.head_box[after, 2:] / self.tail_box[before, 2:]) / SIZE_SIGMA
@@ -136,10 +138,10 @@ class Ends:
         return rows, taken[rows]
 
     def _chance(self, after: Ints, gap: Floats) -> Floats:
-        """(K,) twice the log density with which some track begins like rows `after` (K,) within `gap` seconds (K,).
+        """(K,) twice the log density of new tracks like rows `after` (K,) within `gap` (K,) [s].
 
-        As many begin as did, anywhere in the extent of all boxes, with any of the velocities that they have, and with
-        their sizes.
+        New tracks have the observed rate, are uniform over the extent of all boxes, and have the observed
+        distributions of velocity and size.
         """
         velocity = list(self.motion.velocity)
         v, spread = self.head_x[:, velocity], self.head_P[:, velocity, velocity]
@@ -151,14 +153,14 @@ class Ends:
         return np.asarray(2 * np.log(gap * rate) - len(velocity) * np.log(2 * np.pi * speed2) - alike[after])
 
     def _moved(self, x: Floats, P: Floats, dt: float, box: Floats) -> tuple[Floats, Floats]:
-        """States x (K, n), P (K, n, n) of objects with these boxes, dt seconds later or, if negative, earlier."""
+        """States x (K, n), P (K, n, n) of objects with these boxes, predicted by dt [s], which may be negative."""
         F = self.motion.transition(dt, x)
         Q = self.motion.process_noise(abs(dt), x, P, np.zeros(len(x), np.int64), longer(box))
         noisy = F @ (P + Q) @ np.swapaxes(F, 1, 2) if dt < 0 else F @ P @ np.swapaxes(F, 1, 2) + Q
         return (F @ x[:, :, None])[:, :, 0], noisy
 
     def joined(self, steps: list[Step], before: Ints, after: Ints) -> list[Step]:
-        """The steps with rows `after` (L,) under the ids of rows `before` (L,), and with rows in the gaps."""
+        """The steps with rows `after` (L,) under the ids of rows `before` (L,), and with rows added in the gaps."""
         name, begins, ends = self.id.copy(), np.zeros(len(self.id), np.int64), np.full(len(self.id), len(steps))
         begins[after], ends[before] = self.first[after], self.last[before]
         bridges: dict[int, list[Tracks]] = {}
@@ -180,7 +182,7 @@ class Ends:
         return done
 
     def _bridge(self, row: Tracks, a: int, b: int, t: float) -> Tracks:
-        """The last row of track a, made one at t [s] in its gap before track b: by what both ends say of it."""
+        """A row at t [s] in the gap between tracks a and b, from the predictions of both ends; `row` is a's last."""
         ahead, back = t - self.time[self.last[a]], t - self.time[self.first[b]]
         x0, P0 = self._moved(self.tail_x[[a]], self.tail_P[[a]], ahead, self.tail_box[[a]])
         x1, P1 = self._moved(self.head_x[[b]], self.head_P[[b]], back, self.head_box[[b]])
@@ -195,7 +197,7 @@ class Ends:
 
 
 def _within(ends: Floats, begins: Floats, longest_s: float) -> tuple[Ints, Ints, Floats]:
-    """Rows (L,) that end, in order, others that begin at most longest_s [s] later, and the times between (L,) [s]."""
+    """Rows (L,) that end, in order, rows (L,) that begin at most longest_s [s] later, and the gaps (L,) [s]."""
     order = np.argsort(begins, kind="stable")
     latest = np.nextafter(ends + longest_s, np.inf)
     low, high = (np.searchsorted(begins[order], t, side="right") for t in (ends, latest))
@@ -214,7 +216,7 @@ COLUMNS = (
 
 
 def _together(tracks: Tracks, more: list[Tracks]) -> Tracks:
-    """The tracks with the rows of others, in the order of their ids."""
+    """The tracks and the rows of others, sorted by id."""
     if more:
         columns: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS

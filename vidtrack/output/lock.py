@@ -1,4 +1,4 @@
-"""One run at a time in a place."""
+"""Exclusive locks on folders and files: one run at a time."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if sys.platform != "win32":
 
 @contextmanager
 def exclusive(path: Path) -> Iterator[None]:
-    """Keep other runs out of a folder that exists, or off a file; the system opens it again even after a kill.
+    """Lock an existing folder or a file against other runs; the system releases the lock even after a kill.
 
-    A file's lock is on FILE.lock beside it, for the file itself is replaced when it is written. Where locks are
-    unknown, as on Windows and some network disks, nobody is kept out.
-    Raises OutputError while another run is there, or if the lock file cannot be made.
+    A file is locked by FILE.lock beside it, because the file itself is replaced when written. Without locks, as on
+    Windows and some network disks, nothing is locked.
+    Raises OutputError if another run holds the lock, or if the lock file cannot be made.
     """
     if sys.platform == "win32":
         yield
@@ -36,11 +36,11 @@ def exclusive(path: Path) -> Iterator[None]:
             raise OutputError(f"{path} is in use by another run; end that one first, or choose another place")
         yield
     finally:
-        os.close(handle)  # the file stays: who waits for it may have opened it already
+        os.close(handle)  # the lock file stays: another process may have opened it
 
 
 def lock_file(path: Path) -> Path:
-    """The file whose lock stands for that of `path`."""
+    """The lock file of `path`."""
     return path.with_name(path.name + ".lock")
 
 
@@ -49,6 +49,6 @@ def _locked(handle: int) -> bool:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
-    except OSError:  # no locks on this disk
+    except OSError:  # the file system has no locks
         return True
     return True

@@ -1,4 +1,4 @@
-"""One 0/255 picture a frame: what the detector took for traffic."""
+"""The detector's foreground masks, one 0/255 picture per frame."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.output.sink import Step
 
 
 class MaskFolder:
-    """Sink that writes `%06d.png` at source size, the frame number from 0. Raises OutputError if it cannot be made."""
+    """Sink that writes `%06d.png` by frame number, at source size. Raises OutputError if the folder cannot be made."""
 
     def __init__(self, folder: Path) -> None:
         try:
@@ -27,8 +27,8 @@ class MaskFolder:
             raise ConfigError("stored detections have no masks; leave --save-masks out")
         mask = step.foreground.full_size(step.frame.shape)
         with replacing(self._folder / f"{step.index:06d}.png") as new:
-            # Encoded here and written by Python: cv2.imwrite would not say why it failed.
+            # cv2.imwrite does not report the reason of a failure.
             new.write_bytes(cv2.imencode(".png", mask, [cv2.IMWRITE_PNG_BILEVEL, 1])[1].tobytes())
 
     def close(self) -> None:
-        """Nothing waits."""
+        """Do nothing: each mask is already written."""

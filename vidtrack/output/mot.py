@@ -1,4 +1,4 @@
-"""mot.txt: tracks in MOTChallenge form, for its evaluation tools."""
+"""mot.txt: tracks in the form of MOTChallenge, for its evaluation tools."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.sink import Step
 from vidtrack.output.tables import csv_text, stacked
-from vidtrack.scan import Floats, Ints
 
 _FRAME, _ID, _SEEN = 0, 1, 7
 
@@ -19,9 +19,9 @@ _FRAME, _ID, _SEEN = 0, 1, 7
 class MotFile:
     """Sink that writes `frame,id,left,top,width,height,conf,-1,-1,-1`, frames from 1, sorted by frame and id.
 
-    The rows of a gap wait until the track is found again, and are dropped at its death: nobody saw it go there.
-    Rows of later frames wait with them, so that what is in the file is sorted at any time and memory holds no more
-    than the longest gap. `conf` is the track's probability of existence.
+    The rows of a gap wait until the track is measured again; they are dropped if the track ends first. Rows of later
+    frames wait too, so that the file is always sorted and memory is bounded by the longest gap. `conf` is the track's
+    probability of existence.
     """
 
     def __init__(self, path: Path) -> None:
@@ -31,20 +31,20 @@ class MotFile:
         self._due = Every(1.0)
 
     def step(self, step: Step) -> None:
-        """Take one frame's confirmed tracks."""
+        """Receive one frame's confirmed tracks."""
         self._steps.append(step.in_picture())
         if self._due():
             self.flush()
 
     def close(self) -> None:
-        """Write what waits; gaps that stayed open are dropped."""
+        """Write the waiting rows without those of open gaps."""
         try:
             self._write(alive=np.empty(0, np.int64))
         finally:
             self._file.close()
 
     def flush(self) -> None:
-        """Write what is decided by now."""
+        """Write the rows before the first open gap."""
         if self._steps:
             self._write(alive=self._steps[-1].tracks.id)
 
@@ -57,7 +57,7 @@ class MotFile:
 
 
 def _rows(steps: Sequence[Step]) -> Floats:
-    """(N, 8) frame, id, left, top, width, height, conf, seen; without tracks that have no box."""
+    """(N, 8) frame, id, left, top, width, height, conf, seen; tracks without a box are left out."""
     frame = np.repeat([step.index + 1 for step in steps], [len(step.tracks) for step in steps])
     box, existence = stacked(steps, "box"), stacked(steps, "existence")
     conf = np.where(np.isnan(existence), 1.0, existence)
@@ -66,11 +66,10 @@ def _rows(steps: Sequence[Step]) -> Floats:
 
 
 def settle_gaps(rows: Floats, alive: Ints) -> tuple[Floats, Floats]:
-    """Rows that can be written, and those that wait: from the first gap on that may still be closed.
+    """Rows to write now, and rows that wait: those from the first open gap on.
 
-    rows   (N, 8) see _rows, sorted by frame; a row that was not seen counts once its track was seen later, and
-           not at all if the track died before
-    alive  ids of the tracks that may be found again
+    rows   (N, 8) see _rows, sorted by frame; an unseen row is written if its track is seen later, else dropped
+    alive  ids of the tracks that may still be seen again
     """
     frame, seen = rows[:, _FRAME], rows[:, _SEEN] > 0
     ids, index = np.unique(rows[:, _ID], return_inverse=True)

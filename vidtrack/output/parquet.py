@@ -1,4 +1,4 @@
-"""Parquet in closed parts: a file without its footer is lost, so each part gets its own until the end."""
+"""Writes Parquet in closed parts: a file without its footer is unreadable, so a kill loses only the open part."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import pyarrow.parquet as pq
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 
-_PART_ROWS = 20_000  # 3 MB: what waits in memory, and what the one file keeps together
+_PART_ROWS = 20_000  # 3 MB: rows buffered in memory, and rows in a group of the final file
 _PART_S = 60.0
 
 
 class ParquetParts:
-    """Writes `NAME.parts/000000.parquet`, ...; on closing they become the one file NAME.
+    """Writes `NAME.parts/000000.parquet`, ...; `close` joins them to the file NAME.
 
-    A killed run leaves the parts, each readable (`pyarrow.parquet.read_table` takes the folder).
+    A killed run leaves the parts, each readable (`pyarrow.parquet.read_table` reads the folder).
     """
 
     def __init__(self, path: Path, schema: pa.Schema) -> None:
@@ -32,13 +32,13 @@ class ParquetParts:
         self._due = Every(_PART_S)
 
     def add(self, rows: pa.Table) -> None:
-        """Take rows; close a part before them when it is large or old enough."""
+        """Add rows; close the part before them if it is large or old enough."""
         if self._waiting and (self._due() or sum(len(table) for table in self._waiting) >= _PART_ROWS):
             self._close_part()
         self._waiting.append(rows)
 
     def close(self) -> None:
-        """Join all parts to one file."""
+        """Join all parts into one file."""
         parts = (pq.read_table(self._part(i)) for i in range(self._count))
         last = pa.concat_tables([self._schema.empty_table(), *self._waiting])
         write_parquet(self._path, self._schema, chain(parts, [last]))
@@ -58,7 +58,7 @@ class ParquetParts:
 
 
 def _grouped(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
-    """The same rows in tables of at least _PART_ROWS, but for the last."""
+    """The same rows in tables of at least _PART_ROWS rows, except the last."""
     group: list[pa.Table] = []
     for table in tables:
         group.append(table)
@@ -70,12 +70,12 @@ def _grouped(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
 
 
 def parts_folder(path: Path) -> Path:
-    """Where the parts of a Parquet file are while it is being written."""
+    """Folder of the parts of an unfinished Parquet file."""
     return path.with_name(path.name + ".parts")
 
 
 def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
-    """Write the tables one after the other; the file appears when it is complete."""
+    """Write the tables to one file, which appears when it is complete."""
     with replacing(path) as new, pq.ParquetWriter(new, schema) as writer:
         for table in _grouped(tables):
             writer.write_table(table)

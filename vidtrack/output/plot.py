@@ -1,4 +1,4 @@
-"""tracks.png: where the traffic went, over the scene without traffic."""
+"""tracks.png: the paths of all tracks over the background."""
 
 from __future__ import annotations
 
@@ -8,31 +8,32 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Patch, Pen, draw_lines
 from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Tracks
+from vidtrack.tracks import Tracks
 from vidtrack.traffic.lines import Line
 from vidtrack.video.frame import Image
 
 _SIDE = 960
-"""Pixels; smaller pictures are enlarged to about this, or their numbers could not be read."""
+"""px; smaller pictures are enlarged so that their longer side is about this, for readable ids."""
 
 _BATCH = 50
-"""Frames that are drawn together: one call for a stroke costs as much as one for a segment."""
+"""Frames drawn together: one call per stroke costs as much as one per segment."""
 
 _NUMBERED = 150
-"""Most tracks that get their number; in a longer run the last ones do."""
+"""Largest number of ids drawn; the last tracks get them."""
 
 
 class TrajectoryPlot:
-    """Sink that draws each confirmed track as it moves, so memory does not grow with the run.
+    """Sink that draws the confirmed tracks during the run, so that memory does not grow.
 
     shape   (H, W) of the source
-    scene   gives the (H, W, 3) background when the run ends; None: plain grey
-    totals  gives the counts by line and direction when the run ends; None: lines show their names only
+    scene   returns the (H, W, 3) background at the end of the run; None: plain grey
+    totals  returns the counts by line and direction at the end of the run; None: lines show names only
     """
 
     def __init__(
@@ -49,23 +50,23 @@ class TrajectoryPlot:
         self._totals = totals
         self._shape = shape
         self._zoom = max(1, round(_SIDE / max(shape)))
-        # Colour times opacity, and opacity: anti-aliased strokes then blend exactly.
+        # Premultiplied colour and opacity, which blend anti-aliased strokes exactly.
         self._layer = np.zeros((shape[0] * self._zoom, shape[1] * self._zoom, 4), np.uint8)
         self._pen = Pen(self._layer)
-        self._stepped = False  # before the first frame there is no scene to ask for
+        self._stepped = False  # there is no scene before the first frame
         self._waiting: list[Tracks] = []
-        self._id, self._xy = np.empty(0, np.int64), np.empty((0, 2))  # last drawn point of each living track
+        self._id, self._xy = np.empty(0, np.int64), np.empty((0, 2))  # last drawn point of each current track
         self._ends: dict[int, Floats] = {}
 
     def step(self, step: Step) -> None:
-        """Extend the trajectories by one frame's confirmed tracks; a coasted gap becomes a straight line."""
+        """Extend the paths by one frame's confirmed tracks; a coasted gap becomes a straight line."""
         self._stepped = True
         self._waiting.append(step.tracks)
         if len(self._waiting) == _BATCH:
             self._draw()
 
     def _draw(self) -> None:
-        """One stroke for all that a track moved since the last call."""
+        """Draw one stroke per track, from its last drawn point."""
         if not self._waiting:
             return
         ids = np.concatenate([self._id, *(t.id[t.seen] for t in self._waiting)])
@@ -76,7 +77,7 @@ class TrajectoryPlot:
         for track_id, path in zip(self._id.tolist(), paths, strict=True):
             self._pen.path(path * self._zoom, (*colour(track_id), 255), width=2)
             self._ends.pop(track_id, None)
-            self._ends[track_id] = path[-1].copy()  # or it would keep all points of the batch
+            self._ends[track_id] = path[-1].copy()  # a view would keep the whole batch in memory
         self._xy = np.array([path[-1] for path in paths]).reshape(-1, 2)
         alive = np.isin(self._id, self._waiting[-1].id)
         self._id, self._xy = self._id[alive], self._xy[alive]
@@ -94,11 +95,11 @@ class TrajectoryPlot:
         zoom = self._zoom
         enlarged = [Line(k.name, zoom * k.x1, zoom * k.y1, zoom * k.x2, zoom * k.y2) for k in self._lines]
         self._number(pen, draw_lines(pen, enlarged, self._totals() if self._totals else None))
-        with replacing(self._path) as new:  # half a picture would look like one
+        with replacing(self._path) as new:  # a partial file would look complete
             new.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
 
     def _number(self, pen: Pen, taken: Sequence[Patch]) -> None:
-        """Each track's number at its end, or in the nearest free place above or below."""
+        """Draw each track's id at its end, or at the nearest free place above or below."""
         free = np.ones(self._layer.shape[:2], bool)
         for patch in taken:
             free[patch] = False
@@ -116,7 +117,7 @@ class TrajectoryPlot:
 
 @kernel
 def _lay_over(layer: Image, picture: Image) -> None:
-    """Blend a layer (h, w, 4), colours times opacity and the opacity, over the picture (h, w, 3); both uint8."""
+    """Blend a layer (h, w, 4), premultiplied colours and opacity, over the picture (h, w, 3); both uint8."""
     white = np.float32(255)
     for y in range(picture.shape[0]):
         for x in range(picture.shape[1]):

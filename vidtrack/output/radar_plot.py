@@ -1,4 +1,4 @@
-"""tracks.png of a radar run: plots and tracks in kilometres, as seen from above."""
+"""tracks.png of a radar run: plots and tracks in the horizontal plane, in kilometres."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.output.colours import colour
 from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 _NUMBERED = 60
-"""Most tracks that get their number; with more of them nothing could be read."""
+"""Largest number of ids drawn; more would be unreadable."""
 
 
 class RadarPlot:
-    """Sink that draws all plots in grey and each track in its colour, its number at its end.
+    """Sink that draws all plots in grey and each track in its colour, with its id at its end.
 
     radar  (x, y) of the radar
     """
@@ -29,7 +30,7 @@ class RadarPlot:
         self._tracks: dict[int, list[Floats]] = {}
 
     def step(self, step: Step) -> None:
-        """Keep one scan."""
+        """Store the plots and tracks of one scan."""
         if len(step.scan):
             self._plots.append(located(step.scan)[:, :2].astype(np.float32))
         for track_id, xy in zip(step.tracks.id.tolist(), step.tracks.xy[:, :2], strict=True):

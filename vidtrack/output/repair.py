@@ -1,4 +1,4 @@
-"""Makes a run folder whole again after its process was killed."""
+"""Repairs the folder of a killed run."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from vidtrack.output.linefile import drop_partial_line, replace_text, sort_rows
 from vidtrack.output.parquet import parts_folder, write_parquet
 from vidtrack.output.tables import layout, schema
 
-_BLOCK = 1 << 20  # bytes of text that are read at a time
+_BLOCK = 1 << 20  # bytes of text read at a time
 
 
 def repair(folder: Path) -> int:
-    """Rebuild tracks.parquet from tracks.csv, cut half-written lines; returns the number of rows.
+    """Rebuild tracks.parquet from tracks.csv, remove incomplete lines; returns the number of rows.
 
-    A summary of a killed run stays marked as interrupted; its tracks and counts are taken from the tables.
-    Raises FormatError when `folder` holds no tracks.csv or a damaged one.
+    summary.json stays marked as interrupted; its tracks and counts are taken from the tables.
+    Raises FormatError if tracks.csv is missing or damaged.
     """
     for name in ("tracks.csv", "mot.txt", "counts.csv", "decisions.csv"):
         if (folder / name).is_file():
@@ -40,19 +40,19 @@ def repair(folder: Path) -> int:
 
 
 def add_parquet(folder: Path) -> None:
-    """Make tracks.parquet of tracks.csv, a block at a time. Raises FormatError, and StoppedEarly on a full disk."""
+    """Write tracks.parquet from tracks.csv, block by block. Raises FormatError, and StoppedEarly on a full disk."""
     wanted, blocks = _blocks(folder / "tracks.csv")
     write_parquet(folder / "tracks.parquet", wanted, blocks)
 
 
 def read_tracks(path: Path) -> pa.Table:
-    """The table in a tracks.csv, with units in its schema. Raises FormatError."""
+    """Read a tracks.csv, with units in the schema. Raises FormatError."""
     wanted, blocks = _blocks(path)
     return pa.concat_tables([wanted.empty_table(), *blocks])
 
 
 def _blocks(path: Path) -> tuple[pa.Schema, Iterator[pa.Table]]:
-    """What is in a tracks.csv, a block at a time. Raises FormatError, now or later."""
+    """Schema and blocks of a tracks.csv, read lazily. Raises FormatError, now or while iterating."""
     try:
         with path.open() as file:
             wanted = schema(layout(file.readline().strip().split(",")))

@@ -1,4 +1,4 @@
-"""A finished run as steps again, so that any sink can show it."""
+"""Reads a finished run as steps, so that any sink can show it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ import cv2
 import numpy as np
 import pyarrow as pa
 
-from vidtrack.config import Settings, parse
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.load import parse
+from vidtrack.config.settings import Settings
 from vidtrack.errors import FormatError
 from vidtrack.output.repair import read_tracks
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import Scan
+from vidtrack.tracks import Status, Tracks
 from vidtrack.video.frame import Frame, Image
 
 _NO_BLOBS = (np.empty((0, 2)), np.eye(2))
@@ -23,10 +26,10 @@ _NO_BLOBS = (np.empty((0, 2)), np.eye(2))
 
 @dataclass(frozen=True, slots=True)
 class FinishedRun:
-    """A run folder's contents.
+    """The contents of a run folder.
 
     source    name of the input
-    shape     (H, W) of its pictures; None for a radar's run
+    shape     (H, W) of the pictures; None for a radar run
     table     tracks.csv
     """
 
@@ -38,7 +41,7 @@ class FinishedRun:
 
 
 def read_run(folder: Path) -> FinishedRun:
-    """Read a run folder. Raises FormatError when it has no tracks.csv or summary.json, or a damaged one."""
+    """Read a run folder. Raises FormatError if tracks.csv or summary.json is missing or damaged."""
     table = read_tracks(folder / "tracks.csv")
     path = folder / "summary.json"
     try:
@@ -52,16 +55,16 @@ def read_run(folder: Path) -> FinishedRun:
 
 
 def background(folder: Path, shape: tuple[int, int]) -> Image:
-    """tracks.png in source size (H, W), grey without one."""
+    """tracks.png at source size (H, W); plain grey if it is missing."""
     path = folder / "tracks.png"
-    picture = cv2.imread(str(path)) if path.is_file() else None  # OpenCV would complain aloud
+    picture = cv2.imread(str(path)) if path.is_file() else None  # OpenCV prints a warning for a missing file
     if picture is None:
         return np.full((*shape, 3), 60, np.uint8)
     return np.asarray(cv2.resize(picture, shape[::-1], interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def steps(run: FinishedRun, frames: Iterable[Frame] | None = None) -> Iterator[Step]:
-    """The run step by step: the source's frames, or without them all of the table from its first to its last."""
+    """The steps of the run: for the source's frames, or without them for all frames of the table's span."""
     columns = {name: run.table[name].to_numpy() for name in run.table.column_names}
     statuses = {status.name.lower(): status for status in Status}
     columns["status"] = np.array([statuses[word] for word in columns["status"]], np.int8)
@@ -75,7 +78,7 @@ def steps(run: FinishedRun, frames: Iterable[Frame] | None = None) -> Iterator[S
 
 
 def _table_times(number: Ints, time_s: Floats) -> Iterator[tuple[int, float, None]]:
-    """Number and time of each frame; one without tracks is not in the table, so its time is interpolated."""
+    """Number and time of each frame; the time of a frame without tracks is interpolated."""
     frames, first = np.unique(number, return_index=True)
     if not len(frames):
         return
@@ -85,7 +88,7 @@ def _table_times(number: Ints, time_s: Floats) -> Iterator[tuple[int, float, Non
 
 
 def _tracks(t: float, rows: dict[str, np.ndarray]) -> Tracks:
-    """Tracks of one frame; what the table does not hold is NaN, and velocities have no covariance."""
+    """Tracks of one frame; values missing in the table are NaN, and velocities have no covariance."""
     count = len(rows["track_id"])
     unknown = np.full(count, np.nan)
     unit = "m" if "x_m" in rows else "px"

@@ -1,4 +1,4 @@
-"""A picture with a grid of metres on the road: whether a calibration is right is seen at a glance."""
+"""Draws a metric grid on the road, to check a calibration by eye."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.output.draw import Pen
 from vidtrack.output.folder import replacing
-from vidtrack.scan import Floats
 from vidtrack.traffic.ground import Ground
 from vidtrack.video.frame import Image
 
@@ -20,9 +20,9 @@ _SAMPLES = 200
 
 
 def draw_grid(path: Path, picture: Image, ground: Ground, points: Floats, fitted: Floats) -> float:
-    """Write a PNG of the picture (H, W, 3) with a grid where the calibration holds; the grid's step in metres.
+    """Write a PNG of the picture (H, W, 3) with a grid where the calibration is valid; returns the grid's step [m].
 
-    points, fitted  (N, 2) the calibration's points in the picture, red, and where the homography puts them, green
+    points, fitted  (N, 2) [px] calibration points, red, and their positions by the homography, green
     """
     drawn = picture.copy()
     pen = Pen(drawn)

@@ -1,4 +1,4 @@
-"""Smoothed results: rows wait for what comes after them."""
+"""Smooths results: steps wait for later measurements."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.estimate.smoother import smoothed
-from vidtrack.output.sink import Sink, Step, close_together
-from vidtrack.scan import Tracks
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.threaded import close_together
 from vidtrack.tracking.boxes import absolute
+from vidtrack.tracks import Tracks
 
 
 class Smoothed:
-    """Passes steps on to `sinks` with the states of all tracks smoothed, boxes moved along.
+    """Passes steps on to `sinks` with smoothed states; boxes are moved along.
 
-    lag_s  s; steps wait until so much has come after them, at most twice as long; None: until no track goes on from
-           one step to the next, or the end
+    lag_s  s; steps wait for one to two times this; None: until no track continues from one step to the next, or the
+           end
     """
 
     def __init__(self, *sinks: Sink, lag_s: float | None = None) -> None:
@@ -27,23 +28,23 @@ class Smoothed:
         self._waiting: deque[Step] = deque()
 
     def step(self, step: Step) -> None:
-        """Take a step with confirmed tracks; the tracker must have been told to `smooth`."""
+        """Receive a step with confirmed tracks of a tracker with `smooth`."""
         assert step.tracks.prior_x is not None
-        if np.isnan(step.tracks.prior_x).all():  # nothing goes on, so nothing is known of earlier tracks from here on
+        if np.isnan(step.tracks.prior_x).all():  # no track continues, so later steps do not change earlier ones
             self._release(len(self._waiting))
         self._waiting.append(step)
         if self._lag_s is not None and step.time_s - self._waiting[0].time_s >= 2 * self._lag_s:
             self._release(sum(step.time_s - waiting.time_s >= self._lag_s for waiting in self._waiting))
 
     def close(self) -> None:
-        """Pass on what waits."""
+        """Pass on the waiting steps."""
         try:
             self._release(len(self._waiting))
         finally:
             close_together(*self._sinks)
 
     def _release(self, count: int) -> None:
-        """Pass on the oldest steps, smoothed by all that wait."""
+        """Pass on the `count` oldest steps, smoothed by all waiting steps."""
         later: Tracks | None = None
         ready: deque[Tracks] = deque()
         for step in reversed(self._waiting):
@@ -56,12 +57,12 @@ class Smoothed:
 
 
 def smoothed_first(settings: OutputSettings, *sinks: Sink) -> tuple[Sink, ...]:
-    """The sinks, behind a smoother if the settings ask for one."""
+    """The sinks, behind a smoother if output.smooth is set."""
     return (Smoothed(*sinks, lag_s=settings.smooth_lag_s),) if settings.smooth else sinks
 
 
 def smoothed_by(tracks: Tracks, later: Tracks) -> Tracks:
-    """Tracks with what the smoothed snapshot after them says; boxes keep their place on their track."""
+    """Tracks smoothed by the smoothed snapshot after them; boxes move with the positions."""
     assert later.prior_x is not None
     assert later.prior_P is not None
     assert later.gain is not None

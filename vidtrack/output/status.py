@@ -1,4 +1,4 @@
-"""What a live run looks like now: plain data for a page, a metrics endpoint, a stream of tracks."""
+"""The current status of a live run: plain data for the page, the metrics and the stream of tracks."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, moved_lines
 from vidtrack.output.sink import Step
-from vidtrack.scan import Status, Tracks
+from vidtrack.tracks import Status, Tracks
 from vidtrack.traffic.lines import LineCounter
 
-_LATENCIES = 500  # the last so many are looked at
-_RATE_S = 5.0  # frames per second are counted over this time
+_LATENCIES = 500  # latest frames in the percentiles
+_RATE_S = 5.0  # time over which fps_out is counted
 
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What a live source says of itself.
+    """State and counters of a live source.
 
-    state     "connecting", "running", "waiting" (before another attempt) or "ended"
-    reading   its numbers, as in summary.json: width, height, fps_in, frames_dropped, reconnects, stalls, lost, ...
-    problems  (Unix time [s], what) of the last ones
+    state     "connecting", "running", "waiting" (before the next attempt) or "ended"
+    reading   counters as in summary.json: width, height, fps_in, frames_dropped, reconnects, stalls, lost, ...
+    problems  (Unix time [s], message) of the last problems
     """
 
     state: str
@@ -38,13 +38,13 @@ class Account:
 
 @dataclass(frozen=True, slots=True)
 class LiveStatus(Account):
-    """A live run at one moment.
+    """The status of a live run at one time.
 
     source      address without credentials
     started_unix_s, now_unix_s
     frame, time_s   of the last frame, -1 and 0.0 before it
-    frame_age_s     seconds since the last frame was done; None before it
-    fps_out     frames tracked per second, lately
+    frame_age_s     seconds since the last frame was tracked; None before it
+    fps_out     recent rate of tracked frames [1/s]
     tracks      of the last frame, see `as_rows`
     counts      by line and direction
     """
@@ -61,11 +61,11 @@ class LiveStatus(Account):
 
 
 class StatusBoard:
-    """Sink that remembers the newest step; everything else is made when somebody asks, in the asker's thread.
+    """Sink that keeps the newest step; status and pictures are computed on request, in the requesting thread.
 
     source     address without credentials
-    account    gives the source's account
-    latency_s  how long ago a frame's time was
+    account    returns the source's account
+    latency_s  returns the time [s] since a frame's capture time
     counter    None without lines
     """
 
@@ -89,7 +89,7 @@ class StatusBoard:
         self._changed = Condition()
 
     def step(self, step: Step) -> None:
-        """Take the newest frame."""
+        """Keep the newest step."""
         self._latencies.append(self._latency_s(step.time_s))
         self._done.append(time.monotonic())
         with self._changed:
@@ -97,19 +97,19 @@ class StatusBoard:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Wake those who wait."""
+        """Wake all waiting threads."""
         with self._changed:
             self._changed.notify_all()
 
     def newer(self, frame: int, timeout_s: float) -> Step | None:
-        """Wait for a step after this frame number; None if none came in time. For streams of tracks or pictures."""
+        """Wait for a step after this frame number; None after the time-out."""
         with self._changed:
             self._changed.wait_for(lambda: self._newest is not None and self._newest.index > frame, timeout_s)
             newest = self._newest
         return newest if newest is not None and newest.index > frame else None
 
     def picture(self) -> bytes | None:
-        """The newest picture with tracks and lines drawn in, as JPEG; None before the first frame."""
+        """The newest picture with tracks and lines, as JPEG; None before the first frame."""
         step = self._newest
         if step is None or step.frame is None:
             return None
@@ -122,7 +122,7 @@ class StatusBoard:
         return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, self._quality])[1].tobytes()
 
     def latency_ms(self) -> dict[str, float]:
-        """From capture to tracks, of the last frames: p50, p95, p99 and max; empty before the first."""
+        """Latency from capture to tracks in the last frames [ms]: p50, p95, p99, max; empty before the first frame."""
         latencies = list(self._latencies)
         if not latencies:
             return {}
@@ -130,7 +130,7 @@ class StatusBoard:
         return dict(zip(("p50", "p95", "p99", "max"), values, strict=True))
 
     def now(self) -> LiveStatus:
-        """Everything at this moment; from any thread."""
+        """The current status. Safe in any thread."""
         step = self._newest
         account = self._account()
         now_s = time.monotonic()
@@ -152,7 +152,7 @@ class StatusBoard:
 
 
 def as_rows(tracks: Tracks) -> list[dict[str, Any]]:
-    """The confirmed tracks as JSON would have them: track_id, status, x_px, y_px, vx_px_s, vy_px_s, box_px."""
+    """The confirmed tracks as JSON objects: track_id, status, x_px, y_px, vx_px_s, vy_px_s, box_px."""
     shown = tracks.status != Status.TENTATIVE
     columns = (tracks.id, tracks.status, tracks.xy, tracks.v, tracks.box)
     return [

@@ -1,4 +1,4 @@
-"""summary.json: one run in one object, valid at every moment."""
+"""summary.json: one JSON object per run, valid at any time."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from vidtrack import plane
-from vidtrack.config import Settings
+from vidtrack.arrays import affine
+from vidtrack.config.settings import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
-from vidtrack.scan import TENTATIVE
+from vidtrack.tracks import TENTATIVE
 from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
 
 
 class CameraAccount:
-    """How the camera moved, against the first picture."""
+    """Statistics of the camera's motion relative to the first picture."""
 
     def __init__(self) -> None:
         self._time_s: float | None = None
@@ -32,7 +32,7 @@ class CameraAccount:
         self._frames = 0
 
     def step(self, step: Step) -> None:
-        """Add a picture."""
+        """Add one picture's motion."""
         if step.frame is None:
             return
         dt = 0.0 if self._time_s is None else step.time_s - self._time_s
@@ -40,13 +40,13 @@ class CameraAccount:
         self._frames += 1
         if step.motion is not None:
             height, width = step.frame.shape
-            px = plane.displacement(step.motion, width, height)
+            px = affine.displacement(step.motion, width, height)
             self._moved_s += dt
             self._largest_px = max(self._largest_px, px)
             self._squares += px * px
 
     def as_dict(self) -> dict[str, float]:
-        """Seconds away from where it was at first, and by how many pixels, of that corner which moved most."""
+        """Time away from the first view [s], largest and RMS displacement [px] of the corner that moved most."""
         rms_px = math.sqrt(self._squares / max(self._frames, 1))
         return {
             "moved_s": round(self._moved_s, 3),
@@ -58,13 +58,13 @@ class CameraAccount:
 class Summary:
     """Sink that writes summary.json at the start, every second and at the end.
 
-    source   the input's name, without any password
-    reading  the source's own account when asked: fps, width, height, frames_read, frames_dropped,
-             decode_errors, reconnects, stalls, truncated
-    counter  the counted lines, None without any
-    unit     what steps are: "frames" or "scans"
+    source   name of the input, without any password
+    reading  returns the source's counters: fps, width, height, frames_read, frames_dropped, decode_errors,
+             reconnects, stalls, truncated
+    counter  line counter; None without counting lines
+    unit     of the steps: "frames" or "scans"
 
-    `interrupted` is True until the run clears it before `close`, so a killed or failed run says so.
+    `interrupted` is True until the run clears it before `close`, so the file of a killed or failed run has it True.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Summary:
         self._write(interrupted=True)
 
     def step(self, step: Step) -> None:
-        """Count."""
+        """Count the step and its tracks."""
         confirmed = set(step.tracks.id[step.tracks.status != TENTATIVE].tolist())
         self._tracks += len(confirmed - self._alive)
         self._alive = confirmed
@@ -114,7 +114,7 @@ class Summary:
         self._write(self.interrupted)
 
     def as_dict(self, interrupted: bool) -> dict[str, object]:
-        """What the file holds. `seconds`: time the run took; `media_s`: time of the last frame; stages in seconds."""
+        """Content of the file. `seconds`: duration of the run; `media_s`: time of the last frame; stages in seconds."""
         return {
             "source": self._source,
             **self._reading(),
@@ -137,5 +137,5 @@ class Summary:
 
 @cache
 def _versions() -> dict[str, str]:
-    """Of what a run uses. Once per process: each one asked for costs the reading of a package's whole description."""
+    """Versions of the packages, cached: each needs a package's whole metadata."""
     return {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES}

@@ -12,18 +12,19 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 
+from vidtrack.arrays.types import Floats
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.parquet import ParquetParts
 from vidtrack.output.sink import Step
-from vidtrack.scan import Floats, Status
+from vidtrack.tracks import Status
 
-if TYPE_CHECKING:  # SciPy, only at sites with a calibration
+if TYPE_CHECKING:  # loads SciPy; needed only at calibrated sites
     from vidtrack.traffic.footprint import Footprints
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column's name, unit ("1" for a pure number), kind and the decimals that are worth keeping."""
+    """A column: name, unit ("1" for a pure number), type, and number of decimals in CSV."""
 
     name: str
     unit: str
@@ -71,16 +72,16 @@ _RADAR_3D = (*_RADAR, _real("z_m", "m"), _real("vz_m_s", "m/s"), _real("sigma_z_
 
 
 def _of_velocity(unit: str, decimals: int = 3) -> tuple[Column, ...]:
-    """What is left of the covariance of (x, y, vx, vy)."""
+    """Columns of the covariance of (x, y, vx, vy) beyond the position's."""
     sigmas = (_real(f"sigma_v{axis}_{unit}_s", f"{unit}/s", decimals) for axis in "xy")
     return (*sigmas, *(_real(f"corr_{pair}", "1", 6) for pair in _PAIRS))
 
 
 _PAIRS = {"vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
-"""Correlations besides `corr_xy`, with the rows of the covariance."""
+"""Correlations besides `corr_xy`, with their rows in the covariance."""
 
 VIDEO = (*_VIDEO, *_of_velocity("px"))
-"""Columns of video tracks. `group_id` is -1 alone; `nis` is empty where there was no update."""
+"""Columns of video tracks. `group_id` is -1 without a shared blob; `nis` is empty without an update."""
 
 RADAR = (*_RADAR, *_of_velocity("m"))
 """Columns of radar tracks in the plane: x east, y north."""
@@ -104,7 +105,7 @@ ROAD = (
     _real("length_sigma_m", "m"),
     _real("width_m", "m"),
 )
-"""Columns on the road, of video tracks at a calibrated site; empty where the calibration says nothing."""
+"""Columns of video tracks at a calibrated site; empty where the calibration is not valid."""
 
 _STATUS_WORDS = np.array([status.name.lower() for status in Status])
 
@@ -115,9 +116,9 @@ def schema(columns: Sequence[Column]) -> pa.Schema:
 
 
 def layout(names: Sequence[str]) -> Sequence[Column]:
-    """The columns of a table of tracks with these names; those of video where they fit nothing.
+    """The layout of a table of tracks with these column names; VIDEO if none fits.
 
-    Columns after the first ones may be missing: earlier versions did not write them.
+    Later columns may be missing: earlier versions did not write them.
     """
     kinds = ((_RADAR_3D, RADAR_3D), (_RADAR, RADAR))
     first, known = next((kind for kind in kinds if {c.name for c in kind[0]} <= set(names)), (_VIDEO, (*VIDEO, *ROAD)))
@@ -125,9 +126,9 @@ def layout(names: Sequence[str]) -> Sequence[Column]:
 
 
 def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: Footprints | None = None) -> pa.Table:
-    """Table with these columns, rows in the order of the steps.
+    """A table with these columns, rows in the order of the steps.
 
-    road  places the vehicles for the columns of ROAD; it sees the scene, which stays on the road when the camera moves
+    road  computes the columns of ROAD, in coordinates of the scene, which do not move with the camera
     """
     counts = [len(step.tracks) for step in steps]
     position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
@@ -186,7 +187,7 @@ def _road_values(steps: Sequence[Step], road: Footprints) -> dict[str, Floats]:
 
 
 def stacked(steps: Sequence[Step], name: str) -> np.ndarray:
-    """(N, ...) one quantity of all tracks, in the order of the steps."""
+    """(N, ...) one attribute of all tracks, in the order of the steps."""
     return np.concatenate([getattr(step.tracks, name) for step in steps])
 
 
@@ -208,14 +209,14 @@ class TrackTable:
         self._due = Every(1.0)
 
     def step(self, step: Step) -> None:
-        """Take one frame's confirmed tracks."""
+        """Receive one frame's confirmed tracks."""
         if len(step.tracks):
             self._waiting.append(step)
         if self._due():
             self._write()
 
     def close(self) -> None:
-        """Write what waits and make the one tracks.parquet."""
+        """Write the rest, and join the parts of tracks.parquet."""
         try:
             self._write()
         finally:
@@ -233,7 +234,7 @@ class TrackTable:
 
 
 def csv_text(table: pa.Table) -> str:
-    """The rows as lines, without a header."""
+    """The rows as lines of CSV, without a header."""
     text = io.BytesIO()
     options = pyarrow.csv.WriteOptions(include_header=False, quoting_style="none")
     pyarrow.csv.write_csv(table, text, options)

@@ -1,4 +1,4 @@
-"""Where each track was in the last seconds."""
+"""Recent positions of each track."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from collections import deque
 
 import numpy as np
 
-from vidtrack import plane
-from vidtrack.scan import Floats, Ints, Status, Tracks
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.tracks import Status, Tracks
 
 
 class Trails:
-    """The last `seconds` of all tracks that are not tentative."""
+    """Positions of all tracks but tentative ones over the last `seconds`."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
         self._scans: deque[tuple[float, Ints, Floats]] = deque()
 
     def step(self, tracks: Tracks) -> None:
-        """Add a scan, forget what is too old."""
+        """Add a scan and drop those older than `seconds`."""
         shown = tracks.status != Status.TENTATIVE
         self._scans.append((tracks.t, tracks.id[shown], tracks.xy[shown]))
         while tracks.t - self._scans[0][0] > self._seconds:
@@ -27,14 +28,14 @@ class Trails:
     def paths(self, motion: Floats | None = None) -> dict[int, Floats]:
         """(n, d) positions in order of time for each track of the last scan.
 
-        motion  (2, 3) from the scene to the picture that they are drawn on; None: the identity
+        motion  (2, 3) from the scene to the picture; None: identity
         """
         if not self._scans:
             return {}
         alive = self._scans[-1][1]
         ids = np.concatenate([scan[1] for scan in self._scans])
         xy = np.concatenate([scan[2] for scan in self._scans])
-        xy = xy if motion is None else plane.points(motion, xy)
+        xy = xy if motion is None else affine.points(motion, xy)
         order = np.argsort(ids, kind="stable")
         ids, xy = ids[order], xy[order]
         first, last = np.searchsorted(ids, alive), np.searchsorted(ids, alive, side="right")

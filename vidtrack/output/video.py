@@ -1,4 +1,4 @@
-"""The annotated video: H.264 in fragmented MP4, which browsers play and a kill does not spoil."""
+"""The annotated video: H.264 in fragmented MP4, playable in browsers and after a kill."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from av.container import OutputContainer
 from av.video.stream import VideoStream
 
-from vidtrack.config import OutputSettings
+from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
-from vidtrack.output.disk import Disk
 from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails, moved_lines
+from vidtrack.output.ffmpeg_file import FFmpegFile
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
 from vidtrack.output.trails import Trails
-from vidtrack.scan import Status
+from vidtrack.tracks import Status
 from vidtrack.traffic.lines import Line, LineCounter
 from vidtrack.video.frame import Image
 
@@ -27,11 +27,11 @@ _FRAGMENT_S = 1
 
 
 class AnnotatedVideo:
-    """Sink that draws tracks on the pictures and encodes them with the times of the source.
+    """Sink that draws tracks on the pictures and encodes them with the source's times.
 
-    fps   nominal rate, a hint for the encoder; the pictures keep their own times
+    fps   nominal rate, a hint for the encoder
 
-    Raises OutputError when the file cannot be opened, ConfigError for steps without pictures.
+    Raises OutputError if the file cannot be opened, ConfigError for steps without pictures.
     """
 
     def __init__(self, path: Path, fps: float, settings: OutputSettings, lines: Sequence[Line] = ()) -> None:
@@ -43,11 +43,11 @@ class AnnotatedVideo:
         self._stream: VideoStream | None = None
         self._pts = -1
         try:
-            self._disk = Disk(path)
+            self._file = FFmpegFile(path)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}; give --video another file") from None
         self._container: OutputContainer = av.open(
-            self._disk,
+            self._file,
             "w",
             format="mp4",
             options={
@@ -68,9 +68,9 @@ class AnnotatedVideo:
         if self._stream is not None:
             self._container.mux(self._stream.encode(None))
         self._container.close()
-        self._disk.close()
+        self._file.close()
         if self._stream is None and self._path.is_file():
-            self._path.unlink()  # nothing plays a video without a picture
+            self._path.unlink()  # players reject a video without pictures
         self._check_disk()
 
     def _draw(self, step: Step, picture: Image) -> Image:
@@ -97,14 +97,14 @@ class AnnotatedVideo:
 
     def _check_disk(self) -> None:
         with writing(self._path):
-            if self._disk.error is not None:
-                raise self._disk.error
+            if self._file.error is not None:
+                raise self._file.error
 
     def _add_stream(self, width: int, height: int) -> VideoStream:
         stream = self._container.add_stream("libx264", rate=Fraction(self._fps).limit_denominator(1001))
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         stream.time_base = stream.codec_context.time_base = _CLOCK
         stream.codec_context.gop_size = max(1, round(2 * self._fps))
-        # No B-frames: they would delay all times, for a fragmented file has no edit list to take that back.
+        # No B-frames: they delay all times, and a fragmented file has no edit list to correct that.
         stream.options = {"crf": str(self._settings.video_crf), "preset": "superfast", "bf": "0"}
         return stream

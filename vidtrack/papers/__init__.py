@@ -1,1 +1,1 @@
-"""The papers' figures and tables, ours beside theirs: one module an experiment, listed in `registry`."""
+"""Reproduction of the papers' figures and tables: one module per experiment, listed in `registry`."""

@@ -1,4 +1,4 @@
-"""Names of the experiments and where they are. Modules are imported only when one is asked for."""
+"""Names and modules of the experiments. A module is imported only when its experiment runs."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from vidtrack.papers.result import Result
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """A figure or table of a paper: `reproduce(runs, seed)` of a module of this package, and what it shows."""
+    """A figure or table of a paper: a module of this package with `reproduce(runs, seed)`, and a description."""
 
     module: str
     title: str
 
     def reproduce(self, runs: int | None = None, seed: int = 0) -> Result:
-        """Do it. runs: Monte Carlo runs or simulated videos; None: as many as the claim needs."""
+        """Run the experiment. runs: Monte Carlo runs or simulated videos; None: as many as the claim needs."""
         function: Callable[[int | None, int], Result] = import_module(f"vidtrack.papers.{self.module}").reproduce
         return function(runs, seed)
 
@@ -53,7 +53,7 @@ EXPERIMENTS = {
 
 
 def choose(names: Iterable[str]) -> dict[str, Experiment]:
-    """The experiments of these names, or all for none. Raises ConfigError for an unknown one, naming the nearest."""
+    """The experiments of these names; all if none are given. Raises ConfigError for unknown names, with the nearest."""
     chosen = {}
     for name in names or EXPERIMENTS:
         if name not in EXPERIMENTS:

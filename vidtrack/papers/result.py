@@ -1,4 +1,4 @@
-"""What an experiment hands over: a picture, a table, and one sentence."""
+"""The result of an experiment: a figure, a table, and one sentence."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Row = dict[str, object]
 class Result:
     """An experiment's outcome.
 
-    figure   drawn, not yet written
-    rows     the table, ours beside the paper's or a reference's; all rows have the same keys
-    verdict  one sentence: what came out, and how it compares
+    figure   the figure, not yet written
+    rows     the table, with the paper's or a reference's values; all rows have the same keys
+    verdict  one sentence: the outcome, compared with the paper
     """
 
     figure: Figure
@@ -30,7 +30,7 @@ class Result:
     verdict: str
 
     def write(self, folder: Path, name: str) -> None:
-        """Write NAME.png and NAME.csv into a folder that exists. Raises StoppedEarly when the disk refuses."""
+        """Write NAME.png and NAME.csv into an existing folder. Raises StoppedEarly if writing fails."""
         with writing(folder / f"{name}.png"):
             self.figure.savefig(folder / f"{name}.png")
         with writing(folder / f"{name}.csv"), (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""The look that all figures share."""
+"""The common style of all figures."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import quantile
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito: told apart by every kind of colour vision, and in print.
+# Okabe and Ito: distinct for every kind of colour vision, and in print.
 BLUE, ORANGE, GREEN, RED, PURPLE, SKY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9"
 INK, GREY, FAINT = "#222222", "#777777", "#D5D5D5"
 CYCLE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY)

@@ -1,4 +1,4 @@
-"""What no radar can have measured: the rules that a table of plots has to keep, row by row and in order."""
+"""Checks of a table of plots: the range of each value, and the order of scans and times."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from bisect import bisect_right
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.radar.table import Table
-from vidtrack.scan import Floats, Mask
 
 TIME = ("scan", "time_s")
 POLAR = ("range_m", "azimuth_deg", "elevation_deg")
@@ -22,7 +22,7 @@ LONGEST_GAP = 100_000
 
 
 def check_numbers(table: Table, measured: list[str]) -> None:
-    """Note the rows whose values no radar can have measured."""
+    """Add a fault for each row with a value out of range."""
     columns = table.columns
     sigmas = [f"sigma_{name}" for name in measured if f"sigma_{name}" in columns]
     for name in (*TIME, *measured, *sigmas, *([AMPLITUDE] if AMPLITUDE in columns else [])):
@@ -55,7 +55,7 @@ def _check_measured(table: Table, name: str) -> None:
 
 
 def check_order(table: Table, measured: list[str]) -> None:
-    """Note repeated plots, and scans whose time or number cannot be right."""
+    """Add a fault for each repeated plot, and for scans with a wrong time or number."""
     scan, time_s = (table.columns[name] for name in TIME)
     rows = np.flatnonzero(table.good)
     columns = [table.columns[name][rows] for name in (*reversed(measured), "scan")]
@@ -79,10 +79,10 @@ def check_order(table: Table, measured: list[str]) -> None:
 
 
 def _in_order(values: Floats) -> Mask:
-    """(N,) a longest selection that never decreases: whatever is left out of it is what disturbs the order."""
+    """(N,) mask of a longest non-decreasing subsequence; the other values are out of order."""
     if (np.diff(values) >= 0).all():
         return np.ones(len(values), bool)
-    ends: list[float] = []  # the least last value of a selection of each length
+    ends: list[float] = []  # smallest last value of the subsequences of each length
     length = np.empty(len(values), np.int64)
     for k, value in enumerate(values.tolist()):
         length[k] = n = bisect_right(ends, value)

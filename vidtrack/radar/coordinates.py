@@ -1,13 +1,13 @@
-"""Range, azimuth and elevation to x, y, z and back: x east, y north, z up, azimuth clockwise from north.
+"""Conversion of range, azimuth and elevation to x, y, z and back: x east, y north, z up, azimuth from north clockwise.
 
-Angles are in radians. A plot without elevation lies in the plane of the sensor: its range is the ground range.
+Angles are in radians. The range of a plot without elevation is the ground range.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 
 def wrap(angle: Floats) -> Floats:
@@ -34,11 +34,11 @@ def to_polar(xyz: Floats) -> Floats:
 
 
 def unbiased(polar: Floats, R: Floats) -> tuple[Floats, Floats]:
-    """Positions (M, d) whose errors have mean zero, and the covariances (M, d, d) of these errors.
+    """Unbiased positions (M, d) and the covariances (M, d, d) of their errors.
 
-    polar (M, d) range, azimuth[, elevation] with independent errors, of which R (M, d, d) holds the variances.
+    polar (M, d) range, azimuth[, elevation] with independent errors; R (M, d, d) has their variances.
 
-    An angle's error shortens the mean of its cosine by lambda = exp(-sigma^2 / 2); dividing by it removes the bias.
+    An angle's error multiplies the mean of its cosine by lambda = exp(-sigma^2 / 2); division by it removes the bias.
     The covariance is E[(z_u - z)(z_u - z)'] given the measurement. S. Longbin, Z. Xiaoquan, Z. Yiyu, "Unbiased
     Converted Measurements for Tracking", IEEE Trans. Aerospace and Electronic Systems 34(3), 1998.
     """
@@ -58,7 +58,7 @@ def unbiased(polar: Floats, R: Floats) -> tuple[Floats, Floats]:
     tilt = np.exp(-R[:, 2, 2] / 2)
     se, ce, se2, ce2 = _circular(polar[:, 2], tilt)
     position /= tilt[:, None]
-    position[:, 2] *= shrink  # the height does not lean on the azimuth
+    position[:, 2] *= shrink  # the height does not depend on the azimuth
     level, both = r2 * ce**2 * ((shrink * tilt) ** -2 - 2), mean2 / 4 * (1 + ce2)
     cov[:, 0, 0] = level * s**2 + both * (1 - c2)
     cov[:, 1, 1] = level * c**2 + both * (1 + c2)
@@ -71,6 +71,6 @@ def unbiased(polar: Floats, R: Floats) -> tuple[Floats, Floats]:
 
 
 def _circular(angle: Floats, shrink: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Sine and cosine of measured angles, and the means of sin 2a and cos 2a of the true ones."""
+    """Sine and cosine of the measured angles, and the means of sin 2a and cos 2a of the true angles."""
     twice = shrink**4
     return np.sin(angle), np.cos(angle), twice * np.sin(2 * angle), twice * np.cos(2 * angle)

@@ -1,4 +1,4 @@
-"""Motion models and estimators by the names that users give them, in metres and seconds."""
+"""Motion models and estimators by their names in the settings, in metres and seconds."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from functools import partial
 
 import numpy as np
 
-from vidtrack.config import RadarSettings
-from vidtrack.estimate.acceleration import ConstantAcceleration, Singer
+from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.error_signal import ErrorSignalBank
 from vidtrack.estimate.fixed_gain import FixedGainBank
 from vidtrack.estimate.imm import IMMBank
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.acceleration import ConstantAcceleration, Singer
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.estimate.motion.turn import CoordinatedTurn
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import Glint, ParticleBank
 from vidtrack.estimate.resampling import Resampling
-from vidtrack.estimate.turn import CoordinatedTurn
 from vidtrack.estimate.unscented import UnscentedBank
 from vidtrack.radar.scans import Measurements
 
 
 def motion(settings: RadarSettings, dim: int) -> Motion:
-    """The motion model that the settings name."""
+    """The motion model of the settings."""
     speed, accel, hold_s = settings.max_speed / 2, settings.accel, settings.hold_s
     if settings.model == "ca":
         return ConstantAcceleration(dim, change=accel, hold_s=hold_s, speed=speed, accel=accel)
@@ -36,7 +36,7 @@ def motion(settings: RadarSettings, dim: int) -> Motion:
 
 
 def estimator(settings: RadarSettings, found: Measurements, seed: int = 0) -> Callable[[Motion], Estimator]:
-    """What makes the settings' bank of filters from a motion model; the seed is for what is random."""
+    """A factory of the settings' bank of filters from a motion model; seed: for particles."""
     if settings.estimator == "ukf":
         return UnscentedBank
     if settings.estimator == "particle":

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vidtrack.config import RadarSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.table import Table, nearest, read_table
-from vidtrack.scan import Floats, Ints
 
 _log = logging.getLogger(__name__)
 
@@ -27,13 +27,13 @@ KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
 class Plots:
     """All plots of a file, sorted by scan, then time.
 
-    scan       (N,) number of the scan; numbers without plots are empty scans
-    time_s     (N,) when each plot was measured
+    scan       (N,) number of the scan; missing numbers are empty scans
+    time_s     (N,) time of each plot
     z          (N, m) range [m], azimuth [rad][, elevation [rad]] or x, y[, z] [m]; then the range rate [m/s], if any
     sigma      (N, m) standard deviations of z, in its units
-    polar, dim, doppler   what z is: polar or Cartesian, in two or three dimensions, with or without range rate
-    amplitude  (N,) None where the file has none
-    bad_rows   rows that were left out
+    polar, dim, doppler   kind of z: polar or Cartesian, two or three dimensions, with or without range rate
+    amplitude  (N,) or None if the file has none
+    bad_rows   number of rows left out
     """
 
     scan: Ints
@@ -50,7 +50,7 @@ class Plots:
         return len(self.scan)
 
     def without_range_rate(self) -> Plots:
-        """The same plots, positions only."""
+        """The plots without range rates."""
         return replace(self, z=self.z[:, : self.dim], sigma=self.sigma[:, : self.dim], doppler=False)
 
 
@@ -58,8 +58,8 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     """Read a CSV or Parquet table of plots.
 
     Rows may come in any order. Standard deviations come from columns, else from the settings.
-    Raises SourceError when there is no such file; PlotFormatError for missing columns, a file without plots,
-    and bad rows, which settings.skip_bad_rows leaves out instead, with a warning.
+    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
+    rows. With settings.skip_bad_rows bad rows are left out with a warning.
     """
     settings = settings or RadarSettings()
     table = read_table(Path(path), KNOWN)
@@ -78,7 +78,7 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
 
 
 def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:
-    """The good rows in radians, by scan and time."""
+    """The valid rows, sorted by scan and time, in radians."""
     rows = np.flatnonzero(table.good)
     scan, time_s = (table.columns[name][rows] for name in TIME)
     order = np.lexsort((time_s, scan))
@@ -97,7 +97,7 @@ def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plot
 
 
 def _measured(table: Table) -> list[str]:
-    """The columns that are measurements, in their order in z: polar ones where the file has both kinds."""
+    """The measurement columns in the order of z; polar columns if the file has both kinds."""
     unknown = [name for name in table.names if name not in KNOWN] or table.names
     for name in TIME:
         if name not in table.columns:
@@ -114,7 +114,7 @@ def _measured(table: Table) -> list[str]:
 
 
 def _hint_at_misspelt(table: Table) -> None:
-    """Warn of a column that was probably meant to be an optional one: leaving it out in silence would mislead."""
+    """Warn of a column whose name resembles that of a missing optional column."""
     absent = {_bare(name): name for name in KNOWN if name not in table.names}
     for name in table.names:
         near = [] if name in KNOWN else difflib.get_close_matches(_bare(name), absent, n=1, cutoff=0.9)

@@ -1,4 +1,4 @@
-"""Plots become scans: in the coordinates that the estimator works in, scan by scan, empty ones included."""
+"""Scans from plots, in the coordinates of the estimator, with empty scans."""
 
 from __future__ import annotations
 
@@ -7,32 +7,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.config import RadarSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
+from vidtrack.radar.performance.sweep import Sweep
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
-from vidtrack.radar.sweep import Sweep
-from vidtrack.scan import Floats, Ints, Scan
+from vidtrack.scan import Scan
 
 NONLINEAR = ("ekf", "ukf", "particle")
-"""Estimators that take range and angles as they are; the others get positions, converted without bias."""
+"""Estimators that use range and angles directly; the others use positions, converted without bias."""
 
 SIMULTANEOUS_S = 1e-6
-"""Plots within this time are measured at once."""
+"""s; plots within this time count as simultaneous."""
 
 REACH_SCANS = 4
-"""A radar that saw a target surveys at least what the target can reach in so many scans."""
+"""The surveyed space extends beyond the plots by the distance that a target can cover in so many scans."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measurements:
-    """Plots as a tracker takes them, in order of time.
+    """Plots as input of a tracker, in order of time.
 
-    sensor     what z is
+    sensor     measurement model of z
     dim        space dimensions
     scan       (N,) number of each plot's scan
-    time_s     (N,) when each was measured; where times within a scan differ, predictions are moved to them
-    speed      standard deviation of an unknown velocity [m/s]
+    time_s     (N,) time of each plot; if times within a scan differ, predictions are moved to them
+    speed      prior standard deviation of a velocity [m/s]
     z, R       (N, m), (N, m, m)
     amplitude  (N,) or None
     """
@@ -52,7 +53,7 @@ class Measurements:
         return int(self.scan[-1] - self.scan[0]) + 1
 
     def __iter__(self) -> Iterator[tuple[int, Scan]]:
-        """Number and content of each scan from the first to the last; an empty one's time is interpolated."""
+        """Number and scan, from the first to the last; the times of empty scans are interpolated."""
         number, first, size = np.unique(self.scan, return_index=True, return_counts=True)
         time_s = np.add.reduceat(self.time_s, first) / size
         noise = self.R.mean(axis=0)
@@ -66,7 +67,7 @@ class Measurements:
             yield int(number[k]), Scan(float(time_s[k]), z, R, sensor, amplitude=amplitude, noise=noise)
 
     def _at(self, offset: Floats, z: Floats, R: Floats) -> Sensor:
-        """The sensor of a scan whose plots z (M, m) were measured at these times (M,) from the scan's."""
+        """The sensor of a scan with plots z (M, m), R, and time offsets (M,) from the scan's time."""
         if np.ptp(offset) < SIMULTANEOUS_S:
             return self.sensor
         from scipy.spatial import KDTree
@@ -75,10 +76,10 @@ class Measurements:
 
 
 def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
-    """Plots in the coordinates that the settings' estimator works in.
+    """Plots in the coordinates of the settings' estimator.
 
-    Range and angles stay as they are for NONLINEAR estimators; the others get positions, converted without bias. A
-    range rate stays a range rate and is linearised; alpha-beta, which knows positions only, does without it.
+    NONLINEAR estimators use range and angles directly; others use positions, converted without bias. A range rate is
+    linearised; alpha-beta uses positions only.
     """
     if settings.estimator == "alpha-beta":
         plots = plots.without_range_rate()
@@ -102,14 +103,14 @@ def _polar(plots: Plots, settings: RadarSettings) -> Sensor:
 
 
 def clutter_density(found: Measurements) -> float:
-    """Plots per scan and unit of measurement space: the upper bound that counts targets as clutter."""
+    """Plots per scan and unit of measurement space: an upper bound, because targets count as clutter."""
     return len(found.z) / found.count / surveyed(found)
 
 
 def surveyed(found: Measurements) -> float:
-    """Volume of the measurement space: the box around all plots, and around that what targets cross in a few scans.
+    """Volume of the measurement space: the bounding box of all plots, plus a margin that targets cross in a few scans.
 
-    Without such a margin a file with the plots of one target only would look as if it were full of clutter.
+    Without the margin the plots of a single target would fill the space, and appear as dense clutter.
     """
     sides = np.ptp(found.z, axis=0)
     for angle in found.sensor.angles:
@@ -118,7 +119,7 @@ def surveyed(found: Measurements) -> float:
 
 
 def _margin(found: Measurements) -> Floats:
-    """(m,) how far the fastest target, of twice the standard deviation, gets either way within REACH_SCANS."""
+    """(m,) distance that a target with twice the speed's standard deviation covers in REACH_SCANS scans."""
     step = 2 * REACH_SCANS * 2 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)
     margin = np.full(found.z.shape[1], step)
     if found.sensor.angles:
@@ -128,6 +129,6 @@ def _margin(found: Measurements) -> Floats:
 
 
 def _sector(angle: Floats) -> float:
-    """The least sector that holds all angles (N,) in -pi..pi: the circle without the widest gap."""
+    """The smallest sector that contains all angles (N,) in -pi..pi: the circle minus the widest gap."""
     turn = np.sort(angle)
     return float(2 * np.pi - np.diff(turn, append=turn[0] + 2 * np.pi).max())

@@ -1,7 +1,6 @@
-"""Measurement models of a radar: what it would measure of states in metres.
+"""Measurement models of a radar, for states in metres.
 
-A constant-velocity state has each velocity right after its position: [x, vx, y, vy, ...]. Range rate is positive
-for a target that goes away.
+Each velocity of a state follows its position: [x, vx, y, vy, ...]. The range rate of a receding target is positive.
 """
 
 from __future__ import annotations
@@ -11,15 +10,15 @@ from typing import ClassVar
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.radar.coordinates import to_polar, unbiased
-from vidtrack.scan import Floats
 
 NEAREST_M = 1e-6
-"""The line of sight has no direction at the sensor itself: no target is nearer than this."""
+"""m; smallest distance used: the line of sight is undefined at the sensor."""
 
 
 class _Polar:
-    """Range, azimuth[, elevation][, range rate] seen from `origin`; d is the number of space dimensions."""
+    """Range, azimuth[, elevation][, range rate] from `origin`; d is the number of space dimensions."""
 
     __slots__ = ()
     angles: ClassVar[tuple[int, ...]] = (1,)
@@ -44,7 +43,7 @@ class RangeAzimuth(_Polar):
     """z = range [m], azimuth [rad][, range rate [m/s]] of a target in the plane.
 
     origin   (x, y) of the radar [m]
-    doppler  the range rate is measured too
+    doppler  with range rate
     """
 
     origin: tuple[float, float] = (0.0, 0.0)
@@ -56,7 +55,7 @@ class RangeAzimuthElevation(_Polar):
     """z = range [m], azimuth [rad], elevation [rad][, range rate [m/s]].
 
     origin   (x, y, z) of the radar [m]
-    doppler  the range rate is measured too
+    doppler  whether the range rate is measured
     """
 
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -65,7 +64,7 @@ class RangeAzimuthElevation(_Polar):
 
 @dataclass(frozen=True, slots=True)
 class PositionRangeRate:
-    """z = position [m] in two or three dimensions and range rate [m/s], seen from `origin`."""
+    """z = position [m] in two or three dimensions and range rate [m/s] from `origin`."""
 
     angles: ClassVar[tuple[int, ...]] = ()
     origin: tuple[float, ...] = (0.0, 0.0)
@@ -85,13 +84,13 @@ class PositionRangeRate:
         return H
 
     def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
-        """The measured positions as they are."""
+        """The measured positions (M, d) and their covariances (M, d, d)."""
         dim = z.shape[1] - 1
         return z[:, :dim], R[:, :dim, :dim]
 
 
 def _relative(x: Floats, position: tuple[int, ...], origin: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Positions (T, d) as seen from the sensor, and velocities (T, d)."""
+    """Positions (T, d) relative to the sensor, and velocities (T, d)."""
     return x[:, position] - origin, x[:, [column + 1 for column in position]]
 
 

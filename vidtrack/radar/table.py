@@ -1,4 +1,4 @@
-"""Number columns of a CSV or Parquet file, and what is wrong in which line."""
+"""Number columns of a CSV or Parquet file, and the faults by line."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ import pyarrow.compute
 import pyarrow.csv
 import pyarrow.parquet
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import PlotFormatError, SourceError
-from vidtrack.scan import Floats, Ints, Mask
 
 Faults = dict[int, str]
-"""What is wrong, by line of the file; the first fault of a line is kept."""
+"""Fault by line of the file; the first fault of a line is kept."""
 
 SHOWN = 5
-"""Faults that a message spells out."""
+"""Number of faults that a message lists."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A file's columns as numbers, NaN where a cell is none.
+    """A file's columns as numbers, NaN for cells that are not numbers.
 
-    names   of all columns in the file; `columns` holds those that were wanted
-    line    (N,) where each row stands: the header of a CSV is line 1, blank lines do not count;
-            rows of a Parquet file count from 1
+    names   of all columns in the file; `columns` has the wanted ones
+    line    (N,) line of each row: the header of a CSV is line 1, blank lines do not count; rows of a Parquet file
+            count from 1
     unit    what `line` counts: "line" or "row"
-    faults  lines and cells that are no numbers
+    faults  bad lines and cells
     """
 
     path: Path
@@ -42,12 +42,12 @@ class Table:
     faults: Faults
 
     def refuse(self, bad: Mask, name: str, rule: str) -> None:
-        """Note the rows of a mask (N,) whose value in column `name` breaks a rule."""
+        """Add a fault for the rows of a mask (N,) whose value in column `name` breaks a rule."""
         for row in np.flatnonzero(bad):
             self.note(int(row), f"{name} is {self.columns[name][row]:.10g}; {rule}")
 
     def note(self, row: int, fault: str) -> None:
-        """Note what is wrong with a row."""
+        """Add a fault of a row."""
         self.faults.setdefault(int(self.line[row]), fault)
 
     @property
@@ -56,14 +56,14 @@ class Table:
         return ~np.isin(self.line, list(self.faults))
 
     def complaint(self) -> str:
-        """All faults in words, the first few in full."""
+        """The message about all faults; it lists the first few."""
         return _complaint(self.path, self.unit, self.faults)
 
 
 def read_table(path: Path, wanted: Iterable[str]) -> Table:
-    """The wanted columns that a CSV or Parquet file has, told apart by content.
+    """The wanted columns of a CSV or Parquet file; the content decides which format it is.
 
-    Raises SourceError when there is no such file, PlotFormatError when it is neither or has no rows.
+    Raises SourceError if the file does not exist, PlotFormatError if it has neither format, or no rows.
     """
     try:
         with path.open("rb") as file:
@@ -87,7 +87,7 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str:
-    """The names that resemble a wanted one, in words."""
+    """Part of a message: the names that resemble a wanted one."""
     names = list(names)
     near = difflib.get_close_matches(wanted, names, n=3, cutoff=0.5) or names[:6]
     return f"the nearest {'is' if len(near) == 1 else 'are'} {', '.join(map(repr, near))}" if near else "it has none"
@@ -118,7 +118,7 @@ def _read_csv(path: Path, faults: Faults) -> pa.Table:
 
 
 def _lines(rows: int, skipped: list[int]) -> Ints:
-    """(rows,) line of each row of a CSV, without those that were skipped."""
+    """(rows,) line of each row of a CSV, without the skipped lines."""
     return np.delete(np.arange(2, rows + len(skipped) + 2), np.array(skipped, np.int64) - 2)
 
 
@@ -129,7 +129,7 @@ def _refuse_repeated_names(path: Path, names: list[str]) -> None:
 
 
 def _numbers(column: pa.ChunkedArray, name: str, line: Ints, faults: Faults) -> Floats:
-    """A column as floats; each text that is no number becomes a fault."""
+    """A column as floats; each cell that is not a number becomes a fault."""
     try:
         if pa.types.is_string(column.type):
             column = pa.compute.utf8_trim_whitespace(column)

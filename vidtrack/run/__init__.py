@@ -1,1 +1,1 @@
-"""Everything between the command line and the stages: source, steps, sinks, folder. Read `run/run.py` first."""
+"""Runs: each connects a source, a tracker and sinks, and writes a folder of results. Read `run/run.py` first."""

@@ -1,4 +1,4 @@
-"""Stored detections become tracks: each box of the file is one whole object."""
+"""Tracks stored detections: each box in the file is one whole object."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import open_detections
 from vidtrack.output.confirmed import HOLD_S
-from vidtrack.output.folder import spare
+from vidtrack.output.folder import refuse_overwriting
 from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.sinks import file_sinks, file_subject
 from vidtrack.run.steps import scan_steps
 from vidtrack.run.trackers import build_box_tracker
-from vidtrack.video.detections import open_detections
 
 
 @contextmanager
 def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipeline]:
-    """A MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
+    """The pipeline of a MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
     boxes = open_detections(path, settings)
-    spare(boxes.place, extras.masks, extras.video)
+    refuse_overwriting(boxes.place, extras.masks, extras.video)
     tracker = build_box_tracker(
         settings.tracker,
         boxes.settings,

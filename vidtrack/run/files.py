@@ -1,14 +1,14 @@
-"""A run over a file with pictures or boxes, whichever it is."""
+"""Runs over files: video, images, recordings or stored detections."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import is_detections
 from vidtrack.run.boxes import box_pipeline
 from vidtrack.run.run import Extras, Run
 from vidtrack.run.video import video_pipeline
-from vidtrack.video.detections import is_detections
 
 
 def run_file(

@@ -1,4 +1,4 @@
-"""Radar plots become tracks: plots, scans, tracker, and sinks in metres. No pictures, and no OpenCV."""
+"""Tracks radar plots: table, scans, tracker, and sinks in metres. Does not load OpenCV."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.methods import STRENGTH
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
@@ -26,14 +26,14 @@ from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
-from vidtrack.scan import Tracks
 from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Tracks
 
 
 def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 0) -> Iterator[tuple[int, Tracks]]:
-    """Number of each scan of a plot table (CSV, Parquet) and the tracks after it, lazily.
+    """Yields the number of each scan of a plot table (CSV, Parquet) and the tracks after it, lazily.
 
     Raises SourceError and PlotFormatError for a table that cannot be used.
     """
@@ -52,13 +52,13 @@ def run_plots(
     force: bool = False,
     seed: int = 0,
 ) -> Run:
-    """A run over a plot table; the seed is for particles. Raises as Run, and PlotFormatError."""
+    """A run over a plot table; `seed` is for the particle filter. Raises the errors of Run, and PlotFormatError."""
     return Run(radar_pipeline(path, settings, extras or Extras(), seed), output, force=force)
 
 
 @contextmanager
 def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> Iterator[Pipeline]:
-    """A plot table. Raises SourceError, PlotFormatError, ConfigError."""
+    """The pipeline of a plot table. Raises SourceError, PlotFormatError, ConfigError."""
     plots = read_plots(path, settings.radar)
     found = measurements(plots, settings.radar)
     refuse_link(settings.output, "radar runs")
@@ -79,22 +79,22 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
 
 
 def radar_sinks(settings: Settings, extras: Extras, dim: int, folder: Path) -> Iterator[Sink]:
-    """All sinks of a run over plots in `dim` dimensions."""
+    """The sinks of a run over plots in `dim` dimensions."""
     table = TrackTable(folder, RADAR if dim == 2 else RADAR_3D)
     plot = RadarPlot(folder / "tracks.png", settings.radar.position[:2])
     yield Confirmed(*smoothed_first(settings.output, table, plot), hold_s=math.inf)  # scans may be far apart
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv", index="scan")
     if extras.rerun is not None:
-        from vidtrack.output.rerun_radar import RadarRerun
+        from vidtrack.output.rerun.plots import RadarRerun
 
         yield Threaded(RadarRerun(extras.rerun, settings))
 
 
 def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False, seed: int = 0) -> Tracker:
-    """The tracker that the settings describe, for these measurements in metres; the seed is for particles.
+    """The tracker of the settings for these measurements in metres; `seed` is for the particle filter.
 
-    Raises ConfigError for a filter that cannot be smoothed, or a method that needs amplitudes where there are none.
+    Raises ConfigError for a filter without a smoother, or a method that needs amplitudes where there are none.
     """
     radar, common = settings.radar, settings.tracker
     if common.method in STRENGTH and found.amplitude is None:

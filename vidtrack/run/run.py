@@ -1,7 +1,7 @@
 """A run: a source becomes steps, the steps go to sinks, the sinks write a folder.
 
-`video.py`, `boxes.py` and `radar.py` each make the pipeline of one kind of input: its source, its steps, and its plain
-list of sinks. `live/` runs a source that never ends.
+`video.py`, `boxes.py` and `radar.py` each make the pipeline of one kind of input: its source, its steps and its list of
+sinks. `live/` runs a source without an end.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from pathlib import Path
 from types import TracebackType
 
 from vidtrack.errors import SourceError
-from vidtrack.output.folder import begun, spare, withdraw
+from vidtrack.output.folder import begun, refuse_overwriting, withdraw
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 
 
 @dataclass(frozen=True, slots=True)
 class Extras:
-    """What a run writes beside its tables.
+    """Optional outputs of a run.
 
     rerun      FILE.rrd, "spawn" or "serve"
-    video      annotated video
+    video      file of the annotated video
     masks      folder of masks
-    decisions  why each track got what it got
+    decisions  whether to write decisions.csv, the reason of each assignment
     """
 
     rerun: str | None = None
@@ -35,20 +35,20 @@ class Extras:
 
     @property
     def explain(self) -> bool:
-        """Whether the tracker has to keep each scan's choices."""
+        """Whether the tracker must keep each scan's choices."""
         return self.decisions or self.rerun is not None
 
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
-    """An open source, and what happens to it.
+    """An open source with its steps and sinks.
 
-    name     of the source, after which the folder is named
-    place    what is read: nothing is written over it
-    count    of the steps; None: not known beforehand
-    steps    each frame or scan with its tracks, made when it is asked for
+    name     of the source; names the folder
+    place    path of the source, which must not be overwritten
+    count    number of steps; None: unknown
+    steps    each frame or scan with its tracks, computed lazily
     summary  opens summary.json in a folder
-    sinks    opens everything else in a folder, one after the other
+    sinks    opens the other outputs in a folder, one after the other
     """
 
     name: str
@@ -60,31 +60,30 @@ class Pipeline:
 
 
 class Run:
-    """Iterates over the steps of a pipeline while its sinks write them; use it with `with`.
+    """Context manager that iterates over the steps of a pipeline and passes them to its sinks.
 
     output  folder of the results; None: runs/NAME
     force   replace the results of an earlier run in `output`
 
-    folder        where the results are
+    folder        of the results
     name, count   of the pipeline
 
-    However the `with` block is left, all results are complete and valid up to the last whole step;
-    `summary.json` says whether the run was interrupted.
-    Raises SourceError, FormatError, ConfigError or OutputError at the start, StoppedEarly when results can no longer
-    be written.
+    When the `with` block ends, even by an exception, all results are complete up to the last whole step;
+    `summary.json` states whether the run was interrupted.
+    Raises SourceError, FormatError, ConfigError or OutputError at the start, StoppedEarly on a write error.
     """
 
     def __init__(
         self, pipeline: AbstractContextManager[Pipeline], output: Path | None = None, *, force: bool = False
     ) -> None:
         self._begun = False
-        with ExitStack() as stack:  # if a later step fails, what is already open is closed
+        with ExitStack() as stack:  # on an error below, everything already open is closed
             opened = stack.enter_context(pipeline)
-            spare(opened.place, output)
+            refuse_overwriting(opened.place, output)
             self.name, self.count, self._steps = opened.name, opened.count, opened.steps
             with begun(output, opened.name, force) as self.folder, ExitStack() as written:
                 self._summary = opened.summary(self.folder)
-                written.push(self._end)  # the last of all: it reports what the others did
+                written.push(self._end)  # closed last: it reports on the other sinks
                 self._sinks: list[Sink] = []
                 for sink in opened.sinks(self.folder):
                     self._sinks.append(sink)
@@ -105,16 +104,16 @@ class Run:
     ) -> None:
         self._open.__exit__(kind, error, trace)
         if isinstance(error, SourceError) and not self._begun:
-            withdraw(self.folder)  # the corrected command may use it
+            withdraw(self.folder)  # so that the corrected command can use it
 
     def _end(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Close the summary. The error is that of the run, or of a sink that could not be closed."""
+        """Close the summary. The error is from the run or from closing a sink."""
         self._summary.interrupted = kind is not None
         self._summary.close()
 
 
 def recorded(steps: Iterable[Step], sinks: Sequence[Sink]) -> Iterator[Step]:
-    """The steps, each once all sinks have it."""
+    """Yields each step after all sinks have received it."""
     for step in steps:
         for sink in sinks:
             sink.step(step)

@@ -1,4 +1,4 @@
-"""The sinks of runs in pixels, in plain lists: tables, and what shows pictures."""
+"""Lists of the sinks of runs in pixels: tables, and outputs with pictures."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vidtrack.config import Settings
-from vidtrack.estimate.model import Motion
+from vidtrack.config.settings import Settings
+from vidtrack.detections.stored import Detections
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
 from vidtrack.output.decisions import DecisionLog
@@ -21,13 +22,12 @@ from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.threaded import Threaded
+from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
-from vidtrack.traffic.road import road_at
-from vidtrack.video.detections import Detections
+from vidtrack.traffic.metres import road_at
 from vidtrack.video.frame import Image
-from vidtrack.video.recording import Recording
 from vidtrack.video.source import Source
 
 if TYPE_CHECKING:
@@ -36,16 +36,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What the results are about.
+    """The source and settings of a run, as the sinks need them.
 
-    source    as summary.json names it, without any password
+    source    name in summary.json, without any password
     settings  of the run
-    shape     (H, W) of its pictures
-    fps       its nominal rate
-    scene     gives the (H, W, 3) background; None: there are no pictures
-    reading   gives the source's own account, see Summary
-    counter   counts over lines; None without any
-    road      places vehicles on the road; None without a calibrated site
+    shape     (H, W) of the pictures
+    fps       nominal rate [1/s]
+    scene     returns the (H, W, 3) background; None: there are no pictures
+    reading   returns the source's counters, see Summary
+    counter   line counter; None without counting lines
+    road      positions on the road; None without a calibrated site
     """
 
     source: str
@@ -63,12 +63,12 @@ class Subject:
         return self.counter.lines if self.counter else ()
 
     def summary(self, folder: Path) -> Summary:
-        """summary.json in a folder."""
+        """Opens summary.json in a folder."""
         return Summary(folder / "summary.json", self.source, self.settings, self.reading, self.counter)
 
 
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
-    """A counter for the lines of the settings, in a picture of that size; None without any."""
+    """A counter for the lines in the settings, in a picture of this size [px]; None without lines."""
     lines = parse_lines(settings.output.lines, width, height)
     return LineCounter(lines) if lines else None
 
@@ -80,7 +80,7 @@ def file_subject(
     settings: Settings,
     scene: Callable[[], Image] | None,
 ) -> Subject:
-    """A source that ends, `path` as the user wrote it. Raises ConfigError for a bad line or site."""
+    """The subject of a file, `path` as the user wrote it. Raises ConfigError for a bad line or site."""
     stats = source.stats
 
     def reading() -> dict[str, object]:
@@ -105,11 +105,11 @@ def file_subject(
 def file_sinks(
     subject: Subject, extras: Extras, folder: Path, *, motion: Motion, link_s: float | None, hold_s: float
 ) -> Iterator[Sink]:
-    """All sinks of a source that ends.
+    """The sinks of a run over a file.
 
-    motion  the tracker's model, for links
-    link_s  longest gap over which broken tracks are joined; None: they are not
-    hold_s  how long rows wait for their track to be confirmed
+    motion  the tracker's motion model, for links
+    link_s  longest gap over which broken tracks are joined [s]; None: they are not joined
+    hold_s  longest time that rows wait for the confirmation of their track [s]
     """
     counter, output = subject.counter, subject.settings.output
     if counter is not None:
@@ -127,7 +127,7 @@ def file_sinks(
 
 
 def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]]:
-    """Masks, the annotated video and rerun, each with its name: what takes long enough for a thread of its own."""
+    """Names and sinks of masks, annotated video and rerun, which are slow and run in threads of their own."""
     settings = subject.settings
     if extras.masks is not None:
         yield "masks", MaskFolder(extras.masks)
@@ -136,6 +136,6 @@ def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]
 
         yield "video", AnnotatedVideo(extras.video, subject.fps, settings.output, subject.lines)
     if extras.rerun is not None:
-        from vidtrack.output.rerun import RerunSink
+        from vidtrack.output.rerun.pictures import RerunSink
 
         yield "rerun", RerunSink(extras.rerun, subject.shape, settings, subject.lines)

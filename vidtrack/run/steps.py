@@ -1,4 +1,4 @@
-"""Ready-made scans through a tracker: stored detections and radar plots."""
+"""Tracks scans that exist before the run: stored detections and radar plots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.tracking.tracker import Tracker
 
 
 def scan_steps(scans: Iterable[tuple[int, Scan]], tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:
-    """Each numbered scan with the tracks after it.
+    """Yields a step for each (number, scan), with the tracks after it.
 
     redundant  probability with which two measurements of one target are combined first; None: they are not combined
     """

@@ -1,12 +1,12 @@
-"""The trackers that the settings describe, of blobs and of a detector's boxes. No pictures, and no OpenCV."""
+"""Builds the trackers of the settings, for blobs and for a detector's boxes. Does not load OpenCV."""
 
 from __future__ import annotations
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
-from vidtrack.associate.trust import EQUAL, Trust
-from vidtrack.config import DetectionSettings, Settings, TrackerSettings
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
+from vidtrack.config.settings import DetectionSettings, Settings, TrackerSettings
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import life, rule
 from vidtrack.tracking.occlusion.occlusion import Occlusion
@@ -18,12 +18,12 @@ from vidtrack.tracking.tracker import Tracker
 
 
 def box_tracker(settings: Settings | None = None, bounds: tuple[float, float] | None = None) -> Tracker:
-    """A tracker for `box_scan`, the boxes of your own detector, as `vidtrack track det.txt` has it.
+    """A tracker for `box_scan`, the boxes of your own detector, as in `vidtrack track det.txt`.
 
-    bounds  (width, height) of the picture [px]: tracks that leave it end at once; None: they end when unseen for long
+    bounds  (width, height) of the picture [px]: tracks that leave it end at once; None: they end by time alone
 
-    What the settings leave open (accelerations, scores that may not start a track) a file tells beforehand and a
-    stream cannot: `tracker.accel` holds then, and every box may start a track.
+    A file of detections supplies settings that are None (acceleration, least score that starts a track). A stream
+    cannot: `tracker.accel` then applies, and every box may start a track.
     """
     settings = settings or Settings()
     return build_box_tracker(settings.tracker, settings.detections, bounds)
@@ -36,10 +36,10 @@ def build_blob_tracker(
     explain: bool = False,
     smooth: bool = False,
 ) -> Tracker:
-    """The tracker of blobs within bounds (width, height) [px]: a blob may be a part of a vehicle, or several.
+    """The tracker of blobs within bounds (width, height) [px]: a blob may be part of a vehicle, or several vehicles.
 
     explain  keep each scan's choices, for decisions.csv and rerun
-    smooth   keep what a smoother needs
+    smooth   keep predictions and gains for the smoother
     """
     associate = rule(settings)
     merging = settings.merged_blobs and not isinstance(associate, ForestRule)
@@ -80,12 +80,12 @@ def build_box_tracker(
 ) -> Tracker:
     """The tracker of a detector's boxes within bounds (width, height) [px]: each box is one whole object.
 
-    Boxes may overlap but are never shared, their size and score are evidence, and M hits of N confirm a track even if
-    it does not move.
+    Tracks never share a box; size and score enter the likelihood; M hits in N scans confirm a track even if it does
+    not move.
 
-    pace     seconds of the scans' clock in a second of the settings; not 1 where the rate of the scans is assumed
+    pace     seconds of scan time per second of the settings; not 1 where the rate of the scans is assumed
     explain  keep each scan's choices, for decisions.csv and rerun
-    smooth   keep what a smoother needs
+    smooth   keep predictions and gains for the smoother
     """
     return Tracker(
         model=_motion(settings, settings.accel if detections.accel is None else detections.accel, pace),
@@ -101,7 +101,7 @@ def build_box_tracker(
             coast_scans=None,
         ),
         picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace, exit_s=EXIT_S * pace),
-        trust=EQUAL if detections.sure_score is None else Trust(detections.sure_score),
+        two_stage=SINGLE_STAGE if detections.sure_score is None else TwoStage(detections.sure_score),
         detection_probability=detections.detection_probability,
         clutter_density=settings.clutter_density,
         explain=explain,
@@ -110,7 +110,7 @@ def build_box_tracker(
 
 
 def _motion(settings: TrackerSettings, accel: float, pace: float = 1.0) -> ConstantVelocity:
-    """Nearly constant velocity in the picture, accelerations in object sizes; `cross` in proportion to `accel`."""
+    """Nearly constant velocity in the picture, acceleration in object sizes; `cross` is proportional to `accel`."""
     accel = accel / pace**2
     return ConstantVelocity(
         dim=2,

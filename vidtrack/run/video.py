@@ -1,4 +1,4 @@
-"""Pictures become tracks: source, detector, tracker, frame by frame. Read this file after `run.py`."""
+"""Tracks video: source, detector and tracker, frame by frame. Read this file after `run.py`."""
 
 from __future__ import annotations
 
@@ -10,35 +10,36 @@ from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
-from vidtrack.config import Settings
+from vidtrack.arrays.types import Mask
+from vidtrack.config.settings import Settings
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S
-from vidtrack.output.folder import spare
+from vidtrack.output.folder import refuse_overwriting
 from vidtrack.output.sink import Step
+from vidtrack.recording.source import Recording, is_recording
 from vidtrack.run.live.checkpoint import Checkpoint
 from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.trackers import build_blob_tracker
-from vidtrack.scan import TENTATIVE, Mask, Tracks
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.video import background
+from vidtrack.video.blobs.explain import explain
+from vidtrack.video.blobs.outlook import Outlook
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
-from vidtrack.video.recording import Recording, is_recording
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import open_source
-from vidtrack.video.vehicles.explain import explain
-from vidtrack.video.vehicles.outlook import Outlook
 
 log = logging.getLogger(__name__)
 
 
 def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
-    """Frames of a video (file, image folder or glob) with the tracks in each, lazily.
+    """Yields each frame of a video (file, image folder or glob) with its tracks, lazily.
 
-    settings  such as load_settings(assignments=["tracker.coast_s=2"]); None: the defaults
+    settings  for example load_settings(assignments=["tracker.coast_s=2"]); None: the defaults
 
-    Raises SourceError when the input is missing or yields nothing.
+    Raises SourceError if the input is missing or yields no frame.
     """
     settings = settings or Settings()
     with open_source(str(path), settings.source) as source:
@@ -51,24 +52,24 @@ def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[
 
 @contextmanager
 def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipeline]:
-    """A video file, image folder or glob, or the recording of a live run.
+    """The pipeline of a video file, image folder, glob, or recording of a live run.
 
     Raises SourceError, FormatError, ConfigError, OutputError.
     """
-    from vidtrack.run.sinks import file_sinks, file_subject  # who only tracks needs no tables
+    from vidtrack.run.sinks import file_sinks, file_subject  # `track` needs no sinks
 
     recorded = is_recording(path)
     with (
         closing(Recording(path) if recorded else open_source(path, settings.source)) as source,
         frame_by_frame(settings.detector.kind),
     ):
-        spare(source.place, extras.masks, extras.video)
+        refuse_overwriting(source.place, extras.masks, extras.video)
         tracker = build_blob_tracker(
             settings.tracker, (source.width, source.height), explain=extras.explain, smooth=settings.output.smooth
         )
         detector = build_detector(settings)
         if isinstance(source, Recording):
-            source.remember = Checkpoint(detector, tracker, source.like).restore
+            source.restore = Checkpoint(detector, tracker, source.like).restore
         subject = file_subject(path, source, tracker, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S
@@ -83,17 +84,17 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
 
 
 def build_detector(settings: Settings) -> Background:
-    """The detector that the settings describe. Raises ConfigError for a mask that is not a picture."""
+    """The detector of the settings. Raises ConfigError for a mask that is not a picture."""
     path = settings.source.mask
     keep = None if path is None else read_mask(path)
     return background.create(settings.detector, settings.source.scale, keep)
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:
-    """Each frame through detector and tracker.
+    """Yields a step for each frame, after detector and tracker.
 
-    The tracker's prediction reaches the detector before the frame is processed: fragments are joined inside a
-    predicted box, and vehicles that were seen driving are not absorbed into the scene.
+    The detector receives the tracker's prediction before it processes the frame: fragments are joined inside a
+    predicted box, and vehicles that have driven are not absorbed into the scene.
     """
     outlook = Outlook()
     ended = perf_counter()
@@ -122,6 +123,6 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
 def has_driven(tracks: Tracks) -> Mask:
     """(T,) confirmed tracks that have travelled farther than one and a half times their size.
 
-    A ghost, the mark that a departed vehicle leaves in the scene, never does, and must not be kept from being absorbed.
+    A ghost, the mark that a departed vehicle leaves in the scene, never travels, and must be absorbed.
     """
     return (tracks.status != TENTATIVE) & (tracks.travel > 1.5 * longer(tracks.box))

@@ -1,4 +1,4 @@
-"""CLEAR MOT: how many objects are found, and how often a track jumps from one to another.
+"""CLEAR MOT: detection errors and identity switches.
 
 K. Bernardin, R. Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR MOT
 Metrics", EURASIP J. Image and Video Processing, 2008.
@@ -10,19 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Ints, Mask
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.score.matching import Matchup, best_pairs, split_contests
 
 EPS = float(np.finfo(float).eps)
-CONTINUES = 1000.0  # outweighs any similarity, so that keeping last frame's pairs comes first
+CONTINUES = 1000.0  # outweighs any similarity, so that pairs of the last frame come first
 
 
 @dataclass(frozen=True, slots=True)
 class Clear:
     """CLEAR scores; `mota` and `motp` (mean similarity of the matches) as fractions.
 
-    A switch is a match to another track than the object's last one. A fragmentation is a match that
-    resumes after frames without. Mostly tracked: more than 80 % of an object's rows are matched;
+    A switch is a match to another track than the object's last one. A fragmentation is a match after
+    frames without a match. Mostly tracked: more than 80 % of an object's rows are matched;
     mostly lost: less than 20 %.
     """
 
@@ -41,7 +41,7 @@ class Clear:
 def clear(matchup: Matchup, threshold: float = 0.5) -> Clear:
     """CLEAR scores of a result, matched at a similarity of at least `threshold`.
 
-    Equal to TrackEval: a frame in which either side is empty neither ends nor begins a fragment.
+    As in TrackEval, a frame in which truth or result is empty neither ends nor begins a fragment.
     """
     matched = correspondences(matchup, threshold)
     matches = int(matched.sum())
@@ -73,8 +73,8 @@ def clear(matchup: Matchup, threshold: float = 0.5) -> Clear:
 
 
 def correspondences(matchup: Matchup, threshold: float = 0.5) -> Mask:
-    """The pairs (B,) that CLEAR matches: in each frame first those that continue a match of the frame
-    before, then the largest total similarity.
+    """The pairs (B,) that CLEAR matches: in each frame first those that continue a match of the previous
+    frame, then those of the largest total similarity.
     """
     close = np.flatnonzero(matchup.similarity >= threshold - EPS)
     truth, result = matchup.truth[close], matchup.result[close]
@@ -97,7 +97,7 @@ def _frames_with_both(matchup: Matchup) -> Ints:
 
 
 def _same_pair_one_frame_before(which: Ints, frame: Ints) -> Ints:
-    """(B,) the index of the pair of the same identities in the frame before, -1 for none."""
+    """(B,) the index of the pair of the same identities in the previous frame, -1 for none."""
     order = np.lexsort((frame, which))
     follows = (np.diff(which[order]) == 0) & (np.diff(frame[order]) == 1)
     before = np.full(len(which), -1)

@@ -1,4 +1,4 @@
-"""Consistency: whether errors are as large as the covariances say.
+"""Consistency: whether errors agree with the covariances.
 
 Y. Bar-Shalom, X. R. Li, T. Kirubarajan, "Estimation with Applications to Tracking and Navigation",
 Wiley 2001, section 5.4.
@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaincinv
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.formats import Table
-from vidtrack.scan import Floats, Ints
 
 
 @dataclass(frozen=True, slots=True)
 class Consistency:
-    """The mean of a normalised square and where it should lie.
+    """The mean of a normalised squared error and its confidence bounds.
 
     low, high   confidence bounds of the mean of `samples` independent chi-square values; in one run the
                 values of a track are correlated in time, and the true bounds are wider
@@ -32,9 +32,9 @@ class Consistency:
 
 
 def consistency(values: Floats, dim: int, confidence: float = 0.95) -> Consistency | None:
-    """Compare NEES or NIS values (K,) with chi-square of `dim` degrees; NaN is left out, None without values.
+    """Compare NEES or NIS values (K,) with chi-square of `dim` degrees of freedom; NaN is ignored, None without values.
 
-    A mean above `high` says that the covariances are too small, one below `low` too large.
+    With a mean above `high` the covariances are too small, below `low` too large.
     """
     values = values[np.isfinite(values)]
     count = len(values)
@@ -49,7 +49,7 @@ def consistency(values: Floats, dim: int, confidence: float = 0.95) -> Consisten
 def nees(result: Table, truth: Table, result_rows: Ints, truth_rows: Ints) -> Floats:
     """Normalised estimation error squared (K,) of the position, e' P^-1 e, of matched rows (K,).
 
-    NaN where the covariance is missing or not positive definite.
+    NaN if the covariance is missing or not positive definite.
     """
     value = np.full(len(result_rows), np.nan)
     if result.cov is None:

@@ -1,4 +1,4 @@
-"""HOTA: detection and association in balance.
+"""HOTA: the geometric mean of detection and association accuracy.
 
 J. Luiten et al., "HOTA: A Higher Order Metric for Evaluating Multi-Object Tracking", IJCV 2021.
 """
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.score.matching import Matchup, assign
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
@@ -45,7 +45,7 @@ def hota(matchup: Matchup, alphas: Floats = ALPHAS) -> Hota:
 
 
 def _share_of_similarity(matchup: Matchup) -> Floats:
-    """(B,) each pair's similarity over all similarity of its two rows, as the soft count of a match."""
+    """(B,) each pair's similarity over the summed similarity of its two rows: the soft count of a match."""
     of_truth = np.bincount(matchup.truth, matchup.similarity)[matchup.truth] if len(matchup.truth) else np.zeros(0)
     of_result = np.bincount(matchup.result, matchup.similarity)[matchup.result] if len(matchup.truth) else np.zeros(0)
     total = of_truth + of_result - matchup.similarity

@@ -1,4 +1,4 @@
-"""Identity scores: how much of the truth is covered by the one best track of each object.
+"""Identity scores: the share of the truth that the best single track of each object covers.
 
 E. Ristani et al., "Performance Measures and a Data Set for Multi-Target, Multi-Camera Tracking",
 ECCV Workshops 2016.
@@ -23,7 +23,7 @@ class Identity:
 
 
 def identity(matchup: Matchup, threshold: float = 0.5) -> Identity:
-    """Identity scores: objects and tracks are paired one to one for the whole run, to share most rows.
+    """Identity scores: objects and tracks are paired one to one for the whole run, so that they share most rows.
 
     Rows are shared when their similarity is at least `threshold`.
     """

@@ -1,4 +1,4 @@
-"""Result and truth side by side: how alike the rows of a frame are, and one-to-one assignment of them."""
+"""Compares result and truth: similarity of the rows of a frame, and their one-to-one assignment."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
 from vidtrack.formats import Table
-from vidtrack.scan import Floats, Ints, Mask
 
 FRAME_SPACING = 3.0  # in units of the reach: rows of different frames are never near
-ROUNDING = 1e-9  # keeps pairs exactly at the reach, which are judged afterwards
+ROUNDING = 1e-9  # keeps pairs exactly at the reach, which are tested afterwards
 
 
 @dataclass(frozen=True, slots=True)
 class Matchup:
-    """Truth and result by frame, and the pairs of them that are alike at all.
+    """Truth and result by frame, and their pairs of positive similarity.
 
     truth_frame, result_frame   (N,), (M,) the frame of each row, numbered 0..F-1
     truth_id, result_id         (N,), (M,) the identity of each row, numbered from 0 without gaps
@@ -59,14 +59,14 @@ class Matchup:
         return max(self.truth_frame.max(initial=-1), self.result_frame.max(initial=-1)) + 1
 
     def identity_pairs(self) -> tuple[Ints, Ints, Ints]:
-        """The distinct (truth id, result id) among the pairs: (K,), (K,), and (B,) which of them each pair is."""
+        """The distinct (truth id, result id) of the pairs: (K,), (K,), and their index (B,) for each pair."""
         results = self.result_id.max(initial=0) + 1
         key, which = np.unique(self.truth_id[self.truth] * results + self.result_id[self.result], return_inverse=True)
         return key // results, key % results, which
 
 
 def match_boxes(result: Table, truth: Table) -> Matchup:
-    """Compare boxes by intersection over union. Raises ConfigError when a table has none."""
+    """Compare boxes by intersection over union. Raises ConfigError if a table has no boxes."""
     if result.box is None or truth.box is None:
         raise ConfigError("both tables need boxes to be matched by IoU; match points instead")
     truth_half, result_half = truth.box[:, 2:] / 2, result.box[:, 2:] / 2
@@ -77,7 +77,7 @@ def match_boxes(result: Table, truth: Table) -> Matchup:
 
 
 def match_points(result: Table, truth: Table, max_distance: float, reach: float = 0.0) -> Matchup:
-    """Compare positions by Euclidean distance d, in the axes both tables have.
+    """Compare positions by Euclidean distance d, in the axes common to both tables.
 
     The similarity 1 - d / (2 max_distance) is 0.5 at max_distance [px or m]; pairs are listed up to
     twice that, or to `reach` if it is larger. Raises ConfigError for positions in different units.
@@ -97,7 +97,7 @@ def box_iou(a: Floats, b: Floats) -> Floats:
     a_start, b_start = a[:, :2], b[:, :2]
     a_end, b_end = a_start + a[:, 2:], b_start + b[:, 2:]
     overlap = _area(np.maximum(np.minimum(a_end, b_end) - np.maximum(a_start, b_start), 0.0))
-    # Sides from the rounded corners, as the overlap's are: equal boxes then have exactly 1.
+    # Sides are from the rounded corners, like the overlap: equal boxes then have exactly 1.
     union = _area(a_end - a_start) + _area(b_end - b_start) - overlap
     return np.divide(overlap, union, out=np.zeros_like(union), where=overlap > 0)
 
@@ -109,8 +109,8 @@ def _area(sides: Floats) -> Floats:
 def _near_rows(truth: Table, result: Table, truth_at: Floats, result_at: Floats, reach: Floats) -> tuple[Ints, Ints]:
     """Rows of truth and result (B,), (B,) of equal frames that differ by at most `reach` (d,) on every axis.
 
-    In order of frame. A k-d tree with the frame as one more axis finds them; listing all pairs of
-    a frame would cost its square.
+    Sorted by frame. Found by a k-d tree with the frame as an additional axis, since all pairs of a
+    frame would cost its square.
     """
     scale = np.where(reach > 0, reach, 1.0)
     finite, trees = [], []
@@ -145,7 +145,7 @@ def _matchup(
 
 
 def assign(frame: Ints, row: Ints, column: Ints, score: Floats) -> Mask:
-    """The one-to-one choice of pairs (B,) in each frame with the largest total score, scores above zero."""
+    """The one-to-one choice of pairs (B,) in each frame with the largest total score, of scores above zero."""
     chosen, contests = split_contests(frame, row, column)
     for pairs, i, j in contests:
         chosen[pairs] = best_pairs(i, j, score[pairs])
@@ -153,9 +153,9 @@ def assign(frame: Ints, row: Ints, column: Ints, score: Floats) -> Mask:
 
 
 def split_contests(frame: Ints, row: Ints, column: Ints) -> tuple[Mask, Iterator[tuple[Ints, Ints, Ints]]]:
-    """The pairs (B,) that no other pair competes with, and frame by frame the others.
+    """The pairs (B,) whose row and column occur only once, and the others frame by frame.
 
-    Pairs must be in order of frame. Each contest is the indices of its pairs and their rows and
+    Pairs must be sorted by frame. Each contest has the indices of its pairs and their rows and
     columns, numbered from 0.
     """
     free = (np.bincount(row)[row] == 1) & (np.bincount(column)[column] == 1) if len(row) else np.zeros(0, bool)
@@ -174,7 +174,7 @@ def _contests(pairs: Ints, frame: Ints, row: Ints, column: Ints) -> Iterator[tup
 
 
 def _numbered_in_frame(frame: Ints, row: Ints, starts: Ints) -> Ints:
-    """Rows renumbered 0, 1, ... within their frame, in their order; starts (S,) is where each frame begins."""
+    """Rows renumbered 0, 1, ... within their frame, in order; starts (S,) index of each frame's first row."""
     _, rank = np.unique(frame * (row.max() + 1) + row, return_inverse=True)
     lowest = np.minimum.reduceat(rank, starts)
     return rank - np.repeat(lowest, np.diff(np.append(starts, len(row))))

@@ -1,4 +1,4 @@
-"""OSPA and GOSPA: the distance between two sets of objects, errors of place and of number in one unit.
+"""OSPA and GOSPA: distances between two sets of objects, with errors of position and number in one unit.
 
 D. Schuhmacher, B.-T. Vo, B.-N. Vo, "A Consistent Metric for Performance Evaluation of Multi-Object
 Filters", IEEE Trans. Signal Processing, 2008.
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints
 from vidtrack.score.matching import Matchup, assign
 
 
@@ -38,7 +38,7 @@ class Gospa:
 
 
 def ospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Ospa:
-    """OSPA of each frame: the mean over the larger set, an object without partner costing the cutoff.
+    """OSPA of each frame: the mean over the larger set, where an unpaired object costs the cutoff.
 
     `cutoff` is in the unit of the matchup's distance (1 - IoU, pixels or metres), at most its reach.
     Raises ConfigError for a cutoff beyond it or an order below 1.
@@ -53,7 +53,7 @@ def ospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Ospa:
 
 
 def gospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Gospa:
-    """GOSPA of each frame with alpha = 2: the sum over pairs, a missed or false object costing cutoff^p / 2.
+    """GOSPA of each frame with alpha = 2: the sum over pairs, where a missed or false object costs cutoff^p / 2.
 
     Units and errors as for `ospa`.
     """
@@ -65,8 +65,8 @@ def gospa(matchup: Matchup, cutoff: float, order: float = 2.0) -> Gospa:
 def _assigned(matchup: Matchup, cutoff: float, order: float) -> tuple[Floats, Ints]:
     """Sum of (distance / cutoff)^p over the optimal pairs nearer than the cutoff, and their number, by frame (F,).
 
-    A pair saves cutoff^p - distance^p against leaving both alone, in OSPA as in GOSPA, so that
-    one assignment is optimal for either. In units of the cutoff no power overflows.
+    In OSPA and GOSPA a pair costs cutoff^p - distance^p less than two unpaired objects, so one
+    assignment is optimal for both. In units of the cutoff no power overflows.
     """
     if not (0 < cutoff <= matchup.reach and cutoff < math.inf):
         raise ConfigError(f"cutoff is {cutoff}; it must be above 0, finite, and at most {matchup.reach:g} here")

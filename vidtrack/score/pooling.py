@@ -1,4 +1,4 @@
-"""Several sequences scored as one."""
+"""Joins several sequences, to score them as one."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from vidtrack.formats import Table
 
 
 def pool(runs: Iterable[tuple[Table, Table]]) -> tuple[Table, Table]:
-    """Sequences of (result, truth) as one result and one truth, their frames and identities kept apart.
+    """Join sequences of (result, truth) into one result and one truth, with distinct frames and identities.
 
-    The scores of the two are those of TrackEval's combined sequences: every object counts once,
-    whatever the length of its sequence.
+    Their scores are those of TrackEval's combined sequences: every object counts once, independent of the
+    length of its sequence.
     """
     results: list[Table] = []
     truths: list[Table] = []
@@ -30,7 +30,7 @@ def pool(runs: Iterable[tuple[Table, Table]]) -> tuple[Table, Table]:
 
 
 def _stack(tables: Sequence[Table]) -> Table:
-    """Tables below each other, with the columns that all of them have."""
+    """Tables concatenated, with the columns common to all."""
 
     def column(name: str) -> NDArray | None:
         columns = [getattr(table, name) for table in tables]

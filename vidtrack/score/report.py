@@ -31,13 +31,13 @@ def evaluate(
     order: float = 2.0,
     states: Table | None = None,
 ) -> dict[str, float | int | str]:
-    """Every score of `result` against `truth`, by name; fractions, not percent.
+    """All scores of `result` against `truth`, by name; fractions, not percent.
 
-    Truth rows with conf 0 are ignored. Boxes match at an IoU of at least `iou`. Points are matched when
+    Truth rows with conf 0 are ignored. Boxes match at an IoU of at least `iou`. Points are matched if
     `points` is set or a table has no boxes, within `max_distance` (None: 20 px or 100 m).
     OSPA and GOSPA use 1 - IoU or the distance, `cutoff` (None: 1 for boxes, max_distance for points)
     and `order`; they are means over the frames in which truth or result has a row, and so are their parts.
-    NIS and NEES come from `states` (None: result) where it has the columns.
+    NIS and NEES are from `states` (None: result) if it has the columns.
     Raises FormatError for tables without identities or a truth without rows, ConfigError for bad options.
     """
     truth = truth.select(truth.conf != 0)
@@ -97,7 +97,7 @@ def _set_distances(matchup: Matchup, cutoff: float, order: float) -> dict[str, f
 
 
 def _consistency(states: Table, truth: Table, matchup: Matchup, threshold: float) -> dict[str, float]:
-    """NIS and NEES with their bounds, under the names nis, nis_low, ..., where the table has the columns."""
+    """NIS and NEES with their bounds, named nis, nis_low, ..., if the table has the columns."""
     matched = correspondences(matchup, threshold)
     values = {"nees": nees(states, truth, matchup.result[matched], matchup.truth[matched])}
     if states.nis is not None:

@@ -1,1 +1,1 @@
-"""The live page: what cameras see and how they fare, for a browser and for other programs, over HTTP."""
+"""The live page: pictures, tracks and status of the cameras over HTTP, for browsers and programs."""

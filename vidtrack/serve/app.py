@@ -1,4 +1,4 @@
-"""What the page answers."""
+"""The HTTP routes of the page."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from vidtrack.serve.metrics import CONTENT_TYPE, metrics
 log = logging.getLogger(__name__)
 
 _STATIC = Path(__file__).with_name("static")
-_STATUS_S = 0.02  # least time between two looks at a camera
-_PICTURE_S = 0.2  # and between two pictures of it
+_STATUS_S = 0.02  # least time between two status requests to a camera
+_PICTURE_S = 0.2  # least time between two pictures of a camera
 
 
 class Answers:
     """The page over `cameras` by name, and the same for other programs.
 
-    Status and pictures are made when somebody asks, once for all who do.
+    Status and pictures are computed on request, and shared by simultaneous requests.
     """
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
@@ -52,11 +52,11 @@ class Answers:
         )
 
     async def page(self, request: Request) -> Response:
-        """The page itself; its script asks for the rest."""
+        """The HTML page, whose script requests the other routes."""
         return FileResponse(_STATIC / "page.html")
 
     async def status(self, request: Request) -> Response:
-        """All cameras: name, whether it delivers, status."""
+        """Name, health and status of each camera."""
         return JSONResponse([{"name": name, "up": up, **status} for name, status, up in await self._looks()])
 
     async def picture(self, request: Request) -> Response:
@@ -70,15 +70,15 @@ class Answers:
         return Response(jpeg, media_type="image/jpeg")
 
     async def tracks(self, request: Request) -> Response:
-        """The tracks in each camera's frames, one JSON object a line, until the client leaves."""
+        """The tracks of each camera's frames, one JSON object per line, until the client disconnects."""
         return StreamingResponse(self._lines(), media_type="application/x-ndjson")
 
     async def metrics(self, request: Request) -> Response:
-        """For Prometheus."""
+        """The metrics for Prometheus."""
         return Response(metrics(await self._looks()), media_type=CONTENT_TYPE)
 
     async def healthz(self, request: Request) -> Response:
-        """200 if all cameras deliver, else 503 and which one does not."""
+        """200 if all cameras deliver, else 503 with a line for each that does not."""
         down = [f"{name}: {status['state']}" for name, status, up in await self._looks() if not up]
         return PlainTextResponse("\n".join(down or ["ok"]) + "\n", 503 if down else 200)
 
@@ -90,7 +90,7 @@ class Answers:
         ]
 
     async def _lines(self) -> AsyncIterator[str]:
-        """The newest frame each time: a slow reader misses some, and nothing piles up for it."""
+        """Always the newest frame: a slow client misses frames, and no queue grows."""
         sent = dict.fromkeys(self._cameras, -1)
         while True:
             for name, status, _ in await self._looks():

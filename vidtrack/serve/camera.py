@@ -1,4 +1,4 @@
-"""What the page asks of a camera, and how often."""
+"""The page's access to a camera, at a limited rate."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A camera as the page knows it; both functions are called in threads of the page, never by the tracker.
+    """A camera of the page. The page calls both functions in its own threads.
 
-    status   gives the fields of `vidtrack.output.status.LiveStatus` as plain data. Only `source`, `state` and
-             `problems` must be there; what is not known yet is left out
-    picture  gives the newest annotated picture as JPEG; None before the first one
-    stale_s  a camera whose last frame is older than this does not deliver
+    status   returns the fields of `vidtrack.output.status.LiveStatus` as plain data; only `source`, `state` and
+             `problems` are required
+    picture  returns the newest annotated picture as JPEG; None before the first one
+    stale_s  a camera whose last frame is older than this does not deliver [s]
     """
 
     status: Callable[[], Status]
@@ -45,7 +45,7 @@ class Camera:
 
 
 class Shared(Generic[Value]):
-    """A value that is made in a thread, at most every `least_s` seconds and once for all who ask."""
+    """A value computed in a thread, at most every `least_s` seconds, and shared by all requests."""
 
     def __init__(self, make: Callable[[], Value], least_s: float) -> None:
         self._make = make
@@ -54,7 +54,7 @@ class Shared(Generic[Value]):
         self._made: tuple[float, Value] | None = None
 
     async def get(self) -> Value:
-        """The newest value; made now if it is too old."""
+        """The current value, computed anew if it is older than `least_s`."""
         async with self._lock:
             if self._made is None or monotonic() - self._made[0] >= self._least_s:
                 value = await asyncio.to_thread(self._make)

@@ -1,4 +1,4 @@
-"""Numbers of all cameras in Prometheus' text format, version 0.0.4."""
+"""Metrics of all cameras in the Prometheus text format 0.0.4."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ from vidtrack.serve.camera import Status
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 Sample = tuple[Mapping[str, str], float]
-"""Labels beside the camera's, and a value."""
+"""Labels in addition to the camera's, and a value."""
 
 _QUANTILES = {"p50": "0.5", "p95": "0.95", "p99": "0.99", "max": "1"}
 
 
 def metrics(cameras: Iterable[tuple[str, Status, bool]]) -> str:
-    """One text of all cameras, each a name, its status, and whether it delivers.
-
-    What a camera does not know yet is left out.
-    """
+    """The metrics of cameras, each given as name, status, and whether it delivers. Unknown values are left out."""
     cameras = list(cameras)
     lines = ["# HELP vidtrack_up Whether the camera delivers and its frames are tracked.", "# TYPE vidtrack_up gauge"]
     lines += [_line("vidtrack_up", {"camera": name}, up) for name, _, up in cameras]

@@ -1,4 +1,4 @@
-"""Serves the live page in a thread of its own."""
+"""Serves the live page in a thread."""
 
 from __future__ import annotations
 
@@ -10,60 +10,60 @@ from types import TracebackType
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from vidtrack.serve.access import protected
 from vidtrack.serve.app import Answers
 from vidtrack.serve.camera import Camera
-from vidtrack.serve.door import open_door, url_of
-from vidtrack.serve.guard import guarded
+from vidtrack.serve.listener import listen, url_of
 
-_MOST = 100  # connections at a time; a camera that is opened again needs file handles too
-_ASK_S = 5.0  # in which a client has to say something
+_MOST = 100  # connections at a time; leaves file handles for reopening cameras
+_ASK_S = 5.0  # time in which a client must send a request
 _END_S = 0.5
 
 
 class Page:
-    """A page at "[HOST:]PORT"; use it with `with`.
+    """Context manager that serves the page at "[HOST:]PORT".
 
-    place  on this machine only if no host is given; port 0 is any free one
-    token  that a client must bring; without one no other machine may see the page
+    place  without a host, on loopback; port 0 is any free port
+    token  required of clients; without one only this machine has access
 
-    url    where it is
+    url    of the page
 
-    The tracker is never asked to wait: the page looks at the cameras when a client asks, and a client that is slow
-    or gone only keeps its own connection waiting. Raises ConfigError when the port cannot be used.
+    The tracker never waits for the page: cameras are read on request, and a slow client delays only its own
+    connection. Raises ConfigError if the port cannot be used.
     """
 
     def __init__(self, place: str, token: str | None = None) -> None:
-        self._door = open_door(place, token)
+        self._listener = listen(place, token)
         self._token = token
         self._server: uvicorn.Server | None = None
-        self.url = url_of(self._door)
+        self.url = url_of(self._listener)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
-        """Begin to answer; until then clients wait."""
+        """Start to respond; until then clients wait."""
         self._server = uvicorn.Server(
             uvicorn.Config(
-                guarded(Answers(cameras).app(), self._token),
+                protected(Answers(cameras).app(), self._token),
                 loop="asyncio",
                 http=_Connection,
                 ws="none",
                 lifespan="off",
                 log_config=None,
-                log_level="critical",  # clients' mistakes are no news, and ours are told by the application
+                log_level="critical",  # clients' errors are not logged; the application logs its own
                 access_log=False,
                 server_header=False,
                 proxy_headers=False,
                 timeout_graceful_shutdown=0,
             )
         )
-        self._thread = Thread(target=self._server.run, args=([self._door],), name="page", daemon=True)
+        self._thread = Thread(target=self._server.run, args=([self._listener],), name="page", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Hang up on everybody."""
+        """Close all connections and the port."""
         if self._server is not None:
             self._server.force_exit = self._server.should_exit = True
             self._thread.join(_END_S)
-        self._door.close()
+        self._listener.close()
 
     def __enter__(self) -> Page:
         return self
@@ -75,7 +75,7 @@ class Page:
 
 
 class _Connection(H11Protocol):
-    """One of not too many connections; who connects has to ask soon."""
+    """A connection, refused beyond _MOST and closed without a request within _ASK_S."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 
 NOISE_MARGIN = 64
 

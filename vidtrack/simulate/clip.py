@@ -12,8 +12,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
 from vidtrack.simulate import draw
 from vidtrack.simulate.camera import Camera, camera
 from vidtrack.simulate.clock import beginning, burn_in

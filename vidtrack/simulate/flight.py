@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 G = 9.80665
 """m/s^2, the acceleration that manoeuvres are measured in."""

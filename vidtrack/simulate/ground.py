@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.scene import Colour, Part
 
 ASPHALT: tuple[Colour, float] = ((96, 97, 98), 3.5)

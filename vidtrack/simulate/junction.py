@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, PAINT, PAVING, ROOF, WALL, YELLOW, Axes
 from vidtrack.simulate.looks import CAR_COLOURS, CLOTHES, SKIN, car, foliage, lorry, motorcycle, person
 from vidtrack.simulate.motion import cruise, distance_to, route, sway

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate import draw
 from vidtrack.simulate.moment import Canvas, Moment, Placed, pixel_centres, rounded
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate import draw
 from vidtrack.simulate.draw import Image, Sprite
 from vidtrack.simulate.scene import Actor

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.scene import Path
 
 KNOT_S = 1 / 120

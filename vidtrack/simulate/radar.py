@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.detection.amplitude import RAYLEIGH, Weibull, linear, swerling1
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull, linear, swerling1
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.radar.coordinates import to_polar, wrap
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.simulate.flight import Flight
 
 GLINT_FACTOR = 5.0

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.detection.amplitude import Weibull
+from vidtrack.amplitude.densities import Weibull
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
 from vidtrack.simulate.flight import Flight, G, Leg, fly, sidestep, weave
 from vidtrack.simulate.radar import Radar, Seen, Target, observe
 

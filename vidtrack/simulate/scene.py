@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Mask
+from vidtrack.arrays.types import Floats, Mask
 
 Colour = tuple[float, float, float]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.simulate.scene import Actor, Scene, bounds
 
 RASTER = 4  # grid cells per scene pixel and axis when areas are counted

@@ -1,1 +1,1 @@
-
+"""The tracker and its parts. Read `tracker.py` first."""

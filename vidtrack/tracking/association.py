@@ -1,4 +1,4 @@
-"""Association of one scan, and the interface of the two times at which it can be decided."""
+"""The association of one scan, and the interface of immediate and deferred decisions."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Event, Ints, Mask, Tracks
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import Tracks
 
 
 class Association(NamedTuple):
@@ -19,8 +21,8 @@ class Association(NamedTuple):
     problem   the scan's problem as the K successors of the rows see it
     decision  how the successors come from the rows
     taken     (K,) measurement of the largest weight of each successor; -1: none
-    shared    (K,) measurement that updates each successor, and perhaps others, by its edges; -1: none
-    hides     (M,) measurements that are larger than their tracks account for
+    shared    (K,) measurement whose edges update each successor, and perhaps others; -1: none
+    hides     (M,) measurements that may contain a further target: larger than their tracks
     free      (M,) measurements that start a track
     """
 
@@ -44,7 +46,7 @@ class Association(NamedTuple):
 
 
 class Timing(Protocol):
-    """When measurements are assigned for good: `Immediate`, in their own scan, or `Deferred`, some scans later.
+    """When a scan is decided finally: `Immediate`, in the scan itself, or `Deferred`, some scans later.
 
     A row of the register is a track, or one of the possible histories of a track.
     """
@@ -53,22 +55,22 @@ class Timing(Protocol):
         """Assign measurements to the rows; the register's rows become their successors."""
 
     def shown(self, rows: int) -> Mask:
-        """(rows,) which of the first rows are shown as tracks."""
+        """(rows,) the rows, of the first `rows`, that are output as tracks."""
 
     def visible(self, tracks: Tracks) -> Tracks:
-        """Those of all rows that are shown, one a track."""
+        """The output rows of `tracks`, one per track."""
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
-        """Choose the rows that are shown, once the new tracks are in the bank."""
+        """Choose the output rows, after the new tracks are in the bank."""
 
     def confirm(self, ready: Mask, register: Register) -> Mask:
-        """Confirm the tracks of those rows that are `ready` (T,) by their life and sure enough; returns (T,) these."""
+        """Confirm tracks of rows that are `ready` (T,) by their life cycle, and certain enough; returns (T,) these."""
 
     def ended(self, ids: Ints, going: Mask, why: Mask) -> Ints:
-        """Ids of the tracks whose last row, of those with ids (T,), is among `going` (T,), with a row in `why` (T,)."""
+        """Ids of tracks without rows (ids (T,)) outside `going` (T,), if a row is in `why` (T,)."""
 
     def keep(self, kept: Mask) -> None:
         """Drop all rows but these."""
 
     def add(self, count: int) -> None:
-        """Append rows of tracks that are known from elsewhere."""
+        """Append rows of `count` externally given tracks."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats, Mask, Scan
+from vidtrack.arrays.types import Floats, Mask
+from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import area, best_cover, widened
 
 FRAGMENT, NEAR, SMALL = 0.6, 0.5, 0.3

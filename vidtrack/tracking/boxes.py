@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ScanError
 from vidtrack.estimate.noise import BOX_JITTER, box_noise
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 
 SAME = 0.65
 """Intersection over union; two boxes of a frame that have more are of one object. Among the 40,000 boxes of MOT15 and

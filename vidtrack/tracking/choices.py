@@ -1,16 +1,17 @@
-"""What was decided in a scan, row by row: for the snapshot and for `--decisions`."""
+"""The decisions of a scan by row, for the snapshot and for `--decisions`."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Pairs
 from vidtrack.associate.problem import Problem
 from vidtrack.compiled import kernel
-from vidtrack.scan import Choices, Decision, Floats, Ints
+from vidtrack.decision import Choices, Decision
 
 LISTED = 10
-"""Candidates told of each track and scan: of a heap of measurements not all."""
+"""Largest number of candidates listed for each track and scan."""
 
 
 def heaviest(decision: Decision) -> Ints:
@@ -47,7 +48,7 @@ def _of_taken(
     taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_ratio: Floats, log_missed: Floats,
     chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,
 ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
-    """(T,) log-likelihood ratio, share and nis of what each row took; the pairs and then the weights are in rows."""
+    """(T,) log-likelihood ratio, share and NIS of the measurement taken by each row; pairs and weights in row order."""
     ratio, share, nis = log_missed.copy(), np.ones(len(taken)), np.full(len(taken), np.nan)
     for t in range(len(taken)):
         if taken[t] < 0:
@@ -78,7 +79,7 @@ def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices
 
 
 def _weight(pairs: Pairs, decision: Decision) -> Floats:
-    """(N,) weight of each pair; zero for those that the decision does not name."""
+    """(N,) weight of each pair; zero for pairs without a weight in the decision."""
     count = 1 + int(pairs.measurement.max(initial=0))
     name = pairs.row * count + pairs.measurement  # ascending
     weight = np.zeros(len(pairs))

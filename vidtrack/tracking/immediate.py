@@ -1,4 +1,4 @@
-"""Decisions in the scan itself: a row is a track."""
+"""Immediate decisions, in the scan itself: a row is a track."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.associate.trust import Trust
-from vidtrack.scan import CONFIRMED, TENTATIVE, Decision, Event, Ints, Mask, Tracks
+from vidtrack.associate.two_stage import TwoStage
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.choices import heaviest
 from vidtrack.tracking.occlusion.sharing import Sharing
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 CLAIMED = 0.1
 """A measurement whose weights over all tracks sum to more than this starts no track."""
@@ -23,17 +25,17 @@ CLAIMED = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Immediate:
-    """Each scan is decided at once and for good.
+    """Each scan is decided finally in the scan itself.
 
-    rule     association rule
-    sharing  what happens when targets share a measurement
-    trust    which scores may start a track
-    births   whether measurements that belong to no track start one
+    rule       association rule
+    sharing    what happens when targets share a measurement
+    two_stage  two-stage association by score
+    births     whether measurements that belong to no track start one
     """
 
     rule: Associator
     sharing: Sharing
-    trust: Trust
+    two_stage: TwoStage
     births: bool
 
     STATE = ()
@@ -42,14 +44,14 @@ class Immediate:
         """Confirmed tracks first, then the measurements that they share, then tentative tracks."""
         pairs, count = problem.pairs, problem.measurements
         confirmed = register.status != TENTATIVE
-        sure = self.trust.sure(problem.scan)
-        decision = self.trust.decide(self.rule, problem, confirmed, sure)
+        sure = self.two_stage.sure(problem.scan)
+        decision = self.two_stage.decide(self.rule, problem, confirmed, sure)
         shared, hides = self.sharing.claim(view, decision, confirmed, count)
         decision = decision.without(shared >= 0)
         free = hides & ~_claimed(decision, count)
         open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
         if np.count_nonzero(open_to_all):
-            second = self.trust.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
+            second = self.two_stage.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
             free &= ~_claimed(second, count)
             decision = decision.joined(second)
         shared, free = self.sharing.catch(view, decision, shared, free)
@@ -60,7 +62,7 @@ class Immediate:
 
     @property
     def _starter(self) -> Associator:
-        """The rule for tentative tracks: whole measurements, as weights of clutter would keep them alive for ever."""
+        """The rule for tentative tracks, always hard: with weights, clutter would keep them alive indefinitely."""
         return self.rule if isinstance(self.rule, HARD) else GNN()
 
     def shown(self, rows: int) -> Mask:

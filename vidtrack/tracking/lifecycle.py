@@ -1,4 +1,4 @@
-"""The life of a track: when it is believed, and when it is given up."""
+"""The life cycle of a track: confirmation and deletion."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from typing import Protocol
 import numpy as np
 from scipy.special import bdtrc
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Floats, Ints, Mask
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import MERGED, TENTATIVE
 
 
 class Life(Protocol):
-    """Rules for the rows of a register.
+    """Rules of confirmation and deletion for the rows of a register.
 
     birth            log-odds that a measurement which belongs to no track is a target's
     confirms, ends   the reason that the events of a confirmation, and of a hopeless track's deletion, give
@@ -41,7 +42,7 @@ class Life(Protocol):
         """(T,) rows without evidence for too long."""
 
     def idle(self, register: Register, t: float) -> Mask:
-        """(T,) rows that were never seen to travel and no longer move."""
+        """(T,) rows that never travelled and no longer move."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +104,7 @@ class LifeCycle:
         return _hopeless(register.history, register.status, self.confirm_window, allowed)
 
     def idle(self, register: Register, t: float) -> Mask:
-        """(T,) rows that were never seen to travel and no longer move: no vehicles, but what the scene got wrong."""
+        """(T,) rows that never travelled and no longer move: errors of the scene, not vehicles."""
         if self.idle_s is None:
             return np.zeros(len(register), bool)
         near = register.travelled < self.idle_travel * np.fmax(register.box[:, 2], register.box[:, 3])

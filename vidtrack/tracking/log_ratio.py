@@ -1,4 +1,4 @@
-"""The life of a track by its score: Wald's sequential test of target against clutter (Sittler 1964; Blackman 1986)."""
+"""The life cycle by track score: Wald's sequential test of target against clutter (Sittler 1964; Blackman 1986)."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from math import inf, log
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Mask
 from vidtrack.tracking.lifecycle import grown, missed, refuse_immortal, unseen
 from vidtrack.tracking.register import Register
 
 LEAST = 1e-8
-"""Smallest error probability: scores are kept within limits that it does not reach."""
+"""Smallest error probability: its thresholds are within the limits of scores."""
 
 
 @dataclass(frozen=True, slots=True)
 class LogRatio:
-    """Confirmation and deletion by the log-likelihood ratio, target against clutter, of all that was seen.
+    """Confirmation and deletion by the log-likelihood ratio of target against clutter, over all scans.
 
     The score begins with ln(new_share). A hit adds ln(P_D N(v; 0, S) / clutter density), a miss ln(1 - P_D P_G).
     At ln((1 - missed_track) / false_track) the track is confirmed; ln((1 - false_track) / missed_track) below its
@@ -82,7 +82,7 @@ class LogRatio:
         return register.score <= register.best - self.drop
 
     def idle(self, register: Register, t: float) -> Mask:
-        """(T,) none: the score alone tells."""
+        """(T,) none: the score decides."""
         return np.zeros(len(register), bool)
 
     def lost(self, register: Register, t: float) -> Mask:

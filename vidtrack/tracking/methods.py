@@ -7,7 +7,7 @@ from typing import Any
 
 from vidtrack.associate import methods
 from vidtrack.associate.hard import Associator
-from vidtrack.config import TrackerSettings
+from vidtrack.config.settings import TrackerSettings
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.deferred.mht import MHT
 from vidtrack.tracking.deferred.splitting import Split

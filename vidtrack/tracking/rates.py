@@ -1,19 +1,22 @@
-"""Detection probability and clutter density: given, or estimated from what tracks take and leave."""
+"""Detection probability and clutter density, given or estimated from the associations."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
-from vidtrack.scan import MERGED, TENTATIVE, Decision, Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import MERGED, TENTATIVE
 
 MEMORY_S = 300.0
 """Time constant with which old scans are forgotten."""
 PRIOR, PRIOR_SCANS = 0.9, 10.0
-"""Detection probability before anything was seen, and the scans of one track that weigh as much."""
+"""Prior detection probability, and its weight in scans of one track."""
 HIGHEST = 0.999
-"""Largest estimate of P_D: a target that was always seen may still be missed."""
+"""Largest estimate of P_D."""
 
 Rate = float | Floats | None
 

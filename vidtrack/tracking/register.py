@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import expit
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.scan import COASTING, CONFIRMED, MERGED, TENTATIVE, Floats, Ints, Mask
+from vidtrack.tracks import COASTING, CONFIRMED, MERGED, TENTATIVE
 
 BELIEF = 20.0
 """Largest log-odds of a track's existence."""

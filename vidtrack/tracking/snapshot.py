@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from vidtrack.estimate.model import Motion
-from vidtrack.scan import Floats, Ints, Tracks
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.tracking.boxes import absolute
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import Tracks
 
 
 def snapshot(

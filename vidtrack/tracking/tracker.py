@@ -7,21 +7,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vidtrack.amplitude.threshold import ThresholdController
+from vidtrack.arrays.checks import check_states
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.adaptive import thresholded
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, Associator
 from vidtrack.associate.problem import Problem
-from vidtrack.associate.trust import EQUAL, Trust
-from vidtrack.detection.threshold import ThresholdController
+from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
+from vidtrack.decision import Choices, Event
 from vidtrack.errors import ConfigError, ScanError
-from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.bank import Estimator, Mixture
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.model import Motion
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.noise import for_update
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.estimate.smoother import smoothing_gain
-from vidtrack.scan import CONFIRMED, TENTATIVE, Choices, Event, Floats, Ints, Mask, Scan, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association, Timing
 from vidtrack.tracking.boxes import absolute, longer
 from vidtrack.tracking.choices import choices, evidence
@@ -35,15 +38,15 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.snapshot import snapshot
-from vidtrack.usable import check_states
+from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 
 class Outcome(NamedTuple):
-    """What a scan gave each track.
+    """Result of a scan for each track.
 
     measurement  (T,) alone or shared; -1: none
     nis          (T,) normalised innovation squared; NaN: none
-    choices      of the tracks that are shown, those that end in the scan included; None: not asked for
+    choices      of the output tracks, including those that end in the scan; None without `explain`
     """
 
     measurement: Ints
@@ -51,7 +54,7 @@ class Outcome(NamedTuple):
     choices: Choices | None
 
     def after(self, kept: Mask, born: Ints) -> Outcome:
-        """That of the tracks kept (T,), then of those born from measurements (B,)."""
+        """The outcome of the tracks kept (T,), then of those born from measurements (B,)."""
         measurement = np.concatenate([self.measurement[kept], born])
         nis = np.concatenate([self.nis[kept], np.full(len(born), np.nan)])
         return Outcome(measurement, nis, self.choices)
@@ -64,10 +67,10 @@ class Tracker:
     associate  association rule: NN(), GNN(), ..., or one that decides some scans later: MHT(), Split()
     gate       Gate, or the probability of one
     life       confirmation and deletion: LifeCycle(), M of N, or LogRatio(), by the log-likelihood ratio
-    picture    what only a picture tells: Picture(), with its bounds, or NoPicture(), where measurements are points
-    sharing    what happens when targets share a measurement: Exclusive(), nothing, or Occlusion(); MHT and Split take
-               the first only
-    trust      which scores may start a track; None: scores do not count
+    picture    Picture() for measurements with boxes, with its bounds, or NoPicture() for points
+    sharing    model for measurements of several targets: Exclusive() (none) or Occlusion(); MHT and Split require
+               Exclusive()
+    two_stage  association by score in two stages; None: scores do not count
     estimator  makes the bank of filters from the model
     births     whether measurements that belong to no track start one
     detection_probability, clutter_density [per px^2 or m^2]   for weights and existence probability: numbers, arrays
@@ -92,7 +95,7 @@ class Tracker:
         life: Life | None = None,
         picture: Surroundings | None = None,
         sharing: Sharing | None = None,
-        trust: Trust | None = None,
+        two_stage: TwoStage | None = None,
         *,
         estimator: Callable[[Motion], Estimator] = KalmanBank,
         births: bool = True,
@@ -108,7 +111,7 @@ class Tracker:
         self.life: Life = life or LifeCycle()
         self.picture: Surroundings = picture or Picture()
         self.sharing: Sharing = sharing or Exclusive()
-        self.trust = trust or EQUAL
+        self.two_stage = two_stage or SINGLE_STAGE
         self.timing = self._timing(associate or GNN(), births)
         self.threshold = threshold
         self.rates = Rates(detection_probability, clutter_density, self.picture.area if surveyed is None else surveyed)
@@ -171,20 +174,20 @@ class Tracker:
 
     @property
     def road(self) -> Road | None:
-        """What traffic taught about the scene; None: nothing."""
+        """Maps learnt from traffic; None without them."""
         return self.picture.road
 
     def _timing(self, rule: Associator | ForestRule, births: bool) -> Timing:
-        """When measurements are assigned for good, as the rule has it."""
+        """Immediate or deferred decisions, by the kind of rule."""
         if isinstance(rule, str | type):
             raise ConfigError(f"associate is {rule!r}; give an instance, such as GNN()")
         if not isinstance(rule, ForestRule):
-            return Immediate(rule, self.sharing, self.trust, births)
+            return Immediate(rule, self.sharing, self.two_stage, births)
         if not isinstance(self.sharing, Exclusive):
             raise ConfigError(
                 f"{type(rule).__name__} decides later and knows no shared measurements; leave sharing out"
             )
-        return Deferred(rule.forest(), self.trust, births)
+        return Deferred(rule.forest(), self.two_stage, births)
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
         """Move all rows to the scan's time and delete those unseen for too long; returns the time step [s]."""
@@ -226,6 +229,7 @@ class Tracker:
         problem = Problem.gated(
             self.gate, zhat, cov, scan, *self.rates.of(self.register.run),
             run=self.register.run, label=self.register.label, angles=sensor.angles,
+            modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
         )  # fmt: skip
         if self.threshold is not None:
             problem = thresholded(problem, self.threshold)
@@ -242,7 +246,7 @@ class Tracker:
         hit = found.taken >= 0
         rows = hit.nonzero()[0]
         sure = hit.copy()
-        sure[rows] = self.trust.sure(scan)[found.taken[rows]]
+        sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
         register.see(hit, sure, scan.t, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.traffic.calibrate import checked, complaints, pairs_of, road_plane, solved
 from vidtrack.traffic.footprint import velocity
 from vidtrack.traffic.ground import Ground

@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtri
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
 from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.homography import Fit, Normal, by_k, by_point, depth, fitted, picture_of, plane_of
 from vidtrack.traffic.hull import hull

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.ground import Ground
 
 _SLENDER, _SLENDER_SIGMA = 0.4, 0.1
@@ -125,10 +125,12 @@ class Footprints:
         middle = ground.inside(middle)
         sides[np.isnan(middle[:, 0])] = np.nan
         wide = [footprint(ground, box, e, _SLENDER + sign * _SLENDER_SIGMA) for sign in (1, -1)]
-        by_shape, sides_sigma = (wide[0][0] - wide[1][0]) / 2, np.abs(wide[0][1] - wide[1][1]) / 2
-        turned = [footprint(ground, box, _turned(e, sign * e_sigma), _SLENDER)[0] for sign in (1, -1)]
+        by_shape = (wide[0][0] - wide[1][0]) / 2
+        turned = [footprint(ground, box, _turned(e, sign * e_sigma), _SLENDER) for sign in (1, -1)]
+        stretched = footprint(ground, box + np.array([0, 0, np.sqrt(2) * _EDGE_PX, 0]), e, _SLENDER)
+        length_errors = [(wide[0][1] - wide[1][1]) / 2, (turned[0][1] - turned[1][1]) / 2, stretched[1] - sides]
         foot = np.column_stack([middle[:, 0], box[:, 1] + box[:, 3] - 0.5])
-        by_heading = np.where(np.isnan(e), _ANY_WAY_SIGMA * (foot - middle), (turned[0] - turned[1]) / 2)
+        by_heading = np.where(np.isnan(e), _ANY_WAY_SIGMA * (foot - middle), (turned[0][0] - turned[1][0]) / 2)
         edges = _EDGE_PX**2 * np.eye(2)
         for error in (by_shape, by_heading):
             edges = edges + error[:, :, None] * error[:, None, :]
@@ -151,7 +153,7 @@ class Footprints:
             v_shared=shared[:, 2:],
             heading=np.where(np.isnan(middle[:, 0]), np.nan, np.arctan2(e[:, 0], e[:, 1])),
             length=sides[:, 0],
-            length_sigma=np.where(np.isnan(sides[:, 0]), np.nan, sides_sigma[:, 0]),
+            length_sigma=np.linalg.norm(length_errors, axis=0)[:, 0],
             width=sides[:, 1],
         )
 

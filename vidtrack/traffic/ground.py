@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.traffic.homography import Normal, by_k, by_point, depth, matrix, picture_of, plane_of
 from vidtrack.traffic.hull import within
 from vidtrack.traffic.lens import Lens

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 _REWEIGHTINGS = 4
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from vidtrack.scan import Floats, Mask
+from vidtrack.arrays.types import Floats, Mask
 
 
 def hull(points: Floats) -> Floats:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Ints, Mask, Status, Tracks
+from vidtrack.tracks import Status, Tracks
 
 _log = logging.getLogger(__name__)
 

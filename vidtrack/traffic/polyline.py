@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats, Mask
+from vidtrack.arrays.types import Floats, Mask
 
 
 def turn(a: Floats, b: Floats, c: Floats) -> Floats:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,8 @@ import numpy as np
 from pydantic import AfterValidator, AwareDatetime, BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic import model_validator as whole
 
+from vidtrack.config.group import Group, read_toml
 from vidtrack.errors import ConfigError
-from vidtrack.settings.group import Group
-from vidtrack.toml_file import read_toml
 from vidtrack.traffic.polyline import crosses_itself
 
 _NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")

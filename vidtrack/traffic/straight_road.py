@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import chdtri
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats, Mask
 from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.homography import Normal
 from vidtrack.traffic.hull import hull

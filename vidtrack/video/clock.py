@@ -1,4 +1,4 @@
-"""Trustworthy time: stamps that always increase, and a rate that is not the header's word alone."""
+"""Frame times from timestamps: strictly increasing, with a frame rate checked against the header."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ LONGEST_WAIT = 8  # items held back for the next sane stamp: bounds memory where
 def stamp_rate(stamps: ArrayLike) -> float | None:
     """Items per unit of time from their timestamps in any order; None if the stamps are all the same.
 
-    From the mean of the intervals near the median: gaps do not count, and the rounding of a container
-    that stores milliseconds (33, 33, 34) averages out. Items that share a stamp count each.
+    The mean of the intervals near the median: gaps do not count, and rounding to milliseconds (33, 33, 34) averages
+    out. Items that share a stamp count separately.
     """
     stamps = np.asarray(stamps, dtype=float)
     distinct = np.unique(stamps)
@@ -34,15 +34,15 @@ def stamp_rate(stamps: ArrayLike) -> float | None:
 
 
 def is_plausible(fps: float) -> bool:
-    """Whether a camera may have this rate [1/s]."""
+    """Whether a camera can have this rate [1/s]."""
     return LOWEST_FPS <= fps <= HIGHEST_FPS
 
 
 def nominal_rate(header: float, measured: float | None) -> float | None:
-    """The rate [1/s] to trust: the measured one, in the header's form where they agree; None if neither can be.
+    """The frame rate [1/s]: the measured one, or the header's exact value if they agree; None if both are implausible.
 
-    header     what the file states, 0 for nothing
-    measured   the rate of the timestamps, None if they do not tell
+    header     rate that the file states, 0 for none
+    measured   rate of the timestamps, None if unknown
     """
     if measured is None or abs(header / measured - 1) <= AGREEMENT:
         return header if is_plausible(header) else None
@@ -50,16 +50,15 @@ def nominal_rate(header: float, measured: float | None) -> float | None:
 
 
 def increasing_times(stamped: Iterable[tuple[float | None, T]], period: float) -> Iterator[tuple[float, T]]:
-    """Give every item a time, strictly above the one before; the first is 0. Any unit of time serves.
+    """Strictly increasing times of all items, from 0, in the unit of the stamps.
 
     stamped   (timestamp or None, item) in the order of presentation
     period    nominal time between two items
 
-    A stamp is sane if it lies above all before it. Of two such neighbours in the wrong order the first
-    is at fault: a lone jump ahead must not spoil what follows. Sane stamps are kept, and with them gaps
-    and variable rates. The items between two sane stamps follow the earlier one at the nominal period,
-    or evenly where there is less room. If no sane stamp comes for LONGEST_WAIT items, time goes on at
-    the nominal rate.
+    A stamp is valid if it is above all stamps before it. If the next stamp is below it, the first of the two is
+    invalid, so that a single jump ahead does not invalidate the rest. Valid stamps are kept, and with them gaps and
+    variable rates. Items between two valid stamps follow the earlier one at the nominal period, or evenly if short.
+    After LONGEST_WAIT items without a valid stamp, time goes on at the nominal rate.
     """
     origin: float | None = None  # the stamp of time 0
     last = -period

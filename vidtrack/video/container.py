@@ -1,4 +1,4 @@
-"""Video files through FFmpeg: every picture that can be decoded, with a time that can be trusted."""
+"""Video files through FFmpeg: every picture that can be decoded, with a reliable time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import av
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
@@ -23,8 +23,8 @@ _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K vi
 class VideoFile:
     """The pictures of a video file in order of presentation; iterate once.
 
-    name, place, fps, frames as for Source. Damage is counted in `stats` and reading goes on with the next picture
-    that can be decoded. Raises SourceError for what is not a readable video.
+    name, place, fps, frames as for Source. Damage is counted in `stats`, and reading continues with the next picture
+    that can be decoded. Raises SourceError for a file that is not a readable video.
     """
 
     def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats) -> None:
@@ -55,7 +55,7 @@ class VideoFile:
         self._container.close()
 
     def _demuxed(self) -> Iterator[av.Packet | None]:
-        """Packets, over unreadable stretches; None at the end, where the decoder gives what it holds back."""
+        """Packets; unreadable parts are skipped. None at the end, to flush the decoder."""
         stuck = False
         while True:
             try:
@@ -73,7 +73,7 @@ class VideoFile:
         yield None
 
     def _decoded(self) -> Iterator[av.VideoFrame]:
-        """Pictures as the decoder gives them, damaged ones too where it could patch them."""
+        """Decoded pictures, including damaged ones that the decoder concealed."""
         damaged = partial = False
         for packet in chain(self._opening, self._packets):
             if packet is not None:
@@ -92,7 +92,7 @@ class VideoFile:
             self._stats.mark_truncated(f"the end of {self._path} cannot be decoded")
 
     def _first_packets(self) -> list[av.Packet | None]:
-        """Enough packets to measure the rate; they are decoded afterwards like the others."""
+        """Enough packets to measure the rate; they are decoded later."""
         packets: list[av.Packet | None] = []
         size = 0
         for packet in self._packets:
@@ -105,8 +105,8 @@ class VideoFile:
     def _rate(self, settings: SourceSettings) -> tuple[float, float]:
         """Nominal frames/s, and the timestamps' ticks per second.
 
-        Where the user states the rate, or the stamps' own is none that a camera has, the ticks are
-        stretched to fit: gaps stay gaps.
+        If the user states the rate, or the stamps' rate is implausible, the ticks are rescaled to the nominal rate;
+        gaps remain.
         """
         ticks_per_s = float(1 / self._stream.time_base) if self._stream.time_base else 1.0
         stamps = [self._stamp(packet) for packet in self._opening if packet is not None]
@@ -121,7 +121,7 @@ class VideoFile:
         return fps, ticks_per_s
 
     def _rate_by_main_header(self) -> float:
-        """AVI states its rate twice; the second statement, or an assumption with a warning."""
+        """The rate in the main header of an AVI file, which states its rate twice; else assumed with a warning."""
         period_s = avi_period_s(self._path)
         if period_s is not None and is_plausible(1 / period_s):
             return 1 / period_s
@@ -155,7 +155,7 @@ def _open(path: Path) -> av.container.InputContainer:
 
 
 def _video_stream(container: av.container.InputContainer, path: Path) -> av.VideoStream:
-    """The first stream of moving pictures: the cover of an audio file is none."""
+    """The first video stream; the cover picture of an audio file does not count."""
     streams = [s for s in container.streams.video if not s.disposition & av.stream.Disposition.attached_pic]
     if not streams:
         kinds = ", ".join(sorted({stream.type for stream in container.streams} - {"video"})) or "still pictures"

@@ -1,4 +1,4 @@
-"""The output of a detector: where the picture differs from the scene, and by how much."""
+"""The output of a detector: the foreground mask and the strength of the difference from the scene."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack import plane
-from vidtrack.scan import Floats
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats
 from vidtrack.video.frame import Frame, Image
 
 
@@ -21,12 +21,12 @@ class Foreground:
     mask      (h, w) 0 background, 255 foreground
     strength  (h, w) disturbance in units of its threshold (1 is just detected)
     step      source pixels per mask pixel
-    weak      (h, w) the mask with lower thresholds: pieces that it links may be of one vehicle; None: not known
-    place     (2, 3) from the mask, enlarged by `step`, to the scene [source px]; None: it lies on it
-    motion    (2, 3) from the scene to the picture [source px]; None: the camera is where it was in the first one
-    warnings  what the user should know, each said once
-    elsewhere the camera looks elsewhere from now on, and the scene is another one
-    surveyed  (4,) left, top, right, bottom of what the mask can show [source px of the scene]; None: not known
+    weak      (h, w) the mask with lower thresholds, which links pieces of one vehicle; None: not computed
+    place     (2, 3) from the mask, enlarged by `step`, to the scene [source px]; None: identity
+    motion    (2, 3) from the scene to the picture [source px]; None: identity, the camera has not moved
+    warnings  new warnings for the user
+    elsewhere whether the camera has changed its view, and the scene has been replaced
+    surveyed  (4,) left, top, right, bottom of the area in view [source px of the scene]; None: not known
     """
 
     mask: Image
@@ -40,16 +40,16 @@ class Foreground:
     elsewhere: bool = False
 
     def reduced(self, shape: tuple[int, int]) -> Image:
-        """(h, w) the mask in the processed picture of that shape."""
+        """(h, w) the mask in the coordinates of a processed picture of this shape."""
         if self.place is None or self.motion is None:
             return self.mask
-        to_picture = plane.rescaled(plane.after(self.motion, self.place), 1 / self.step)
+        to_picture = affine.rescaled(affine.after(self.motion, self.place), 1 / self.step)
         return _warped(self.mask, to_picture, shape)
 
     def full_size(self, shape: tuple[int, int]) -> Image:
-        """(H, W) mask of the source, 0 and 255; where the reduction left out rows or columns the last is repeated."""
+        """(H, W) mask at source size, 0 and 255; rows and columns that the reduction left out repeat the last."""
         if self.place is not None and self.motion is not None:
-            to_picture = plane.after(plane.after(self.motion, self.place), enlargement(self.step))
+            to_picture = affine.after(affine.after(self.motion, self.place), enlargement(self.step))
             return _warped(self.mask, to_picture, shape)
         mask = self.mask.repeat(self.step, axis=0).repeat(self.step, axis=1)
         rows, columns = (max(0, size - found) for size, found in zip(shape, mask.shape, strict=True))
@@ -57,7 +57,7 @@ class Foreground:
 
 
 def enlargement(step: int) -> Floats:
-    """From the processed pixels to the source's, `step` times as many in each direction."""
+    """Affine map (2, 3) from processed pixels to source pixels."""
     return np.array([[step, 0, (step - 1) / 2], [0, step, (step - 1) / 2]])
 
 
@@ -70,10 +70,10 @@ class Background(Protocol):
     """A model of the scene without traffic."""
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box is never absorbed into the scene, however long it stands.
+        """Foreground of `frame`; pixels in `known` boxes are never absorbed into the scene.
 
-        known (K, 4): left, top, width, height [source px of the scene] of vehicles the tracker predicts here.
+        known (K, 4): left, top, width, height [source px of the scene] of predicted vehicles.
         """
 
     def scene(self) -> Image:
-        """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
+        """(H, W, 3) the learnt scene in coordinates of the first picture, in source size, blue-green-red."""

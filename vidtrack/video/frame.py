@@ -1,4 +1,4 @@
-"""One picture of a video, as the decoder left it: luminance and half-size chroma planes."""
+"""One picture of a video: luminance and half-size chroma planes, as decoded."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Frame:
     time_s  seconds since the source's first frame, never decreasing
     y       (H, W) luminance
     u, v    ((H+1)//2, (W+1)//2) chroma planes (Cb, Cr), None for a grey source
-    full_range  luminance spans 0..255 (JPEG) and not 16..235 (video)
+    full_range  luminance spans 0..255 (JPEG), else 16..235 (video)
     """
 
     index: int

@@ -1,4 +1,4 @@
-"""What a container's own bytes say and FFmpeg does not pass on: how long the file should be, and AVI's frame period."""
+"""Container headers beyond FFmpeg's interface: the length that the file should have, and AVI's frame period."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 
 
 def missing_bytes(path: Path) -> int:
-    """Bytes by which an AVI, MP4 or Matroska file is shorter than its outermost chunks say; 0 if whole or unknown.
+    """Bytes by which an AVI, MP4 or Matroska file is shorter than its outermost chunks state; 0 if whole or unknown.
 
-    Unlike the frame count, which writers get wrong, these sizes are what a reader walks by.
+    These sizes are reliable, because readers depend on them; frame counts are often wrong.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -41,7 +41,7 @@ def avi_period_s(path: Path) -> float | None:
 
 
 def avi_states_rate(path: Path) -> bool:
-    """Whether an AVI file states a rate; where neither of its headers does, FFmpeg assumes one without a word."""
+    """Whether an AVI file states a rate; FFmpeg silently assumes one if neither header does."""
     with path.open("rb") as file:
         stream = re.search(rb"strh.{4}vids.{16}(.{4})(.{4})", file.read(_HEADERS), re.DOTALL)
     return avi_period_s(path) is not None or stream is None or all(map(any, stream.groups()))
@@ -56,7 +56,7 @@ def _riff_end(file: BinaryIO, size: int) -> int:
         if len(head) < 8 or head[:4] != b"RIFF":
             break
         length = struct.unpack("<I", head[4:])[0]
-        if length in (0, 0xFFFFFFFF):  # a recorder that never came back to fill it in
+        if length in (0, 0xFFFFFFFF):  # never filled in by the recorder
             break
         end = start + length  # without the 8 bytes of its head: some writers count them in
         start += 8 + length + length % 2

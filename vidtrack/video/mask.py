@@ -1,4 +1,4 @@
-"""The user's mask: where in the picture traffic is looked for."""
+"""The user's mask: the region of the picture in which traffic is detected."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vidtrack.video.frame import Image
 
 
 def read_mask(path: Path) -> Image:
-    """(H, W) picture that is white where traffic is looked for. Raises ConfigError if it is no such picture."""
+    """(H, W) mask, white where traffic is detected. Raises ConfigError if the file is not such a picture."""
     try:
         data = np.frombuffer(path.read_bytes(), np.uint8)
     except OSError as error:

@@ -10,7 +10,7 @@ from typing import cast
 
 import av
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.sequence import read_sequence_info, untimed_rate
 from vidtrack.video.stats import SourceStats
@@ -30,10 +30,10 @@ _DECODERS = {
 
 
 class ImageSequence:
-    """Pictures in files of their own, in natural order (img2 before img10), at a rate they do not know.
+    """One picture per file, in natural order (img2 before img10), at a given frame rate.
 
-    name, place, fps, frames as for Source. An image that cannot be read is counted and skipped; its number and
-    its time stay empty, so that the others keep theirs.
+    name, place, fps, frames as for Source. An image that cannot be read is counted and skipped; the numbers and times
+    of the others do not change.
     """
 
     def __init__(self, paths: Iterable[Path], settings: SourceSettings, stats: SourceStats) -> None:
@@ -55,11 +55,11 @@ class ImageSequence:
             yield index, index / self.fps, picture
 
     def close(self) -> None:
-        """Nothing stays open between images."""
+        """Do nothing: no file stays open between images."""
 
 
 def images_in(folder: Path) -> list[Path]:
-    """The images of a folder, or of the sub-folder where a data set keeps them. Raises SourceError without any."""
+    """The images of a folder, or of a data set's image sub-folder. Raises SourceError if there are none."""
     for place in (*(folder / name for name in _DATASET_FOLDERS), folder):
         images = [path for path in place.iterdir() if _is_image(path)] if place.is_dir() else []
         if images:
@@ -92,7 +92,7 @@ def _natural(path: Path) -> list[tuple[str, int]]:
 
 
 def _read(path: Path) -> av.VideoFrame:
-    """Decode one file by what its first bytes say, because suffixes lie. Raises SourceError."""
+    """Decode one file by its first bytes; suffixes are unreliable. Raises SourceError."""
     try:
         data = path.read_bytes()
         codec = next((codec for magic, codec in _DECODERS.items() if data.startswith(magic)), None)

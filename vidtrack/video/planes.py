@@ -1,4 +1,4 @@
-"""Decoded pictures as luminance and half-size chroma planes, without a copy where the decoder's layout allows."""
+"""Luminance and half-size chroma planes of decoded pictures, without a copy if the decoder's layout allows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
     Planar 8-bit YUV and grey are read-only views of the decoder's memory whose rows may be padded; finer
     chroma is thinned to half size by stride. Everything else (RGB, palettes, more than 8 bits, packed
     layouts) is converted: RGB to full-range BT.601, which `Frame.bgr` undoes; YUV keeps its range.
-    A picture that says how it is to be turned, as a phone's does, comes upright.
+    A picture with rotation metadata, as from a phone, is turned upright.
     """
     quarter_turns = round(picture.rotation / 90) if abs(picture.rotation) <= 180 else 0  # beyond: no rotation at all
     picture = planar(picture)
@@ -36,7 +36,7 @@ def to_frame(index: int, time_s: float, picture: av.VideoFrame) -> Frame:
 
 
 def planar(picture: av.VideoFrame) -> av.VideoFrame:
-    """The picture in planes of 8 bits: itself where it is so already, otherwise converted."""
+    """The picture in planes of 8 bits, converted if necessary."""
     if picture.format.name in _YUV and all(plane.line_size > 0 for plane in picture.planes):
         return picture
     if _is_grey(picture):
@@ -68,12 +68,12 @@ def _thinned(plane: Image, height: int, width: int) -> Image:
 
 
 def _turned(plane: Image, quarter_turns: int) -> Image:
-    """The plane turned counterclockwise; a copy only where it is turned."""
+    """The plane rotated counterclockwise; a copy only if it is rotated."""
     return np.ascontiguousarray(np.rot90(plane, quarter_turns)) if quarter_turns else plane
 
 
 def matched(frame: Frame, first: Frame) -> Frame:
-    """The frame in the first one's size, with chroma exactly if the first has some: cameras go grey at night."""
+    """The frame converted to the first one's size, with chroma if the first has it: cameras turn grey at night."""
     if frame.shape == first.shape and (frame.u is None) == (first.u is None):
         return frame
     y = _scaled(frame.y, first.y)

@@ -11,10 +11,10 @@ T = TypeVar("T")
 
 
 class ReadAhead(Generic[T]):
-    """Iterates over `items` in one thread of its own, at most `depth` items ahead of the consumer.
+    """Iterates over `items` in its own thread, at most `depth` items ahead of the consumer.
 
-    An error in the thread is raised where its item would have come. `close` may be called at any time and
-    returns as soon as the item in work is done; the thread has ended then.
+    An error in the thread is raised in place of its item. `close` may be called at any time; it returns when the item
+    in work is done and the thread has ended.
     """
 
     def __init__(self, items: Iterable[T], depth: int) -> None:
@@ -41,6 +41,6 @@ class ReadAhead(Generic[T]):
         self._ahead.append(self._thread.submit(next, self._items, None))
 
     def close(self) -> None:
-        """Stop the thread and forget what it read ahead."""
+        """Stop the thread and discard the items read ahead."""
         self._thread.shutdown(cancel_futures=True)
         self._ahead.clear()

@@ -1,12 +1,12 @@
-"""Connected components by run-length coding and union-find: rows of equal pixels are joined, not pixels."""
+"""Connected components by run-length coding and union-find."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Ints
 from vidtrack.compiled import kernel
-from vidtrack.scan import Ints
 from vidtrack.video.frame import Image
 
 Runs = NDArray[np.int32]
@@ -20,7 +20,7 @@ _BYTE, _LAST = np.uint64(8), np.uint64(56)  # bits up to the next byte, and up t
 
 @kernel
 def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
-    """Maximal horizontal runs of pixels that are not 0, or for `background` those that are: row, start, stop.
+    """Maximal horizontal runs of pixels that are not 0 (for `background`: that are 0): row, start, stop.
 
     mask (h, w) uint8; each (N,) int32 in raster order, stop excluded.
     """
@@ -38,7 +38,7 @@ def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
 def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: Runs, start: Runs, stop: Runs) -> int:
     """Fill row, start, stop and return the number of runs.
 
-    words (N,) eight pixels each, and the rest of them; outside: the marks of eight pixels that are in no run.
+    words (N,) eight pixels each, rest: the remaining pixels; outside: the marks of eight pixels outside runs.
     """
     n = y = left = k = 0
     first = -1  # of the run that is open
@@ -69,7 +69,7 @@ def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: R
 
 @kernel
 def _rest(pixels: Image, filler: bool) -> np.uint64:
-    """The last pixels, fewer than eight, as a word that is filled up."""
+    """The last pixels, fewer than eight, as a padded word."""
     rest = np.full(8, filler, np.uint8)
     for x in range(len(pixels) // 8 * 8, len(pixels)):
         rest[x % 8] = pixels[x]
@@ -95,7 +95,7 @@ def _lowest_byte(word: np.uint64) -> int:
 
 @kernel(inline="always")
 def _after_zeros(words: Words, k: int) -> int:
-    """Number of the first word from k on that is not 0, or of words if there is none."""
+    """Index of the first word from k on that is not 0; len(words) if there is none."""
     while k + 8 <= len(words) and _all_zero(words, k):
         k += 8
     while k < len(words) and words[k] == 0:
@@ -114,7 +114,7 @@ def _all_zero(words: Words, k: int) -> bool:
 
 @kernel
 def connect(row: Runs, start: Runs, stop: Runs, diagonal: int) -> tuple[Ints, int]:
-    """Component of each run and their number; runs of neighbouring rows touch if they overlap.
+    """Component of each run and the number of components; overlapping runs of neighbouring rows are connected.
 
     diagonal: 1 joins across corners (8-connected), 0 does not (4-connected). Components are numbered by their
     first run in raster order.
@@ -136,10 +136,10 @@ def connect(row: Runs, start: Runs, stop: Runs, diagonal: int) -> tuple[Ints, in
 
 @kernel
 def components(parent: Ints) -> tuple[Ints, int]:
-    """Component of each element (N,) after `join`, numbered by their first elements, and their number."""
+    """Component of each element (N,) after `join`, numbered by first element, and the number of components."""
     label = np.empty(len(parent), np.int64)
     count = 0
-    for k in range(len(parent)):  # a root is the first of its component, so it is numbered before the others ask
+    for k in range(len(parent)):  # a root is the first of its component, so it is numbered before the others
         if parent[k] == k:
             label[k] = count
             count += 1
@@ -150,7 +150,7 @@ def components(parent: Ints) -> tuple[Ints, int]:
 
 @kernel
 def join(parent: Ints, a: int, b: int) -> None:
-    """Make one component of those of a and b; parent (N,) int64 begins as 0, 1, 2, ..."""
+    """Join the components of a and b; parent (N,) int64 begins as 0, 1, 2, ..."""
     a, b = _root(parent, a), _root(parent, b)
     if a < b:
         parent[b] = a

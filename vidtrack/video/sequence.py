@@ -1,4 +1,4 @@
-"""`seqinfo.ini`: what a MOTChallenge sequence says about itself where its files carry no time."""
+"""`seqinfo.ini`, the description of a MOTChallenge sequence, with its frame rate."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import configparser
 from dataclasses import dataclass
 from pathlib import Path
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import FormatError
 from vidtrack.video.clock import FALLBACK_FPS
 from vidtrack.video.stats import SourceStats
@@ -14,7 +14,7 @@ from vidtrack.video.stats import SourceStats
 
 @dataclass(frozen=True, slots=True)
 class SequenceInfo:
-    """The fields of seqinfo.ini that are used here; None where they are absent."""
+    """The used fields of seqinfo.ini; None if absent."""
 
     name: str | None = None
     fps: float | None = None

@@ -1,4 +1,4 @@
-"""Open what the user points at and read it ahead: video files, image folders and globs become frames."""
+"""Frames from video files, image folders and globs, read ahead."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 from types import TracebackType
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.container import VideoFile
 from vidtrack.video.frame import Frame
@@ -37,12 +37,12 @@ def open_source(path: str, settings: SourceSettings) -> Source:
 class Source:
     """The frames of an input from `start_s` to `end_s`, read in a thread of their own; iterate once.
 
-    name           what to call the run
+    name           default name of the run
     place          the file, or the folder of the images
     width, height  of the first picture [px]; later ones of another size are scaled to it
     fps            nominal frames/s; each frame has its own time
-    frames         how many to expect, for progress bars only; None if unknown
-    stats          what was read and what went wrong
+    frames         expected number, for progress bars only; None if unknown
+    stats          counts of frames and problems
 
     Iterating raises SourceError if the span of time holds no frame.
     """
@@ -98,7 +98,7 @@ class Source:
             raise SourceError(f"{self.name} has no frame between {self._span}; the last one read is at {last_s:g} s")
 
     def _alike(self, frames: Iterator[Frame], first: Frame) -> Iterator[Frame]:
-        """All frames in the size and kind of the first; said once."""
+        """All frames converted to the size and kind of the first, with one warning."""
         told = False
         for frame in frames:
             if frame.shape != first.shape and not told:
@@ -122,7 +122,7 @@ def _pictures(path: str, settings: SourceSettings, stats: SourceStats) -> VideoF
 
 
 def _missing(path: Path) -> str:
-    """What is missing, and the nearest name beside it."""
+    """The message for a missing file, with the nearest existing name."""
     if not path.parent.is_dir():
         return f"cannot open {path}: there is no folder {path.parent}"
     names = [entry.name for entry in path.parent.iterdir()]

@@ -1,11 +1,11 @@
-"""The span of media time that a run looks at."""
+"""The span of media time of a run."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from vidtrack.config import SourceSettings
+from vidtrack.config.settings import SourceSettings
 
 _ROUNDING_S = 1e-6  # 3 * 0.1 s still belongs to a span that ends at 0.3 s
 

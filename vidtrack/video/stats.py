@@ -1,4 +1,4 @@
-"""What went wrong while reading a source, for the summary and the user."""
+"""Counts and warnings of a source, for the summary and the user."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ log = logging.getLogger(__name__)
 class SourceStats:
     """Counts that grow while a source is read.
 
-    frames_read     frames handed on
-    frames_dropped  frames a live source had to leave out; files never drop one
-    decode_errors   pictures that could not be read, or only with damage
-    truncated       the file is shorter than its container says, or its end cannot be decoded
-    header_fps      rate that the source states; None if it states none
-    fps_assumed     nothing tells the rate
-    warnings        what the user was told, in order
+    frames_read     frames delivered
+    frames_dropped  frames that a live source dropped; 0 for files
+    decode_errors   unreadable or damaged pictures
+    truncated       the file is shorter than its container states, or its end cannot be decoded
+    header_fps      rate that the source states; None without one
+    fps_assumed     whether the rate is assumed
+    warnings        warnings in order
     """
 
     frames_read: int = 0
@@ -35,7 +35,7 @@ class SourceStats:
         log.warning(message)
 
     def count_error(self, what: str) -> None:
-        """Count a damaged picture; only the first one is told, a bad disk would fill the screen."""
+        """Count a damaged picture; only the first one gives a warning."""
         self.decode_errors += 1
         if self.decode_errors == 1:
             self.warn(f"{what}; reading goes on, further damage is only counted")

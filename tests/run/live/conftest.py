@@ -4,7 +4,7 @@ import pytest
 from cameras import HttpCamera, crossing
 from command_line import SAMPLES
 
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.run.files import run_file
 
 

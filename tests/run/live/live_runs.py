@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from cameras import HANG_S
 
-from vidtrack.config import load
-from vidtrack.scan import Status
+from vidtrack.config.load import load
+from vidtrack.tracks import Status
 
 NEVER_ROLLS = "live.roll_s=1e10"  # parts, and the first one lasts: its clock began in 1970
 

@@ -3,7 +3,7 @@
 import pytest
 from cameras import RtspCamera, needs_rtsp
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection

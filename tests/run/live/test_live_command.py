@@ -20,11 +20,11 @@ from patient import start
 from vidtrack.cli import cli
 from vidtrack.cli.live import LiveOptions, amount
 from vidtrack.cli.signals import Terminated, stopping
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.errors import OutputError
 from vidtrack.output.repair import read_tracks, repair
+from vidtrack.recording.retention import parts_of
 from vidtrack.run.files import run_file
-from vidtrack.run.live.retention import parts_of
 from vidtrack.state import read_state
 
 SECRET = "u:pass%40word@"
@@ -155,7 +155,7 @@ def test_a_signal_while_the_program_loads_is_no_error_either(monkeypatch):
     def terminated(*_, **_kind):
         raise Terminated
 
-    monkeypatch.setattr("vidtrack.config.load", terminated)
+    monkeypatch.setattr("vidtrack.config.load.load", terminated)
     result = CliRunner().invoke(cli, ["live", "0"], standalone_mode=False)
     assert result.exception is None
     assert result.return_value == 0

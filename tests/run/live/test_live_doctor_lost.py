@@ -11,7 +11,7 @@ from cameras import HANG_S, Picture, Script, script_of
 from click.testing import CliRunner
 
 from vidtrack.cli import cli
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.doctor import examine, opening
 from vidtrack.doctor.judge import judge
 from vidtrack.errors import SourceError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cameras import HANG_S, HttpCamera, coming, within
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection

@@ -18,7 +18,7 @@ from patient import line_with, start
 
 import vidtrack.run.live.run
 from vidtrack.cli import cli
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.lock import exclusive
 from vidtrack.output.repair import read_tracks

@@ -5,14 +5,14 @@ from threading import Event, Thread
 import pytest
 from cameras import Picture, Script, grey
 
-from vidtrack.config import Settings
-from vidtrack.run.live import recorder
-from vidtrack.run.live.retention import Retention, parts_of
+from vidtrack.config.settings import Settings
+from vidtrack.recording import recorder
+from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.video.frame import Frame
 
 
-class Film:
-    """A film on a disk that may be full."""
+class Muxer:
+    """A muxer on a disk that may be full."""
 
     full = False
 
@@ -21,7 +21,7 @@ class Film:
         path.touch()
 
     def take(self, packet, pictures, arrived_s):
-        if Film.full:
+        if Muxer.full:
             self.error = OSError(28, "No space left on device")
         else:
             self.packets += 1
@@ -32,14 +32,14 @@ class Film:
 
 @pytest.fixture
 def tape(tmp_path, monkeypatch):
-    monkeypatch.setattr(recorder, "Film", Film)
+    monkeypatch.setattr(recorder, "Muxer", Muxer)
     monkeypatch.setattr(recorder, "_RETRY_S", 0.0)
     return recorder.Recorder(tmp_path / "tape", Settings(), None, Retention(None, None))
 
 
 def receive(tape, full=False):
     """A packet comes; returns where its frame is."""
-    Film.full = full
+    Muxer.full = full
     packet = Picture(grey(100))
     tape.cut(Script(), packet)
     place = tape.place()
@@ -66,7 +66,7 @@ def test_a_part_that_ends_before_its_first_frame_is_tracked_ends_no_other(tape, 
 
 
 @pytest.mark.parametrize("in_time", [True, False])
-def test_a_film_is_never_closed_while_a_packet_is_written(tape, monkeypatch, caplog, in_time):
+def test_a_file_is_never_closed_while_a_packet_is_written(tape, monkeypatch, caplog, in_time):
     entered, answer, did = Event(), Event(), []
 
     def take(*_):
@@ -75,8 +75,8 @@ def test_a_film_is_never_closed_while_a_packet_is_written(tape, monkeypatch, cap
         did.append("take")
 
     receive(tape)
-    monkeypatch.setattr(tape._film, "take", take)
-    monkeypatch.setattr(tape._film, "close", lambda: did.append("close"))
+    monkeypatch.setattr(tape._muxer, "take", take)
+    monkeypatch.setattr(tape._muxer, "close", lambda: did.append("close"))
     monkeypatch.setattr(recorder, "_END_S", 60.0 if in_time else 0.0)
     reader = Thread(target=receive, args=(tape,))
     reader.start()

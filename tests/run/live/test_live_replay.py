@@ -8,16 +8,16 @@ import pytest
 from cameras import Picture, Script, crossing, script_of
 from live_runs import frames, play, rows, run_until, settings
 
-from vidtrack.config import load
+from vidtrack.config.load import load
 from vidtrack.errors import FormatError, OutputError, SourceError
 from vidtrack.output.repair import read_tracks
+from vidtrack.recording.retention import parts_of
+from vidtrack.recording.source import is_recording, recorded_settings
 from vidtrack.run.files import run_file
 from vidtrack.run.live.checkpoint import CheckpointFile
 from vidtrack.run.live.outputs import LiveExtras
-from vidtrack.run.live.retention import parts_of
 from vidtrack.run.live.run import LiveRun
 from vidtrack.state import read_state
-from vidtrack.video.recording import is_recording, recorded_settings
 
 PICTURES = crossing()
 

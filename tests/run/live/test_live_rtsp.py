@@ -10,7 +10,8 @@ import pytest
 from cameras import HANG_S, RtspCamera, coming, needs_rtsp, wait_for, within
 from live_runs import frames, play
 
-from vidtrack.config import LiveSettings, Settings
+from vidtrack.config.live import LiveSettings
+from vidtrack.config.settings import Settings
 from vidtrack.errors import SourceError
 from vidtrack.run.live.run import LiveRun
 from vidtrack.video.live.address import parse_address

@@ -16,12 +16,12 @@ import vidtrack.output.linefile as linefile
 from vidtrack.output.confirmed import LIVE_HOLD_S
 from vidtrack.output.folder import append
 from vidtrack.output.repair import read_tracks
+from vidtrack.recording.retention import parts_of
 from vidtrack.run.files import run_file
 from vidtrack.run.live.outputs import LiveExtras
-from vidtrack.run.live.retention import parts_of
 from vidtrack.run.live.run import LiveRun
-from vidtrack.scan import Status
 from vidtrack.state import read_state
+from vidtrack.tracks import Status
 
 TABLES = {"tracks.csv", "tracks.parquet", "mot.txt", "summary.json", "tracks.png"}
 
@@ -169,7 +169,7 @@ class Disk:
     def __init__(self, monkeypatch):
         self.full = False
         monkeypatch.setattr(linefile, "append", self._append)
-        monkeypatch.setattr("vidtrack.output.disk.append", self._append)
+        monkeypatch.setattr("vidtrack.output.ffmpeg_file.append", self._append)
 
     def _append(self, file, block):
         if self.full:
@@ -179,7 +179,7 @@ class Disk:
 
 def test_a_full_disk_is_outlived(camera, tmp_path, monkeypatch, caplog):
     disk = Disk(monkeypatch)
-    monkeypatch.setattr("vidtrack.run.live.recorder._RETRY_S", 0.2)
+    monkeypatch.setattr("vidtrack.recording.recorder._RETRY_S", 0.2)
     out, tape = tmp_path / "out", tmp_path / "tape"
     early = ""
 

@@ -4,11 +4,11 @@ import shutil
 
 from cameras import Picture, Script, crossing, script_of
 
-from vidtrack.config import load
+from vidtrack.config.load import load
+from vidtrack.recording.retention import parts_of
+from vidtrack.recording.source import Recording
 from vidtrack.run.live.outputs import LiveExtras
-from vidtrack.run.live.retention import parts_of
 from vidtrack.run.live.run import LiveRun
-from vidtrack.video.recording import Recording
 
 
 def test_a_run_that_numbers_anew_is_told(compiled, tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from cameras import HANG_S, Picture, Script, coming, grey, script_of, wait_for, within
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.live.address import Address, parse_address
 from vidtrack.video.live.connection import Connection, Refused, Stalled

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.scan import Status
 from vidtrack.simulate.clip import simulate
+from vidtrack.tracks import Status
 from vidtrack.video.frame import Frame
 
 T, END = 8.0, 15.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vidtrack as vt
-from vidtrack.associate.trust import EQUAL
+from vidtrack.associate.two_stage import SINGLE_STAGE
 from vidtrack.tracking.deferred.deferred import Deferred
 from vidtrack.tracking.immediate import Immediate
 
@@ -34,7 +34,7 @@ def test_of_each_track_one_row_is_shown(rule):
 
 
 def test_a_track_ends_with_its_last_row():
-    waiting = Deferred(vt.MHT().forest(), EQUAL, births=True)
+    waiting = Deferred(vt.MHT().forest(), SINGLE_STAGE, births=True)
     ids = np.array([1, 1, 2, 3])
     going = np.array([True, False, True, True])
     assert waiting.ended(ids, going, going).tolist() == [2, 3]

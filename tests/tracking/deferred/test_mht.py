@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vidtrack as vt
-from vidtrack.associate.trust import Trust
+from vidtrack.associate.two_stage import TwoStage
 from vidtrack.state import gather, restore
 from vidtrack.tracking.deferred.generation import likeliest
 from vidtrack.tracking.deferred.hypotheses import Hypotheses, kept
@@ -257,7 +257,7 @@ def test_a_tentative_track_keeps_its_name_while_it_is_doubted():
 @pytest.mark.parametrize("method", [vt.MHT(), vt.Split()])
 def test_unsure_detections_continue_a_track_but_do_not_confirm_it(method):
     tracker = vt.Tracker(
-        vt.ConstantVelocity(dim=1, accel=1.0, speed=1.0), method, trust=Trust(0.5), clutter_density=1e-4
+        vt.ConstantVelocity(dim=1, accel=1.0, speed=1.0), method, two_stage=TwoStage(0.5), clutter_density=1e-4
     )
     scores = [0.9, 0.2, 0.9, 0.9, 0.2, 0.2]
     status, taken = [], []

@@ -6,13 +6,14 @@ from blob_scene import centred, confirmed_ids, default_tracker, events, nearest_
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Decision, Status
 from vidtrack.tracking.boxes import overlapping
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.picture.border import Border
 from vidtrack.tracking.picture.picture import View
+from vidtrack.tracks import Status
 
 SPEED = 60.0
 

@@ -6,11 +6,11 @@ from drawn_tracks import drive, tracks_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidtrack.scan import TENTATIVE
 from vidtrack.state import gather, restore
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.picture.sizes import SizeField
+from vidtrack.tracks import TENTATIVE
 
 WIDTH, HEIGHT = 320, 240
 

@@ -1,4 +1,4 @@
-"""Figure 1: the best P_F scan by scan, in closed form and by the optimum of the exact q2."""
+"""Figure 1: the optimal P_F of each scan, in closed form and from the exact q2."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from vidtrack.detection.amplitude import detection_probability
-from vidtrack.detection.reduction import gate_volume, q2
+from vidtrack.amplitude.densities import detection_probability
+from vidtrack.amplitude.reduction import gate_volume, q2
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
 from vidtrack.papers.p000.experiment import CELLS, SCANS, SNR, best_p_fa, controlled, scenario
 from vidtrack.papers.result import Result, Row
-from vidtrack.radar.prediction import predict
-from vidtrack.scan import Floats
+from vidtrack.radar.performance.prediction import predict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +23,7 @@ K = np.arange(1, SCANS + 1)
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """Nothing is random here, so runs and seed change nothing."""
+    """Deterministic: runs and seed have no effect."""
     studies = {volume: _study(volume) for volume in CELLS}
     rows: list[Row] = [
         {"cell_volume": volume, "k": int(k)} | {name: float(column[k - 1]) for name, column in study.items()}
@@ -35,7 +35,7 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def _study(cell_volume: float) -> dict[str, Floats]:
-    """For each scan n and P_F of both ways, each along its own Riccati recursion, and what P_F* costs in q2."""
+    """n and P_F of both methods in each scan, each by its own Riccati recursion, and the loss of q2 by P_F*."""
     n_closed, n_exact = (_cells(cell_volume, method) for method in ("closed-form", "exact"))
     closed = np.array([best_p_fa("closed-form", n) for n in n_closed])
     best_there = np.array([best_p_fa("exact", n) for n in n_closed])

@@ -1,4 +1,4 @@
-"""Figure 2: position error of a PDAF with a fixed threshold and with the best one, scan by scan."""
+"""Figure 2: position error of a PDAF in each scan, with a fixed threshold and with the optimal one."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.amplitude.densities import detection_probability
+from vidtrack.amplitude.threshold import ThresholdController
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.pda import PDA
-from vidtrack.detection.amplitude import detection_probability
-from vidtrack.detection.threshold import ThresholdController
 from vidtrack.papers import style
 from vidtrack.papers.p000.experiment import CELLS, FIXED, LOST, SCANS, SNR, controlled, scenario
 from vidtrack.papers.result import Result, Row
-from vidtrack.radar.in_gate import AllPlots
-from vidtrack.radar.monte_carlo import Outcome, root_mean_square, simulate
-from vidtrack.radar.prediction import pda_factor, position_error, predict
-from vidtrack.scan import Floats
+from vidtrack.radar.performance.in_gate import AllPlots
+from vidtrack.radar.performance.monte_carlo import Outcome, root_mean_square, simulate
+from vidtrack.radar.performance.prediction import pda_factor, position_error, predict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 RUNS = 10_000
-"""The paper has 100, with which the wrong one of the two can look better."""
+"""The paper has 100 runs, too few to order the two thresholds reliably."""
 
 PAPER_RUNS = 100
 CLAIM = "P_F* gives smaller errors than the fixed 1e-2"
@@ -33,14 +33,14 @@ WAYS = {"P_F*": style.BLUE, "fixed 1e-2": style.RED}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """Runs of both ways to set the threshold, and the exact Riccati recursion of each (SCANS,)."""
+    """Runs with both thresholds, and the exact Riccati recursion of each (SCANS,)."""
 
     outcome: dict[str, Outcome]
     riccati: dict[str, Floats]
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """Both resolution cells and both thresholds, with `runs` runs each."""
+    """Simulate both resolution cells and both thresholds, with `runs` runs each."""
     rng = np.random.default_rng(seed)
     studies = {volume: study(volume, RUNS if runs is None else runs, rng) for volume in CELLS}
     rows = [row for volume, each in studies.items() for way in WAYS for row in _rows(volume, way, each)]
@@ -66,7 +66,7 @@ def study(cell_volume: float, runs: int, rng: np.random.Generator) -> Study:
 
 
 def median(error: Floats) -> tuple[Floats, Floats, Floats]:
-    """Median over the runs of error (scans, runs), and the bounds of its 95 % confidence interval by ranks."""
+    """Median of error (scans, runs) over the runs, and its 95 % confidence interval by order statistics."""
     half = 0.98 / np.sqrt(error.shape[1])
     middle, low, high = np.quantile(error, [0.5, max(0.5 - half, 0.0), min(0.5 + half, 1.0)], axis=1)
     return middle, low, high

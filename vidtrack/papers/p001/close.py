@@ -1,4 +1,4 @@
-"""Two targets side by side, closer than a new track's gate is wide: the survey's figures 4 and 5. Metres, seconds."""
+"""Two targets side by side, within the gate of a new track: the survey's figures 4 and 5. Metres, seconds."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.hard import Associator
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import METHODS
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Status, Tracks
 
 RUNS = 500
 SCANS, PERIOD_S, JUDGED = 30, 2.0, 10
-"""Scans of a run, their distance, and the last ones in which both tracks have to be right."""
+"""Scans of a run, their period, and the number of last scans in which both tracks must be right."""
 SPEED, APART, ACCEL = 150.0, 120.0, 1.0
 SIGMA, DETECTION = 30.0, 0.9
 RIGHT = 100.0
-"""m; a track this near a target, and nearer than all others, follows it."""
+"""m; the nearest track within this distance follows a target."""
 NAMES = ("nn", "split", "gnn", "mht")
 WORDS = {
     "nn": "nearest neighbour",
@@ -34,7 +36,7 @@ WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """truth and z (K, runs, 2, 2) of two targets in each run, seen (K, runs, 2) whether there was a plot."""
+    """truth and z (K, runs, 2, 2) of two targets in each run; seen (K, runs, 2): targets with a plot."""
 
     truth: Floats
     z: Floats
@@ -42,7 +44,7 @@ class Pair:
 
     @classmethod
     def fly(cls, runs: int, seed: int) -> Pair:
-        """Both go east, one APART north of the other, with white acceleration."""
+        """Simulate two targets that go east, one APART north of the other, with white acceleration."""
         rng = np.random.default_rng(seed)
         x, v = np.zeros((runs, 2, 2)), np.tile([SPEED, 0.0], (runs, 2, 1))
         x[:, 1, 1] = APART
@@ -55,7 +57,7 @@ class Pair:
         return cls(truth, truth + SIGMA * rng.normal(size=truth.shape), rng.random(truth.shape[:3]) < DETECTION)
 
     def tracked(self, rule: Associator | ForestRule) -> list[Tracks]:
-        """All runs as one bank."""
+        """Tracks of all runs, in one bank."""
         runs = np.repeat(np.arange(self.truth.shape[1]), 2).reshape(-1, 2)
         tracker = Tracker(
             ConstantVelocity(accel=2.0, speed=100.0),
@@ -70,7 +72,7 @@ class Pair:
         ]
 
     def right(self, steps: Sequence[Tracks]) -> np.ndarray:
-        """(runs,) whether each target is followed by one and the same track, its own, in the last JUDGED scans."""
+        """(runs,) whether in the last JUDGED scans each target is followed by one track, a different one for each."""
         followers = []
         right = np.ones(self.truth.shape[1], bool)
         for truth, tracks in zip(self.truth[-JUDGED:], steps[-JUDGED:], strict=True):

@@ -1,4 +1,4 @@
-"""Figure 2: gates of two close tracks and four observations, and who takes which."""
+"""Figure 2: gates of two close tracks, four observations, and their association."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN, NN, GreedyGNN
 from vidtrack.associate.problem import Problem
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
 from vidtrack.scan import Scan
@@ -28,12 +28,12 @@ HALF = 0.5 * np.eye(2)
 """Covariance of the predictions, and of the observations: S is the unit matrix."""
 GATE = 0.99
 D2 = np.array([[3.25, 1.53, 4.16, 162.0], [21.25, 3.33, 1.16, 117.0]])
-"""Squared distances of an independent calculation; the survey gives no numbers."""
+"""Squared distances by an independent calculation; the survey gives no numbers."""
 BRANCHES, HYPOTHESES = 7, 72
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """Nothing is random here, so runs and seed change nothing."""
+    """Deterministic: runs and seed have no effect."""
     scan = Scan(0.0, OBSERVED, HALF)
     every = Problem.gated(Gate(1.0), PREDICTED, np.tile(HALF, (2, 1, 1)), scan)
     gated = Problem.gated(Gate(GATE), PREDICTED, np.tile(HALF, (2, 1, 1)), scan)
@@ -70,7 +70,7 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def counted(scan: Scan) -> tuple[int, int]:
-    """Branches of the two tracks, and hypotheses about all four observations with nothing pruned."""
+    """Number of branches of the two tracks, and of hypotheses about all four observations without pruning."""
     x = np.zeros((2, 4))
     x[:, ::2] = PREDICTED
     made = []

@@ -1,16 +1,18 @@
-"""Figure 3: the gate shrinks while observations of a track come in, and stays wide enough for a manoeuvre."""
+"""Figure 3: the gate shrinks with the number of observations, and stays wide enough for a manoeuvre."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Gate, quantile
+from vidtrack.decision import Decision
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 RUNS = 10_000
 SCANS, PERIOD_S, SPEED, SIGMA = 12, 2.0, 150.0, 30.0
@@ -21,7 +23,7 @@ SHOWN = 7
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """Targets that accelerate as the model has it, all in one bank; the gate of each scan and who is in it."""
+    """Simulate targets with the model's acceleration in one bank; the gate of each scan and the share inside."""
     runs = RUNS if runs is None else runs
     truth, zhat, S, inside = followed(runs, seed)
     radius = np.sqrt(quantile(GATE, 2) * np.sqrt(np.linalg.det(S)))
@@ -61,11 +63,11 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def followed(runs: int, seed: int) -> tuple[Floats, Floats, Floats, np.ndarray]:
-    """truth (K, runs, 2), predictions zhat (K, runs, 2), S (K, 2, 2) of each scan, and (K, runs) who is inside."""
+    """truth (K, runs, 2), predictions zhat (K, runs, 2), S (K, 2, 2), and (K, runs) runs inside the gate."""
     rng = np.random.default_rng(seed)
     bank, R = KalmanBank(MODEL), SIGMA**2 * np.eye(2)
     x, v = np.zeros((runs, 2)), MODEL.speed * rng.normal(size=(runs, 2))
-    v[0] = SPEED, 0.4 * SPEED  # the one that is drawn
+    v[0] = SPEED, 0.4 * SPEED  # the drawn run
     every = np.arange(runs)
     one_each = Decision(every, every, every, np.ones(runs), np.zeros(runs))
     truth, zhat, S = [x], [x], [R]

@@ -1,4 +1,4 @@
-"""The look of both figures: one panel a case."""
+"""Drawing of both figures: one panel per case."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from vidtrack.papers import style
 from vidtrack.papers.p002.experiment import SCANS, Study
-from vidtrack.radar.monte_carlo import root_mean_square
+from vidtrack.radar.performance.monte_carlo import root_mean_square
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def draw(studies: Sequence[Study]) -> Figure:
-    """Four panels: both predictions, the error of all runs and of those that never strayed, with 95 % bands."""
+    """Four panels: both predictions, the error of all runs and of those never above LOST, with 95 % bands."""
     drawing, panels = style.figure(2, 2, panel=(4.8, 3.4))
     for ax, study in zip(panels, studies, strict=True):
         _panel(ax, study)

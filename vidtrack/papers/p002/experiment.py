@@ -1,4 +1,4 @@
-"""The experiment of both figures: a PSNF in clutter, its predicted error and what thousands of runs show."""
+"""The experiment of both figures: a PSNF in clutter, its predicted error and that of thousands of runs."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull, linear
+from vidtrack.amplitude.strongest import Strongest
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.strongest import PSN, StrongestNeighbour
-from vidtrack.detection.amplitude import RAYLEIGH, Weibull, linear
-from vidtrack.detection.strongest import Strongest
 from vidtrack.papers.result import Row
-from vidtrack.radar.in_gate import StrongestPlot
-from vidtrack.radar.monte_carlo import Outcome, root_mean_square, simulate
-from vidtrack.radar.prediction import normalised, position_error, predict, psn_factor
-from vidtrack.scan import Floats
+from vidtrack.radar.performance.in_gate import StrongestPlot
+from vidtrack.radar.performance.monte_carlo import Outcome, root_mean_square, simulate
+from vidtrack.radar.performance.prediction import normalised, position_error, predict, psn_factor
 
 RUNS = 10_000
-"""The paper has 1,000 and 500; lost tracks are so rare that their share needs more."""
+"""The paper has 1,000 and 500; the share of lost tracks, which are rare, needs more."""
 
 SCANS, LOST = 50, 20.0
 SCENARIO = normalised(q=0.16, gate=4.0, cell_volume=0.1)
@@ -49,15 +49,15 @@ class Study:
 
     @property
     def lost(self) -> float:
-        """Share of the PSNF's runs."""
+        """Share of the PSNF's runs that are lost."""
         return float(self.psn.lost(LOST).mean())
 
     def excess(self, prediction: Floats) -> float:
-        """By how much the settled error of the kept runs, k = 20..50, is above a prediction, in parts of it."""
+        """Relative excess of the steady-state error of the kept runs, k = 20..50, over a prediction."""
         return float(np.sqrt(np.mean(self.kept[19:] ** 2)) / np.sqrt(np.mean(prediction[19:] ** 2)) - 1)
 
     def rows(self, claim: str) -> list[Row]:
-        """The table: one row a scan."""
+        """The table: one row per scan."""
         case, (every, every_se) = self.case, root_mean_square(self.psn.error)
         kept, kept_se = root_mean_square(self.kept)
         expected, _ = root_mean_square(self.psn.expected)

@@ -7,7 +7,7 @@ import numpy as np
 from vidtrack.papers.p002.drawing import draw
 from vidtrack.papers.p002.experiment import RUNS, Case, Study, study
 from vidtrack.papers.result import Result
-from vidtrack.radar.monte_carlo import root_mean_square
+from vidtrack.radar.performance.monte_carlo import root_mean_square
 
 CASES = tuple(
     Case(f"{db} dB, P_FA {p_fa:g}", db, p_fa) for db in (16, 13) for p_fa in (1e-1, 1e-5)
@@ -16,7 +16,7 @@ CLAIM = "prediction nearly equals simulation, the more so at high SNR and low th
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All four cases with `runs` runs each of the PSNF and of the plain strongest neighbour filter."""
+    """Simulate four cases, with `runs` runs each of the PSNF and the strongest neighbour filter."""
     rng = np.random.default_rng(seed)
     studies = [study(case, RUNS if runs is None else runs, rng) for case in CASES]
     return Result(draw(studies), [row for each in studies for row in each.rows(CLAIM)], _verdict(studies))

@@ -6,7 +6,7 @@ from math import log
 
 import numpy as np
 
-from vidtrack.detection.amplitude import Weibull
+from vidtrack.amplitude.densities import Weibull
 from vidtrack.papers.p002.drawing import draw
 from vidtrack.papers.p002.experiment import RUNS, Case, Study, study
 from vidtrack.papers.result import Result
@@ -24,7 +24,7 @@ CLAIM = "prediction nearly equals simulation; larger b and c give smaller errors
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All four clutters with `runs` runs each of the PSNF and of the plain strongest neighbour filter."""
+    """Simulate four kinds of clutter, with `runs` runs each of the PSNF and the strongest neighbour filter."""
     rng = np.random.default_rng(seed)
     studies = [study(case, RUNS if runs is None else runs, rng) for case in CASES]
     return Result(draw(studies), [row for each in studies for row in each.rows(CLAIM)], _verdict(studies))

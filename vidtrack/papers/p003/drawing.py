@@ -1,4 +1,4 @@
-"""Pictures and tables of figures 7 to 10: errors over time, and their histograms."""
+"""Plots and tables of figures 7 to 10: errors over time, and their histograms."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
 from vidtrack.papers.p003.experiment import SCANS, SETTLED, TIMES, mean_and_se
 from vidtrack.papers.p003.scenario import CHANNELS, UNITS, WAYS, Study
 from vidtrack.papers.result import Row
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 def time_figure(each: Study) -> Figure:
-    """Upper row: the errors of the first run, as the paper shows one; lower row: mean absolute errors of all runs."""
+    """Upper row: errors of the first run, as in the paper; lower row: mean absolute errors of all runs."""
     drawing, panels = style.figure(len(CHANNELS), 2, panel=(4.2, 3.0))
     for c, (channel, unit) in enumerate(zip(CHANNELS, UNITS, strict=True)):
         one, every = panels[c], panels[c + len(CHANNELS)]
@@ -38,7 +38,7 @@ def time_figure(each: Study) -> Figure:
 
 
 def time_rows(each: Study, claim: str) -> list[Row]:
-    """One row a channel, filter and scan."""
+    """One row per channel, filter and scan."""
     rows: list[Row] = []
     for c, channel in enumerate(CHANNELS):
         for way in WAYS:
@@ -72,7 +72,7 @@ def histogram(each: Study, channel: int, bins: Floats, paper: Sequence[tuple[str
 
 
 def histogram_rows(each: Study, channel: int, bins: Floats, claim: str) -> list[Row]:
-    """One row a filter and bin."""
+    """One row per filter and bin."""
     rows: list[Row] = []
     for way in WAYS:
         error = each.error[way.name][SETTLED, :, channel].ravel()
@@ -88,6 +88,6 @@ def histogram_rows(each: Study, channel: int, bins: Floats, claim: str) -> list[
 
 
 def summary(each: Study, channel: int) -> str:
-    """The mean absolute errors of a channel in words."""
+    """One sentence with the mean absolute errors of a channel."""
     parts = [f"{each.mean_abs(way.name, channel):.3g} ({way.name})" for way in WAYS]
     return f"{CHANNELS[channel]} [{UNITS[channel]}] " + ", ".join(parts)

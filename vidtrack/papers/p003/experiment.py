@@ -1,7 +1,7 @@
-"""What all experiments share: range, azimuth and elevation filtered each by itself, 7.7 times a second for 30 s.
+"""Common parts of the experiments: range, azimuth and elevation, filtered separately, 7.7 scans/s for 30 s.
 
-The paper gives neither errors of measurement nor how its filters were tuned. Sigma 5 m and 0.04 degrees are ours, and
-the acceleration that each filter is told is named with it.
+The paper gives neither measurement errors nor the tuning of its filters. Sigma 5 m and 0.04 degrees are our choice, and
+the acceleration that a filter assumes is part of its name.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
+from vidtrack.decision import Decision
 from vidtrack.estimate.bank import Estimator
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.particle import NO_GLINT, Glint
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 from vidtrack.simulate.flight import Flight
 from vidtrack.simulate.radar_scenarios import MULTIFUNCTION
 
@@ -27,7 +29,7 @@ TIMES: Floats = SCAN_S * np.arange(SCANS, dtype=float)
 SETTLED = TIMES > 3.0
 
 MODEL = ConstantVelocity(1, accel=1.0)
-"""A channel's state is its value and rate; a row's scale is the acceleration that its filter is told."""
+"""A channel's state is its value and rate; a row's scale is the acceleration that its filter assumes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +42,7 @@ class Channels:
 
 
 def polar(flight: Flight) -> Floats:
-    """(SCANS, 3) true range [m], azimuth [deg] without jumps, elevation [deg]."""
+    """(SCANS, 3) true range [m], unwrapped azimuth [deg], elevation [deg]."""
     measured = MULTIFUNCTION.measures(flight(TIMES)[0])
     azimuth = np.degrees(np.unwrap(np.radians(measured[:, 1])))
     return np.column_stack([measured[:, 0], azimuth, measured[:, 2]])
@@ -55,7 +57,7 @@ def measure(truth: Floats, sigma: Floats, runs: int, rng: Generator, glint: Glin
 
 
 def estimate(bank: Estimator, seen: Channels, accel: Floats) -> Floats:
-    """(SCANS, rows) estimates of a bank that begins with the first two measurements; accel (rows,) it is told."""
+    """(SCANS, rows) estimates of a bank initialised from two measurements; accel (rows,) that it assumes."""
     z, rows = seen.z, len(seen.sigma)
     R = (seen.sigma**2)[:, None, None]
     start = np.column_stack([z[1], (z[1] - z[0]) / SCAN_S])

@@ -21,7 +21,7 @@ ELEVATION = 2
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All filters on the same measurements."""
+    """Run all filters on the same measurements."""
     rng = np.random.default_rng(seed)
     each = study(altitude(rng)[0].flight, RUNS if runs is None else runs, rng)
     kalman, particles = (each.half_width(name, ELEVATION) for name in ("Kalman, tuned", "particles, the paper's"))

@@ -1,4 +1,4 @@
-"""Figure 7: an aircraft comes in; range, azimuth and elevation by particles and by Kalman."""
+"""Figure 7: an incoming aircraft; range, azimuth and elevation by particle and Kalman filters."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ CLAIM = "the particle filter is better than the Kalman filter in range, azimuth 
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All filters on the same measurements."""
+    """Run all filters on the same measurements."""
     rng = np.random.default_rng(seed)
     each = study(incoming(rng)[0].flight, RUNS if runs is None else runs, rng)
     return Result(time_figure(each), time_rows(each, CLAIM), verdict(each))
 
 
 def verdict(each: Study) -> str:
-    """Whether the paper's filter beats a tuned and an under-tuned Kalman filter, with the mean errors."""
+    """One sentence that compares the paper's filter with a tuned and an under-tuned Kalman filter."""
     won = {
         name: sum(each.mean_abs("particles, the paper's", c) < each.mean_abs(name, c) for c in range(len(CHANNELS)))
         for name in ("Kalman, tuned", "Kalman, told a tenth")

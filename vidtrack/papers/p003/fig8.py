@@ -18,7 +18,7 @@ RANGE = 0
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All filters on the same measurements."""
+    """Run all filters on the same measurements."""
     rng = np.random.default_rng(seed)
     each = study(incoming(rng)[0].flight, RUNS if runs is None else runs, rng)
     kalman, particles = (each.half_width(name, RANGE) for name in ("Kalman, tuned", "particles, the paper's"))

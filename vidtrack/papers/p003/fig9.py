@@ -1,4 +1,4 @@
-"""Figure 9: the altitude swings; range, azimuth and elevation by particles and by Kalman."""
+"""Figure 9: an altitude manoeuvre; range, azimuth and elevation by particle and Kalman filters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vidtrack.simulate.radar_scenarios import altitude
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All filters on the same measurements."""
+    """Run all filters on the same measurements."""
     rng = np.random.default_rng(seed)
     each = study(altitude(rng)[0].flight, RUNS if runs is None else runs, rng)
     return Result(time_figure(each), time_rows(each, CLAIM), verdict(each))

@@ -1,4 +1,4 @@
-"""The experiment of figures 7 to 10: the three channels of a flight through Kalman and particle filters."""
+"""The experiment of figures 7 to 10: Kalman and particle filters on the three channels of a flight."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.error_signal import ErrorSignalBank
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.particle import ParticleBank
 from vidtrack.papers import style
 from vidtrack.papers.p003.experiment import MODEL, PARTICLES, SCAN_S, SCANS, SETTLED, estimate, measure, polar
-from vidtrack.scan import Floats
 from vidtrack.simulate.flight import Flight
 from vidtrack.simulate.radar_scenarios import MULTIFUNCTION
 
 CHANNELS = ("range", "azimuth", "elevation")
 UNITS = ("m", "deg", "deg")
 INDEX = 0.02
-"""Tracking index accel dt^2 / sigma of a filter for a channel that hardly accelerates."""
+"""Tracking index accel dt^2 / sigma of a filter for a channel with little acceleration."""
 
 TOLD = 0.1
-"""Share of the right acceleration that an under-tuned filter is told."""
+"""Acceleration of an under-tuned filter as a share of the right one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Way:
     """A filter.
 
-    bank   made from a seed; None: the measurement as it is
-    knows  share of the channel's acceleration that it is told
-    line   how it is drawn
+    bank   factory of the bank from a seed; None: the measurement itself
+    knows  assumed share of the channel's acceleration
+    line   line style
     """
 
     name: str
@@ -54,7 +54,7 @@ WAYS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """Errors (SCANS, runs, 3) of each way, by name, and the accelerations (3,) that the tuned filters are told."""
+    """Errors (SCANS, runs, 3) of each filter, by name, and the accelerations (3,) of the tuned filters."""
 
     error: dict[str, Floats]
     accel: Floats
@@ -64,15 +64,15 @@ class Study:
         return float(np.abs(self.error[name][SETTLED, :, channel]).mean())
 
     def half_width(self, name: str, channel: int) -> float:
-        """95 % of a channel's errors after the first three seconds are below this."""
+        """95th percentile of a channel's absolute errors after the first three seconds."""
         return float(np.quantile(np.abs(self.error[name][SETTLED, :, channel]), 0.95))
 
 
 def study(flight: Flight, runs: int, rng: Generator) -> Study:
-    """Run all ways on the same measurements of a flight.
+    """Run all filters on the same measurements of a flight.
 
-    Tuned filters are told each channel's largest acceleration; in the altitude manoeuvre that is the jump of the climb
-    rate with which it begins, spread over three scans.
+    Tuned filters assume each channel's largest acceleration; in the altitude manoeuvre that is the initial jump of the
+    climb rate, spread over three scans.
     """
     truth, sigma = polar(flight), np.array(MULTIFUNCTION.sigma)
     largest = np.abs(np.gradient(np.gradient(truth, SCAN_S, axis=0), SCAN_S, axis=0)).max(axis=0)

@@ -1,4 +1,4 @@
-"""Table 2: mean range error while the target speeds up with 2.5 g, by filter."""
+"""Table 2: mean range error of each filter while the target accelerates with 2.5 g."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.papers import style
-from vidtrack.papers.p003.contest import BEGIN_S, CONTESTS, END_S, WINDOWS, Contest, mean_abs, run
+from vidtrack.papers.p003.comparison import BEGIN_S, COMPARISONS, END_S, WINDOWS, Comparison, mean_abs, run
 from vidtrack.papers.p003.experiment import RUNS, TIMES, mean_and_se
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,33 +28,33 @@ SHOWN = {
 }
 COLOURS = {"Kalman": style.BLUE, "alpha-beta": style.BLUE, "bootstrap": style.GREEN, "measurement": style.GREY}
 
-Outcome = list[tuple[Contest, dict[str, Floats]]]
+Outcome = list[tuple[Comparison, dict[str, Floats]]]
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All three contests."""
+    """Run all three comparisons."""
     rng = np.random.default_rng(seed)
-    outcome = [(contest, run(contest, RUNS if runs is None else runs, rng)) for contest in CONTESTS]
+    outcome = [(comparison, run(comparison, RUNS if runs is None else runs, rng)) for comparison in COMPARISONS]
     return Result(_figure(outcome), _rows(outcome), _verdict(outcome))
 
 
 def _rows(outcome: Outcome) -> list[Row]:
     rows: list[Row] = []
-    for contest, errors in outcome:
-        for entry in contest.entries:
-            row: Row = {"measurements": contest.title, "filter": entry.name, "accel": entry.accel,
-                        "runs": errors[entry.title].shape[1]}  # fmt: skip
+    for comparison, errors in outcome:
+        for candidate in comparison.candidates:
+            row: Row = {"measurements": comparison.title, "filter": candidate.name, "accel": candidate.accel,
+                        "runs": errors[candidate.title].shape[1]}  # fmt: skip
             for window in WINDOWS:
-                row[window], row[f"{window}_se"] = mean_abs(errors[entry.title], window)
-            rows.append(row | {"paper": PAPER.get(entry.name), "paper_claim": CLAIM})
+                row[window], row[f"{window}_se"] = mean_abs(errors[candidate.title], window)
+            rows.append(row | {"paper": PAPER.get(candidate.name), "paper_claim": CLAIM})
     return rows
 
 
 def _figure(outcome: Outcome) -> Figure:
     drawing, (time, *bars) = style.figure(2, 2, panel=(6.0, 3.8))
     _over_time(time, outcome[0][1])
-    for ax, (contest, errors) in zip(bars, outcome, strict=True):
-        _bars(ax, contest, errors)
+    for ax, (comparison, errors) in zip(bars, outcome, strict=True):
+        _bars(ax, comparison, errors)
     return drawing
 
 
@@ -72,21 +72,21 @@ def _over_time(ax: Axes, errors: dict[str, Floats]) -> None:
     style.legend(ax, loc="upper left", ncols=2)
 
 
-def _bars(ax: Axes, contest: Contest, errors: dict[str, Floats]) -> None:
-    entries = list(contest.entries)[::-1]
-    for y, entry in enumerate(entries):
-        mean, se = mean_abs(errors[entry.title])
-        ax.barh(y, mean, xerr=1.96 * se, color=COLOURS.get(entry.name, style.RED), height=0.7, alpha=0.85)
+def _bars(ax: Axes, comparison: Comparison, errors: dict[str, Floats]) -> None:
+    candidates = list(comparison.candidates)[::-1]
+    for y, candidate in enumerate(candidates):
+        mean, se = mean_abs(errors[candidate.title])
+        ax.barh(y, mean, xerr=1.96 * se, color=COLOURS.get(candidate.name, style.RED), height=0.7, alpha=0.85)
         ax.text(1.0, y, f"{mean:.2f}", transform=ax.get_yaxis_transform(), ha="right", va="center", fontsize=8)
-        if entry.name in PAPER:
-            ax.plot(PAPER[entry.name], y, "|", ms=14, mew=2, color=style.INK)
-    ax.set_yticks(range(len(entries)), [entry.title for entry in entries])
+        if candidate.name in PAPER:
+            ax.plot(PAPER[candidate.name], y, "|", ms=14, mew=2, color=style.INK)
+    ax.set_yticks(range(len(candidates)), [candidate.title for candidate in candidates])
     ax.set_xscale("log")
     ax.set_xlim(1, 400)
     ax.set_xticks([1, 2, 5, 10, 20, 50, 100], ["1", "2", "5", "10", "20", "50", "100"])
     ax.minorticks_off()
     ax.set_xlabel("mean |error| after 3 s [m]; upright lines: the paper")
-    style.title(ax, contest.title)
+    style.title(ax, comparison.title)
 
 
 def _verdict(outcome: Outcome) -> str:

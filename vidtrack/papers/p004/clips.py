@@ -1,4 +1,4 @@
-"""Simulated videos for figures 5 to 9: detected once, tracked in several ways, compared with the truth."""
+"""Simulated videos for figures 5 to 9: detected once, tracked by several methods, compared with the truth."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ import av
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from vidtrack.config import DetectorSettings, Settings, TrackerSettings
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.settings import Settings, TrackerSettings
+from vidtrack.config.video import DetectorSettings
 from vidtrack.papers import style
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.scan import Floats, Ints, Scan, Status, Tracks
+from vidtrack.scan import Scan
 from vidtrack.simulate import Clip
-from vidtrack.video.blobs import find_blobs
+from vidtrack.tracks import Status, Tracks
+from vidtrack.video.blobs.blobs import find_blobs
 from vidtrack.video.frame import Frame
 from vidtrack.video.planes import to_frame
 
@@ -24,17 +27,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ON_TARGET = 15.0
-"""px; a track farther from a target's centre than this is not on it."""
+"""px; largest distance of a track from the centre of its target."""
 
 APART = 4.0
-"""px between the boxes of targets that are surely two blobs."""
+"""px; targets with a larger gap between their boxes are surely two blobs."""
 
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """A clip and what the detector saw in it: a scan for each frame.
+    """A clip and its detections: a scan for each frame.
 
-    whole   (K, N) whether target i is whole in the picture
+    whole   (K, N) whether a target is wholly in the picture
     centre  (K, N, 2) of all targets, NaN outside the picture; box (K, N, 4)
     """
 
@@ -46,9 +49,9 @@ class Watched:
 
 
 def watch(clip: Clip, detector: DetectorSettings | None = None) -> Watched:
-    """Draw a clip and detect in it, without hints from a tracker, so that all trackers get the same blobs.
+    """Render a clip and detect blobs without predictions of a tracker, so that all trackers get the same blobs.
 
-    The paper's filter takes the errors of each frame for new, and so do those that follow these scans.
+    As in the paper, the errors of different frames count as independent.
     """
     settings = Settings(detector=detector or DetectorSettings())
     model = build_detector(settings)
@@ -64,26 +67,26 @@ def watch(clip: Clip, detector: DetectorSettings | None = None) -> Watched:
 
 
 def frames(clip: Clip) -> Iterator[Frame]:
-    """The clip as a decoder would give it, without losses by compression."""
+    """The clip's frames, without compression."""
     for k, image in enumerate(clip):
         yield to_frame(k, float(clip.times[k]), av.VideoFrame.from_ndarray(image, format="bgr24"))
 
 
 def by_default(clip: Clip) -> list[Tracks]:
-    """Tracks of each frame by the whole pipeline with its default settings, where the tracker helps the detector."""
+    """Tracks of each frame by the whole pipeline with default settings, with predictions for the detector."""
     settings = Settings()
     tracker = build_blob_tracker(settings.tracker, clip.size)
     return [step.tracks for step in video_steps(frames(clip), build_detector(settings), tracker, settings)]
 
 
 def follow(watched: Watched, settings: TrackerSettings, scans: list[Scan] | None = None) -> list[Tracks]:
-    """Tracks of each frame; scans stand in for those of the clip."""
+    """Tracks of each frame; scans: replace those of the clip."""
     tracker = build_blob_tracker(settings, watched.clip.size)
     return [tracker.step(scan) for scan in (watched.scans if scans is None else scans)]
 
 
 def unshared(watched: Watched) -> list[Scan]:
-    """The scans without the blobs of targets that touch: what a detector gives that knows a merged blob by sight."""
+    """The scans without the blobs of touching targets, as from a detector that rejects merged blobs."""
     low, high = watched.box[..., :2], watched.box[..., :2] + watched.box[..., 2:]
     gap = np.maximum(low[:, :, None] - high[:, None], low[:, None] - high[:, :, None]).max(axis=-1)
     gap[:, range(gap.shape[1]), range(gap.shape[1])] = np.inf
@@ -92,7 +95,7 @@ def unshared(watched: Watched) -> list[Scan]:
 
 
 def _outside(scan: Scan, low: Floats, high: Floats) -> Scan:
-    """The scan without blobs that meet the boxes from low (B, 2) to high (B, 2)."""
+    """The scan without blobs that intersect the boxes from low (B, 2) to high (B, 2)."""
     assert scan.box is not None
     start = scan.z + scan.box[:, :2]
     overlap = np.minimum(start[:, None] + scan.box[:, None, 2:], high) - np.maximum(start[:, None], low)
@@ -101,13 +104,13 @@ def _outside(scan: Scan, low: Floats, high: Floats) -> Scan:
 
 
 def believed(tracks: Tracks) -> tuple[Ints, Floats]:
-    """Ids (T,) and positions (T, 2) of the tracks past their confirmation."""
+    """Ids (T,) and positions (T, 2) of the confirmed tracks."""
     known = tracks.status != Status.TENTATIVE
     return tracks.id[known], tracks.xy[known]
 
 
 def ids_on_targets(watched: Watched, steps: list[Tracks]) -> Ints:
-    """(K, N) id of the track on each target, one to one by least summed distance below ON_TARGET; -1 for none."""
+    """(K, N) id of the track on each target, by optimal assignment of distances below ON_TARGET; -1 for none."""
     ids = np.full(watched.whole.shape, -1)
     for k, tracks in enumerate(steps):
         track_id, xy = believed(tracks)
@@ -120,7 +123,7 @@ def ids_on_targets(watched: Watched, steps: list[Tracks]) -> Ints:
 
 
 def draw(ax: Axes, watched: Watched, steps: list[Tracks], frame: int, *, first: int = 0) -> None:
-    """The picture at `frame` with each believed track's path from frame `first` on, and its number at its end."""
+    """The picture at `frame`, with the path of each confirmed track from frame `first` on, and its id."""
     picture = watched.clip.frame(frame)[..., ::-1]
     width, height = watched.clip.size
     ax.imshow(picture, extent=(0, width, height, 0), alpha=0.55)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Gate
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 PREDICTED = np.array([[0.0], [6.0]])
 SIGMA = np.array([2.4, 0.8])
@@ -15,7 +16,7 @@ Z = 3.6
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """Two predicted densities and z; nothing is random here, so runs and seed change nothing."""
+    """Draw two predicted densities and z. Deterministic: runs and seed have no effect."""
     distance, density = compare(Z)
     near, likely = int(distance.argmin()), int(density.argmax())
     drawing, (ax,) = style.figure(panel=(6.4, 3.6))
@@ -58,7 +59,7 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def compare(z: float) -> tuple[Floats, Floats]:
-    """Distance and density (2,) of a measurement for both targets, by the tracker's own gate."""
+    """Distance and density (2,) of a measurement for both targets, by the tracker's gate."""
     R = np.array([[0.25]])
     cov = (SIGMA**2)[:, None, None] - R
     scan = Scan(0.0, np.array([[z]]), R)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import NN
 from vidtrack.associate.problem import Problem
+from vidtrack.decision import Decision
 from vidtrack.estimate.kalman import KalmanBank
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Decision, Floats, Scan
+from vidtrack.scan import Scan
 
 MODEL = ConstantVelocity(accel=0.8, cross=0.2, warmup=6, heading=0.0)
 R = 0.49 * np.eye(2)
@@ -21,7 +23,7 @@ REGION = 0.95
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """The region is that of our own filter; nothing is random here, so runs and seed change nothing."""
+    """Draw the region of our filter. Deterministic: runs and seed have no effect."""
     zhat, cov = predicted()
     S = cov + R
     along, across = np.sqrt(np.diag(S))
@@ -75,7 +77,7 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def predicted() -> tuple[Floats, Floats]:
-    """Predicted position (2,) and its covariance (2, 2) of a target seen at 2 px/frame, COAST frames after the last."""
+    """Predicted position (2,) and covariance (2, 2) of a target at 2 px/frame, COAST frames after the last update."""
     bank = KalmanBank(MODEL)
     bank.append(np.array([[-2.0 * UPDATES - 2.0 * COAST, 0.0]]), R[None], np.ones(1))
     one = Decision(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64), np.ones(1), np.zeros(1))

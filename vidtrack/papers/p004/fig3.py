@@ -1,8 +1,8 @@
-"""Figure 3: two crossing targets in one frame. Distance swaps them, the confidence region does not.
+"""Figure 3: two crossing targets in one frame, swapped by distance and correct by confidence region.
 
-Numbers for which this can be proved by hand: predictions (0, 0) with S = diag(1, 36), moving up, and (-4, 6) with
-S = diag(36, 1), moving right; measurements (0, 8) and (4, 6) of these two. Turned by 45 degrees both S have equal
-variances in x and y: eq. (8) of the paper is then plain distance, and only the full S tells the targets apart.
+Numbers that can be checked by hand: predictions (0, 0) with S = diag(1, 36), moving up, and (-4, 6) with
+S = diag(36, 1), moving right; their measurements (0, 8) and (4, 6). Rotated by 45 degrees both S have equal variances
+in x and y: eq. (8) of the paper is then plain distance, and only the full S separates the targets.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Distance, Gate
 from vidtrack.associate.hard import GNN, NN
 from vidtrack.associate.problem import Problem
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers import style
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Scan
+from vidtrack.scan import Scan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,7 @@ class Frame:
 
     @classmethod
     def turned(cls, angle: float) -> Frame:
-        """The proved case, turned about the origin; the regions are those of the process noise along the heading."""
+        """The case above, rotated about the origin, with the regions of process noise along the heading."""
         c, s = np.cos(angle), np.sin(angle)
         T = np.array([[c, -s], [s, c]])
         u = np.stack([np.cos(HEADING), np.sin(HEADING)], axis=-1) @ T.T
@@ -65,7 +66,7 @@ class Frame:
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """The proved case by our own gate and association; nothing is random here, so runs and seed change nothing."""
+    """The case above by our gate and association. Deterministic: runs and seed have no effect."""
     frames = {"axis-aligned": Frame.turned(0.0), "turned by 45 degrees": Frame.turned(np.pi / 4)}
     drawing, panels = style.figure(3, 2, panel=(3.9, 3.7))
     rows: list[Row] = []
@@ -100,7 +101,7 @@ def _outcome(taken: list[int]) -> str:
 
 
 def _panel(ax: Axes, frame: Frame, distance: Distance, case: str) -> None:
-    """Regions, measurements, and which target takes which."""
+    """Draw regions, measurements and the association."""
     taken = frame.taken(distance, GNN)
     colours = (style.BLUE, style.ORANGE)
     for t in (0, 1):

@@ -21,8 +21,8 @@ from vidtrack.papers.p004.ways import (
     follow_all,
 )
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Tracks
 from vidtrack.simulate import simulate
+from vidtrack.tracks import Tracks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ SEEDS = 200
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """`runs` videos with seeds from `seed` on; drawn is the one most like the paper."""
+    """Track `runs` videos with seeds from `seed` on; the figure shows the one most like the paper."""
     seeds = range(seed, seed + (SEEDS if runs is None else runs))
     outcomes = [outcomes_of(watch(simulate("crossing", seed=one))) for one in seeds]
     shown = min(range(len(seeds)), key=lambda i: _unlike_paper(outcomes[i]))
@@ -50,13 +50,13 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def outcomes_of(watched: Watched) -> dict[Way, str]:
-    """What becomes of the two identities in each way of tracking."""
+    """The outcome of the two identities for each method."""
     before, end = moments(watched)
     return {way: outcome(watched, steps, before, end) for way, steps in follow_all(watched).items()}
 
 
 def moments(watched: Watched) -> tuple[int, int]:
-    """The last frame before the targets touch, and the last in which both are whole in the picture."""
+    """The last frame before the targets touch, and the last with both wholly in the picture."""
     low, high = watched.box[..., :2], watched.box[..., :2] + watched.box[..., 2:]
     gap = np.maximum(low[:, 0] - high[:, 1], low[:, 1] - high[:, 0]).max(axis=1)
     both = watched.whole.all(axis=1)
@@ -77,7 +77,7 @@ def outcome(watched: Watched, steps: list[Tracks], before: int, end: int) -> str
 
 
 def _unlike_paper(told: dict[Way, str]) -> tuple[bool, ...]:
-    """Sorts videos: first those where the confidence region is correct, minimum distance is not, and it swaps."""
+    """Sort key: videos with the confidence region correct and minimum distance swapped come first."""
     return told[REGION] != "correct", told[NEAR] == "correct", told[NEAR] != "swap"
 
 
@@ -86,7 +86,7 @@ def _shares(outcomes: list[str]) -> dict[str, float]:
 
 
 def _row(way: Way, share: dict[str, float], videos: int) -> Row:
-    """Beside our shares the failures of the Monte Carlo reference, which has points and no detector."""
+    """A table row: our shares, and the failures of the Monte Carlo reference, which has points and no detector."""
     theirs = reference.CROSSING["axis-aligned, merged for 8 frames"][way.method, way.distance]
     return {
         **way.row(),
@@ -100,7 +100,7 @@ def _row(way: Way, share: dict[str, float], videos: int) -> Row:
 
 
 def _bars(ax: Axes, share: dict[Way, dict[str, float]]) -> None:
-    """Failures of each way, by kind."""
+    """Draw the failures of each method, by kind."""
     y = np.array([9.5, 8.5, 7.5, 6.5, 4.8, 3.8, 2.8, 1.8, 0.0])
     left = np.zeros(len(WAYS))
     for name, colour in zip(reference.CLASSES[1:], (style.RED, style.ORANGE, style.GREY), strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.papers import style
 from vidtrack.papers.p004 import reference
 from vidtrack.papers.p004.clips import Watched, draw, ids_on_targets, watch
@@ -19,14 +20,14 @@ from vidtrack.papers.p004.ways import (
     follow_all,
 )
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats, Ints, Tracks
 from vidtrack.simulate import simulate
+from vidtrack.tracks import Tracks
 
 SEEDS = 30
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """`runs` videos with seeds from `seed` on; drawn is the one where the confidence region saves most identities."""
+    """Track `runs` videos with seeds from `seed` on; the figure shows the one with the largest gain by the region."""
     seeds = range(seed, seed + (SEEDS if runs is None else runs))
     lost = [lost_in(watch(simulate("nine", seed=one))) for one in seeds]
     count = {way: np.array([one[way].size for one in lost], float) for way in WAYS}
@@ -52,12 +53,12 @@ def reproduce(runs: int | None, seed: int) -> Result:
 
 
 def lost_in(watched: Watched) -> dict[Way, Ints]:
-    """The targets that lose their identity in each way of tracking."""
+    """The targets that lose their identity, for each method."""
     return {way: lost_identities(watched, steps) for way, steps in follow_all(watched).items()}
 
 
 def lost_identities(watched: Watched, steps: list[Tracks]) -> Ints:
-    """Targets (indices) whose first track is not on them when they are whole in the picture for the last time."""
+    """Indices of targets whose first track is not on them in their last frame wholly in the picture."""
     ids = ids_on_targets(watched, steps)
     targets = np.arange(ids.shape[1])
     last = len(ids) - 1 - watched.whole[::-1].argmax(axis=0)
@@ -66,7 +67,7 @@ def lost_identities(watched: Watched, steps: list[Tracks]) -> Ints:
 
 
 def _row(way: Way, count: Floats) -> Row:
-    """Beside our mean that of the Monte Carlo reference, which has points, other paths and no detector."""
+    """A table row: our mean, and that of the Monte Carlo reference, which has points, other paths and no detector."""
     return {
         **way.row(),
         "videos": len(count),

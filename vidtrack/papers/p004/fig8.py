@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from vidtrack.papers.p004.junction import NEAR, REGION, SEEDS, Case, panels, stories, table
+from vidtrack.papers.p004.junction import NEAR, REGION, SEEDS, Case, outcomes, panels, table
 from vidtrack.papers.result import Result
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """`runs` videos with seeds from `seed` on; drawn is the first."""
+    """Track `runs` videos with seeds from `seed` on; the figure shows the first."""
     runs = SEEDS if runs is None else runs
-    told = stories(runs, seed)
+    found = outcomes(runs, seed)
 
     def lives(case: Case) -> int:
-        return sum(story.fate in ("absorbs the white car", "alive when the white car comes") for story in told[case])
+        return sum(
+            outcome.fate in ("absorbs the white car", "alive when the white car comes") for outcome in found[case]
+        )
 
     one_sided = [lives(("paper, one-sided", distance)) for distance in ("euclidean", "mahalanobis")]
     verdict = (
-        f"seed {seed}: ghost by minimum distance: {told[NEAR][0].fate}; by confidence region: {told[REGION][0].fate} "
+        f"seed {seed}: ghost by minimum distance: {found[NEAR][0].fate}; by confidence region: {found[REGION][0].fate} "
         f"(the paper: lives; deleted); of {runs} videos it lives until the white car comes in {lives(NEAR)} and "
         f"{lives(REGION)}, one-sided in {one_sided[0]} and {one_sided[1]}."
     )
-    return Result(panels(seed, lambda free, arrives: arrives - 2), table(told), verdict)
+    return Result(panels(seed, lambda free, arrives: arrives - 2), table(found), verdict)

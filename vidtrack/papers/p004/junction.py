@@ -1,7 +1,7 @@
-"""Figures 7 to 9: what becomes of the stop line's ghost, and of the white car, at the simulated T-junction.
+"""Figures 7 to 9: the tracks of the stop line's ghost and of the white car at the simulated T-junction.
 
-The grey car covers the bright stop line; when it has passed, the running average of the `paper` detector has
-forgotten the line, which then looks like something new: the ghost. The white car follows.
+The grey car covers the bright stop line until the running average of the `paper` detector no longer contains the line.
+When the car leaves, the line is detected as a new object: the ghost. The white car follows.
 """
 
 from __future__ import annotations
@@ -13,14 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Distance
-from vidtrack.config import DetectorSettings, PaperSettings, TrackerSettings
+from vidtrack.config.settings import TrackerSettings
+from vidtrack.config.video import DetectorSettings, PaperSettings
 from vidtrack.papers import style
 from vidtrack.papers.p004.clips import Watched, believed, by_default, draw, follow, ids_on_targets, watch
 from vidtrack.papers.result import Row
-from vidtrack.scan import Floats, Ints, Tracks
 from vidtrack.simulate import simulate
 from vidtrack.simulate.junction import HALF, ROAD, STOP_LINE
+from vidtrack.tracks import Tracks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +33,7 @@ LINE = np.array(ROAD(STOP_LINE, -HALF / 2))
 AT_LINE = 10.0
 """px from the line's middle."""
 STAYS_S = 0.5
-"""s; whoever is at the uncovered line for longer is no passing car."""
+"""s; a track that stays longer at the uncovered line is not a passing car."""
 
 TRAIL_S = 1.2
 """s of each path in the pictures."""
@@ -48,16 +50,16 @@ DEFAULT: Case = ("default", "mahalanobis")
 CASES: tuple[Case, ...] = (
     NEAR, REGION, ("paper, one-sided", "euclidean"), ("paper, one-sided", "mahalanobis"), DEFAULT
 )  # fmt: skip
-"""Detector and distance; merged blobs are recognised by default only, since the paper does not know them."""
+"""Detector and distance; only the default recognises merged blobs, which the paper does not treat."""
 
 
 @dataclass(frozen=True, slots=True)
-class Story:
-    """What happened in one way of tracking.
+class JunctionOutcome:
+    """The outcome for one case.
 
     ghosts  ids of the tracks that stayed at the uncovered line
     fate    of them: "none", "absorbs the white car", "alive when the white car comes", "deleted"
-    white   id on the white car before it reaches the line, and at its end; -1: none
+    white   track id of the white car before it reaches the line, and at the end; -1: none
     """
 
     ghosts: tuple[int, ...]
@@ -85,24 +87,24 @@ def filmed(seed: int) -> dict[Case, tuple[Watched, list[Tracks]]]:
 
 
 @lru_cache(maxsize=2)
-def stories(runs: int, seed: int) -> dict[Case, list[Story]]:
-    """What happened in each case in videos with seeds from `seed` on."""
+def outcomes(runs: int, seed: int) -> dict[Case, list[JunctionOutcome]]:
+    """The outcomes of each case in videos with seeds from `seed` on."""
     seeds = range(seed, seed + runs)
     # Backwards: the first, which is drawn, is then still in the cache.
-    told = {one: {case: story(*film) for case, film in filmed(one).items()} for one in reversed(seeds)}
-    return {case: [told[one][case] for one in seeds] for case in CASES}
+    found = {one: {case: junction_outcome(*film) for case, film in filmed(one).items()} for one in reversed(seeds)}
+    return {case: [found[one][case] for one in seeds] for case in CASES}
 
 
 def uncovered(watched: Watched) -> tuple[int, int]:
-    """The first frame in which the line is free after the grey car, and the one in which the white car covers it."""
+    """The first frame with the line free after the grey car, and the first with the white car on it."""
     low = watched.box[:, [GREY, WHITE], :2]
     high = low + watched.box[:, [GREY, WHITE], 2:]
     covers = np.all((low <= LINE) & (high >= LINE), axis=2)
     return int(np.flatnonzero(covers[:, 0])[-1]) + 1, int(np.flatnonzero(covers[:, 1])[0])
 
 
-def story(watched: Watched, steps: list[Tracks]) -> Story:
-    """Read it from the tracks."""
+def junction_outcome(watched: Watched, steps: list[Tracks]) -> JunctionOutcome:
+    """The outcome, from the tracks."""
     free, arrives = uncovered(watched)
     ids = ids_on_targets(watched, steps)
     ghosts = _staying(steps[free:arrives], round(STAYS_S * watched.clip.fps))
@@ -116,11 +118,11 @@ def story(watched: Watched, steps: list[Tracks]) -> Story:
         fate = "alive when the white car comes"
     else:
         fate = "deleted"
-    return Story(ghosts, fate, white)
+    return JunctionOutcome(ghosts, fate, white)
 
 
 def _staying(steps: list[Tracks], least: int) -> tuple[int, ...]:
-    """Tracks at the line in at least so many frames."""
+    """Ids of the tracks that are at the line in at least `least` frames."""
     there = [ids[_at_line(xy)] for ids, xy in map(believed, steps)]
     ids, frames = np.unique(np.concatenate(there), return_counts=True)
     return tuple(ids[frames >= least].tolist())
@@ -130,7 +132,7 @@ def _at_line(xy: Floats) -> Ints:
     return np.flatnonzero(np.linalg.norm(xy - LINE, axis=1) < AT_LINE)
 
 
-def table(told: dict[Case, list[Story]]) -> list[Row]:
+def table(found: dict[Case, list[JunctionOutcome]]) -> list[Row]:
     """The first video's ids and the shares over all of them."""
     return [
         {
@@ -141,19 +143,19 @@ def table(told: dict[Case, list[Story]]) -> list[Row]:
             "white_car_before": one[0].white[0],
             "white_car_after": one[0].white[1],
             "videos": len(one),
-            "ghost_in": _share(story.fate != "none" for story in one),
-            "ghost_absorbs_white_car_in": _share(story.fate == "absorbs the white car" for story in one),
-            "white_car_keeps_identity_in": _share(story.white_kept for story in one),
+            "ghost_in": _share(outcome.fate != "none" for outcome in one),
+            "ghost_absorbs_white_car_in": _share(outcome.fate == "absorbs the white car" for outcome in one),
+            "white_car_keeps_identity_in": _share(outcome.white_kept for outcome in one),
             "paper": {
                 NEAR: "ghost 15 lives on and absorbs the white car 19", REGION: "ghost 15 deleted, white car stays 19"
             }.get((detector, distance), ""),
         }
-        for (detector, distance), one in told.items()
+        for (detector, distance), one in found.items()
     ]  # fmt: skip
 
 
 def panels(seed: int, frame: Callable[[int, int], int]) -> Figure:
-    """Pictures of the three main cases at a frame that depends on when the line is free and the white car comes."""
+    """Pictures of the three main cases at a frame, a function of the two frames of `uncovered`."""
     drawing, axes = style.figure(3, panel=(4.6, 2.8))
     films = filmed(seed)
     k = frame(*uncovered(films[NEAR][0]))

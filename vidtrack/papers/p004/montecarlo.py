@@ -1,7 +1,7 @@
-"""How often minimum distance and the confidence region lose an identity: thousands of crossings as one bank.
+"""Rates of lost identities by minimum distance and by confidence region: thousands of crossings as one bank.
 
-The paper shows one crossing. Here two targets cross at right angles in each of many runs, as one blob for eight
-frames or seen throughout, along the axes or turned by 45 degrees. Nine targets follow.
+The paper shows one crossing. Here two targets cross at right angles in each of many runs, merged in one blob for eight
+frames or always separate, along the axes or rotated by 45 degrees. A second experiment has nine targets.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Distance
 from vidtrack.papers import style
 from vidtrack.papers.p004 import reference
 from vidtrack.papers.p004.scenarios import DISTANCES, crossing, nine, shares, wrong_identities
 from vidtrack.papers.result import Result, Row
-from vidtrack.scan import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,14 +28,14 @@ RUNS_PER_NINE = 20
 
 Pair = tuple[str, Distance]
 PAIRS: tuple[Pair, ...] = tuple((method, distance) for distance in DISTANCES for method in ("nn", "gnn"))
-"""What the reference has."""
+"""Pairs in the reference."""
 OTHERS: tuple[Pair, ...] = tuple((name, "mahalanobis") for name in ("generalized-nn", "pda", "jpda", "split", "mht"))
 Table = dict[str, dict[Pair, Floats]]
 WORDS = {"euclidean": "minimum distance", "decoupled": "region, eq. (8)", "mahalanobis": "region, full S"}
 
 
 def reproduce(runs: int | None, seed: int) -> Result:
-    """All scenarios and methods with `runs` crossings each."""
+    """Simulate all scenarios and methods with `runs` crossings each."""
     runs = RUNS if runs is None else runs
     table, wrong = measure(runs, seed)
     return Result(_figure(table, wrong), _rows(table, wrong, runs), _verdict(table, runs))
@@ -126,7 +126,7 @@ def _figure(table: Table, wrong: dict[Pair, Floats]) -> Figure:
 
 
 def _failures(ax: Axes, ours: dict[Pair, Floats], theirs: reference.Shares) -> None:
-    """For each method the shares of swap, merge and lost end to end; the reference's total as a tick."""
+    """Draw stacked bars of swap, merge and lost for each method; the reference's total as a tick."""
     y = np.arange(len(ours), dtype=float)[::-1]
     left = np.zeros(len(ours))
     for i, colour in ((1, style.RED), (2, style.ORANGE), (3, style.GREY)):

@@ -1,6 +1,6 @@
-"""Shares that an independent implementation of the same crossing experiment gave, and its nine-target numbers.
+"""Results of an independent implementation of the crossing and nine-target experiments.
 
-The paper has no such table. 10,000 runs each (150 of nine targets), so that the standard error of a share p is
+The paper has no such table. 10,000 runs each (150 with nine targets); the standard error of a share p is
 sqrt(p (1 - p) / 10000).
 """
 
@@ -54,4 +54,4 @@ NINE: dict[tuple[str, str], tuple[float, float]] = {
     ("nn", "mahalanobis"): (2.84, 0.128),
     ("gnn", "mahalanobis"): (0.653, 0.090),
 }
-"""Mean number of the nine targets whose track has another's place at the end, and its standard error."""
+"""Mean number of the nine targets with a wrong identity at the end, and its standard error."""

@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats
 from vidtrack.associate.gate import Distance, Gate
-from vidtrack.estimate.motion import ConstantVelocity
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.papers.p004.simulated import MEASUREMENT_SIGMA, Targets, drive, nearest_target, track
-from vidtrack.scan import Floats
 from vidtrack.tracking.methods import METHODS
 
 DISTANCES: tuple[Distance, ...] = ("euclidean", "decoupled", "mahalanobis")
 GATE = 0.9999
 LOST = 15.0
-"""px; a track this far from every target has lost all of them."""
+"""px; a track farther than this from every target is lost."""
 
 CENTRE = np.array([120.0, 90.0])
 FRAMES, BEFORE, SPEED = 40, 20, 2.0
 """Frames of a crossing, frames until the targets meet, px/frame."""
 MERGED = slice(14, 22)
-"""Frames in which the two are one blob, which is a measurement of neither."""
+"""Frames in which the two targets are one blob, and neither is measured."""
 
 NINE_FRAMES, NINE_SPEED = 60, 3.0
 NINE_MERGED = 8.0
@@ -29,7 +29,7 @@ NINE_HEADINGS = np.radians([-38.0, 62.0, 0.0, 180.0, 90.0, -90.0, 140.0, -142.0,
 
 
 def crossing(runs: int, turn: float, merged: bool, rng: Generator) -> Targets:
-    """Two targets a run: one goes in +y and one in +x, all turned by `turn` [rad], to meet at the centre."""
+    """Two targets per run, which go in +y and +x, rotated by `turn` [rad], and meet at the centre."""
     heading = np.tile([np.pi / 2, 0.0], runs) + turn
     start = CENTRE - BEFORE * SPEED * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     truth = drive(start, heading, FRAMES, SPEED, 0.8, 0.05, rng)
@@ -40,7 +40,7 @@ def crossing(runs: int, turn: float, merged: bool, rng: Generator) -> Targets:
 
 
 def nine(runs: int, rng: Generator) -> Targets:
-    """Nine targets a run, each through a random place near the middle of the picture half-way through."""
+    """Nine targets per run, each at a random place near the middle of the picture at half time."""
     heading = np.tile(NINE_HEADINGS, runs)
     middle = CENTRE + rng.uniform(-1, 1, (len(heading), 2)) * (60, 45)
     start = middle - NINE_SPEED * NINE_FRAMES / 2 * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
@@ -62,7 +62,7 @@ def shares(targets: Targets, method: str, distance: Distance, model: ConstantVel
 
 
 def wrong_identities(targets: Targets, method: str, distance: Distance) -> Floats:
-    """(runs,) tracks that end nearest to another target than their own, or far from all."""
+    """(runs,) number of tracks that end nearest to another target than their own, or far from all."""
     end = track(targets, motion(distance, 0.5), METHODS[method](), Gate(GATE, distance))[-1]
     target, away = nearest_target(end, targets.truth[-1], targets.run)
     return ((target != np.arange(target.shape[1])) | (away > LOST)).sum(axis=1).astype(float)

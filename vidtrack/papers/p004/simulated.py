@@ -1,4 +1,4 @@
-"""Points that move and are measured, many Monte Carlo runs at once, tracked by one bank. Time is in frames."""
+"""Simulation of point targets in many Monte Carlo runs, tracked by one bank. Time is in frames."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import Associator
-from vidtrack.estimate.motion import ConstantVelocity
-from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
+from vidtrack.estimate.motion.velocity import ConstantVelocity
+from vidtrack.scan import Scan
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Tracks
 
 MEASUREMENT_SIGMA = 0.7
 """px, of a blob's centroid in each axis."""
@@ -26,7 +28,7 @@ class Targets:
     """Truth and measurements of N targets in all runs, K frames.
 
     truth  (K, N, 2) px, z (K, N, 2) px, run (N,)
-    seen   (K, N) whether a measurement is reported: targets in one blob are not
+    seen   (K, N) whether there is a measurement; targets in one blob have none
     """
 
     truth: Floats
@@ -59,7 +61,7 @@ def drive(
 def track(targets: Targets, model: ConstantVelocity, associate: Associator | ForestRule, gate: Gate) -> Floats:
     """Positions (K - 1, N, 2) of the tracks of all targets from frame 1 on, started there by two points.
 
-    Row n starts on target n; nothing is born or deleted, so that every run ends with a track for each target.
+    Row n starts on target n. There are no births or deletions, so every run ends with a track for each target.
     """
     R = MEASUREMENT_SIGMA**2 * np.eye(2)
     tracker = Tracker(model, associate, gate, FOREVER, births=False)
@@ -91,7 +93,7 @@ def two_points(z0: Floats, z1: Floats) -> tuple[Floats, Floats]:
 
 
 def nearest_target(xy: Floats, truth: Floats, run: Ints) -> tuple[Ints, Floats]:
-    """Of each row of xy (N, 2) the nearest target of its own run, (N,), and its distance (N,).
+    """Nearest target (N,) of the same run for each row of xy (N, 2), and its distance (N,).
 
     Rows and targets are in order of run, with equally many in each.
     """

@@ -1,4 +1,4 @@
-"""The ways of tracking that figures 5 and 6 compare on the same blobs."""
+"""The tracking methods that figures 5 and 6 compare on the same blobs."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from vidtrack.associate.gate import Distance
-from vidtrack.config import TrackerSettings
+from vidtrack.config.settings import TrackerSettings
 from vidtrack.papers.p004.clips import Watched, follow, unshared
-from vidtrack.scan import Tracks
+from vidtrack.tracks import Tracks
 
 WORDS: dict[Distance, str] = {"euclidean": "minimum distance", "mahalanobis": "confidence region"}
 
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Association, distance, and what a blob shared by several vehicles is.
+    """Association rule, distance, and treatment of a blob of several vehicles.
 
-    shared  "one measurement": of one of them, as in the paper; "no measurement": of nobody, as in the Monte Carlo
-            experiment; both with its gate, and no track is given up early. "recognised": the default settings
+    shared  "one measurement": of one vehicle, as in the paper; "no measurement": as in the Monte Carlo experiment; both
+            with that experiment's gate and without early deletion. "recognised": the default settings
     """
 
     method: Literal["nn", "gnn"]
@@ -26,7 +26,7 @@ class Way:
     shared: Literal["one measurement", "no measurement", "recognised"]
 
     def settings(self) -> TrackerSettings:
-        """What the tracker is told."""
+        """Settings of the tracker."""
         if self.shared == "recognised":
             return TrackerSettings(method=self.method, distance=self.distance)
         return TrackerSettings(
@@ -38,7 +38,7 @@ class Way:
         return {"method": self.method, "distance": self.distance, "shared_blob": self.shared}
 
     def paper(self, near: str, region: str) -> str:
-        """What the paper says of its way of tracking, by minimum distance or by confidence region."""
+        """The paper's statement on this method, by minimum distance or by confidence region."""
         return "" if self.shared != "one measurement" else region if self.distance == "mahalanobis" else near
 
     def __str__(self) -> str:
@@ -58,6 +58,6 @@ WAYS = (
 
 
 def follow_all(watched: Watched) -> dict[Way, list[Tracks]]:
-    """The clip tracked in every way."""
+    """The clip tracked by every method."""
     apart = unshared(watched)
     return {way: follow(watched, way.settings(), apart if way.shared == "no measurement" else None) for way in WAYS}

@@ -1,1 +1,1 @@
-"""A live run: a camera becomes tracks for weeks, and the results outlive whatever happens to it."""
+"""Live runs: cameras tracked for weeks. Results stay valid after crashes, kills, full disks and lost connections."""

@@ -1,4 +1,4 @@
-"""Several cameras: given one by one, or listed in a TOML file with settings of their own."""
+"""The cameras of a live run: given as addresses, or listed in a TOML file with settings of their own."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from vidtrack.config import Input, Settings, load, merged
+from vidtrack.config.group import read_toml
+from vidtrack.config.inputs import Input
+from vidtrack.config.load import load, merged
+from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.run.live.outputs import LiveExtras
-from vidtrack.toml_file import read_toml
 from vidtrack.video.live.address import redact
 
 _CAMERAS, _ADDRESS = "camera", "address"
@@ -21,11 +23,11 @@ _CAMERAS, _ADDRESS = "camera", "address"
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One of several.
+    """One camera.
 
-    name      of its folder, and on the page
-    address   what a live run opens; it may hold a password
-    settings  its own ones, nested, above those of all
+    name      names its folder and its place on the page
+    address   of the source; may contain a password
+    settings  nested; they override the settings for all cameras
     """
 
     name: str
@@ -34,10 +36,10 @@ class Entry:
 
 
 def listed(path: Path) -> tuple[list[Entry], dict[str, Any]]:
-    """The cameras of a file, and the settings in it that hold for all.
+    """The cameras listed in a file, and the file's settings for all cameras.
 
-    Each table [camera.NAME] has an `address` and any settings; the rest of the file are settings for all cameras.
-    Raises ConfigError for a file that cannot be read, or lists none.
+    Each table [camera.NAME] has an `address` and optional settings; the rest of the file are settings for all cameras.
+    Raises ConfigError if the file cannot be read or lists no camera.
     """
     tree = read_toml(path, "the list of cameras")
     tables = tree.pop(_CAMERAS, {})
@@ -47,7 +49,7 @@ def listed(path: Path) -> tuple[list[Entry], dict[str, Any]]:
 
 
 def named(addresses: Iterable[str]) -> list[Entry]:
-    """Cameras under names made of their addresses, all different."""
+    """Cameras with unique names made from their addresses."""
     cameras: list[Entry] = []
     for address in addresses:
         wanted = _as_folder(_name(address))
@@ -60,7 +62,10 @@ def named(addresses: Iterable[str]) -> list[Entry]:
 def settings_of(
     camera: Entry, base: Mapping[str, Any], path: Path | None, assignments: Iterable[str | tuple[str, Any]]
 ) -> Settings:
-    """Of all cameras, above them its own, above them --config and --set. Raises ConfigError, naming the camera."""
+    """A camera's settings: those for all, overridden by its own, then by --config and --set.
+
+    Raises ConfigError, naming the camera.
+    """
     try:
         return load(path, assignments, merged(base, camera.settings), Input.CAMERA)
     except ConfigError as error:
@@ -68,7 +73,7 @@ def settings_of(
 
 
 def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:
-    """Places for one camera: into folders goes one with its name, files get it before their ending."""
+    """Output places of one camera: sub-folders with its name, files with its name before the extension."""
     if extras.rerun in ("spawn", "serve"):
         raise ConfigError(
             f"--rerun {extras.rerun} shows one camera; give FILE.rrd for a recording of each, or use --http"
@@ -95,7 +100,7 @@ def _camera(path: Path, name: str, table: Any) -> Entry:
 
 
 def _name(address: str) -> str:
-    """The host of an address, the name of a device."""
+    """The host of an address, or the name of a device."""
     if "://" in address:
         return urlsplit(redact(address)).netloc.rpartition("@")[2]
     return f"video{address}" if address.isdecimal() else Path(address).name

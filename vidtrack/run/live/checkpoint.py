@@ -1,4 +1,4 @@
-"""Where a run stands, so that another one can go on from there."""
+"""Checkpoints of a live run: its complete state, saved so that a later run can continue from it."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from vidtrack.video.frame import Frame
 log = logging.getLogger(__name__)
 
 _SAVE_S = 10.0
-_BLOCK = 10_000  # ids reserved at a time, and numbers of frames: many times more than come between two saves
+_BLOCK = 10_000  # track ids and frame numbers reserved at a time: far more than are used between two saves
 _NEXT_ID, _FRAME = "tracker.register.next_id", "frame"
 
 
 class Checkpoint:
-    """Everything that the tracks of the next frame depend on.
+    """The complete state on which the next frame's tracks depend.
 
-    like           a frame of the size and kind that all frames are brought to
+    like           a frame with the size and colour format of all frames
     frame, time_s  of the last frame; -1 and 0 before the first
-    unix_s         when that was
+    unix_s         Unix time at which it was tracked
     """
 
     STATE = ("detector", "tracker", "frame", "time_s", "unix_s", "width", "height", "coloured")
@@ -44,39 +44,39 @@ class Checkpoint:
         self.unix_s = time.time()
 
     def note(self, step: Step) -> None:
-        """This step is the last one now."""
+        """Record the number and time of the last step."""
         self.frame, self.time_s, self.unix_s = step.index, step.time_s, time.time()
 
     def gather(self) -> State:
-        """A copy as plain data."""
+        """A copy of the state as plain data."""
         return gather(self)
 
     def restore(self, state: State) -> None:
-        """Take over a saved checkpoint. Raises FormatError if other settings made it."""
+        """Set the state from a saved checkpoint. Raises FormatError if it was made with other settings."""
         restore(self, state)
 
 
 class NoCheckpointFile:
-    """Nothing is saved, where there is no --state."""
+    """Saves nothing: a run without --state."""
 
     found: State | None = None
     lost = 0
 
     def offer(self, checkpoint: Checkpoint) -> None:
-        """It is not."""
+        """Do nothing."""
 
     def close(self, checkpoint: Checkpoint | None, until_s: float) -> None:
-        """Nothing is open."""
+        """Do nothing."""
 
 
 class CheckpointFile:
-    """A checkpoint on the disk, saved regularly. Numbers are reserved there before they are used: none is issued twice.
+    """Saves checkpoints to a file at intervals. Ids and frame numbers are reserved in the file before they are used.
 
-    found  what an earlier run left; None without one
-    lost   times that it could not be saved
+    found  state saved by an earlier run; None without one
+    lost   number of failed saves
 
-    Raises FormatError for a file that is no saved state, OutputError for a place where it cannot be saved; the first
-    `offer` raises that too.
+    Raises FormatError if the file is not a saved state, OutputError if its folder is not writable; the first `offer`
+    raises OutputError too.
     """
 
     def __init__(self, path: Path) -> None:
@@ -89,7 +89,7 @@ class CheckpointFile:
         self._writing: Thread | None = None
 
     def offer(self, checkpoint: Checkpoint) -> None:
-        """Save if it is time, beside the tracker."""
+        """Save in a thread if a save is due."""
         first, next_id = not self._reserved, checkpoint.tracker.register.next_id
         scarce = self._reserved - next_id < _BLOCK // 2
         if not (scarce or self._due()) or (self._writing is not None and self._writing.is_alive()):
@@ -103,9 +103,9 @@ class CheckpointFile:
         self._writing.start()
 
     def close(self, checkpoint: Checkpoint | None, until_s: float) -> None:
-        """Save the end, waiting for the disk until a monotonic time; what was reserved in vain is free again.
+        """Save the final state, which frees unused numbers; wait for a running save until `until_s` (monotonic).
 
-        checkpoint  None: a frame was broken off, and what was saved before it holds
+        checkpoint  None: a frame was interrupted, so the last saved state stays
         """
         if self._writing is not None:
             self._writing.join(max(0.0, until_s - monotonic()))
@@ -113,7 +113,7 @@ class CheckpointFile:
             self._write(checkpoint.gather())
 
     def _reserve(self, state: State) -> None:
-        """The first save: before it is on the disk, no number may be used."""
+        """Save for the first time, synchronously: no number may be used before it is reserved."""
         try:
             write_state(self.path, state)
         except OSError as error:

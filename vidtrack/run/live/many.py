@@ -1,4 +1,4 @@
-"""Several cameras at once: a process and a sub-folder each, so that none can harm another."""
+"""Tracks several cameras at once, each in its own process and sub-folder, so that a crash stays with one camera."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from vidtrack.run.live.worker import Job
 
 log = logging.getLogger(__name__)
 
-_END_S = 1.8  # until what does not end is killed; its files are valid all the same
+_END_S = 1.8  # then processes still running are killed; their files stay valid
 _COUNTED = ("frames", "frames_dropped", "decode_errors", "reconnects", "stalls", "tracks")
 
 
 class Many:
-    """Cameras that are tracked at the same time; use it with `with`. Leaving it ends all within two seconds.
+    """Context manager that tracks several cameras at once. Leaving it ends all processes within two seconds.
 
-    supervisors  by name
+    supervisors  by camera name
 
-    Raises OutputError if another run has the folder.
+    Raises OutputError if another run uses the folder.
     """
 
     def __init__(self, jobs: Iterable[Job], folder: Path) -> None:
@@ -42,28 +42,28 @@ class Many:
         self.supervisors = {job.name: Supervisor(job) for job in jobs}
 
     def running(self, timeout_s: float) -> bool:
-        """Wait about so long while processes that crashed are started again; whether any is left and nobody said stop.
+        """Wait up to `timeout_s`, restarting crashed processes; False when all have ended or `stop` was called.
 
-        Returns early when one ends.
+        Returns early when a process ends.
         """
         if not self._stopping.is_set():
             wait([supervisor.sentinel for supervisor in _alive(self.supervisors.values())], timeout_s)
             for supervisor in self.supervisors.values():
-                supervisor.tend()
+                supervisor.restart_if_due()
         return not self._stopping.is_set() and not all(supervisor.ended for supervisor in self.supervisors.values())
 
     def stop(self) -> None:
-        """Tell all to end, and let `running` say no; from any thread, or a signal handler."""
+        """Stop all processes; `running` then returns False. Safe in any thread and in signal handlers."""
         self._stopping.set()
         for supervisor in self.supervisors.values():
             supervisor.stop()
 
     def statuses(self) -> list[dict[str, Any]]:
-        """All cameras: name and status."""
+        """Name and status of each camera."""
         return [{"name": name, **supervisor.status()} for name, supervisor in self.supervisors.items()]
 
     def summary(self) -> dict[str, Any]:
-        """All cameras' summaries in one, with the sums of their counts; `error` where one ended by itself."""
+        """The summaries of all cameras, with the sums of their counts; `error` for a camera that failed."""
         cameras = {name: _summary(supervisor) for name, supervisor in self.supervisors.items()}
         totals = {key: sum(camera.get(key, 0) for camera in cameras.values()) for key in (*_COUNTED, "restarts")}
         return {**totals, "cameras": cameras}
@@ -92,7 +92,7 @@ def _alive(supervisors: Iterable[Supervisor]) -> list[Supervisor]:
 
 
 def _summary(supervisor: Supervisor) -> dict[str, Any]:
-    """What the camera's own runs wrote, their counts added up, and how its last process ended."""
+    """Summary of one camera: counts added over its processes, and the error of the last one."""
     now = supervisor.summary()
     runs = [*supervisor.summaries, now]
     content = now | {key: sum(run.get(key, 0) for run in runs) for key in _COUNTED if any(key in run for run in runs)}
@@ -103,7 +103,7 @@ def _summary(supervisor: Supervisor) -> dict[str, Any]:
 
 
 def _added(counts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
-    """Counts by line and direction."""
+    """Sums of counts by line and direction."""
     total: dict[str, Counter[str]] = {}
     for lines in counts:
         for line, ways in lines.items():

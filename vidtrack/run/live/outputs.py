@@ -1,4 +1,4 @@
-"""Everything that a live run writes: where no other run writes at the same time, and beside the tracker."""
+"""All outputs of a live run: locked against other runs, and written in threads of their own."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from vidtrack.output.confirmed import LIVE_HOLD_S, Confirmed
 from vidtrack.output.folder import open_run, usable
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
-from vidtrack.run.live.beside import Beside
+from vidtrack.recording.retention import Retention, parts_of
+from vidtrack.run.live.background_writer import BackgroundWriter
 from vidtrack.run.live.parts import Parts
-from vidtrack.run.live.retention import Retention, parts_of
 from vidtrack.run.run import Extras
 from vidtrack.run.sinks import Subject, picture_sinks
 
-_WRITE_S = 0.25  # between two writes: with LIVE_HOLD_S this is what a kill costs
-_ROWS_DEPTH = 1000  # steps without pictures that may wait for a slow disk
-_LEAST_S = 0.2  # that each output gets to end, however late it is
+_WRITE_S = 0.25  # between two writes: a kill loses this and LIVE_HOLD_S
+_ROWS_DEPTH = 1000  # queued steps, without pictures
+_LEAST_S = 0.2  # least time for each output to finish
 
 
 @dataclass(frozen=True, slots=True)
 class LiveExtras(Extras):
-    """What a live run writes beside its tables.
+    """Optional outputs of a live run.
 
-    state   file that the next run goes on from
-    record  folder for what the camera sends
+    state   checkpoint file, from which the next run continues
+    record  folder of the recording
     """
 
     state: Path | None = None
@@ -36,36 +36,38 @@ class LiveExtras(Extras):
 
 
 class Outputs:
-    """All results in `folder`, and the extras. Raises OutputError at the start, later it counts losses.
+    """Writes the results in `folder` and the extras.
 
-    sinks  take the steps
+    sinks  receive the steps
+
+    The constructor raises OutputError; later write errors are counted in `lost`.
     """
 
     def __init__(
         self, folder: Path, subject: Subject, extras: Extras, roll_s: float | None, retention: Retention
     ) -> None:
-        self._besides = [Beside.of(name, sink) for name, sink in picture_sinks(subject, extras)]
-        # The last, so that what cannot be opened above leaves the folder empty.
+        self._writers = [BackgroundWriter.of(name, sink) for name, sink in picture_sinks(subject, extras)]
+        # Opened last: if an extra above cannot be opened, the folder stays empty.
         parts = Parts(folder, subject, extras.decisions, roll_s, retention)
-        tables = Beside("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
-        self.sinks: list[Sink] = [*self._besides, Confirmed(tables, hold_s=LIVE_HOLD_S)]
-        self._besides.append(tables)
+        tables = BackgroundWriter("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
+        self.sinks: list[Sink] = [*self._writers, Confirmed(tables, hold_s=LIVE_HOLD_S)]
+        self._writers.append(tables)
 
     @property
     def lost(self) -> dict[str, int]:
-        """Frames that each output could not write."""
-        return {beside.name: beside.lost for beside in self._besides}
+        """Number of frames not written, by output."""
+        return {writer.name: writer.lost for writer in self._writers}
 
     def close(self, until_s: float) -> None:
-        """Finish all by a monotonic time; what is not finished then stays as it is, and valid."""
+        """Finish all outputs by `until_s` (monotonic); unfinished files stay valid."""
         for sink in self.sinks:
             sink.close()
-        for beside in reversed(self._besides):  # the tables first
-            beside.join(max(_LEAST_S, until_s - monotonic()))
+        for writer in reversed(self._writers):  # the tables first
+            writer.join(max(_LEAST_S, until_s - monotonic()))
 
 
 def lock_extras(extras: LiveExtras, output: Path | None, locks: ExitStack) -> None:
-    """Keep other runs off the files that this one continues. Raises ConfigError, OutputError."""
+    """Lock the state file and the recording against other runs. Raises ConfigError, OutputError."""
     if extras.state is not None:
         usable(extras.state.parent)
         locks.enter_context(exclusive(extras.state))
@@ -78,12 +80,12 @@ def lock_extras(extras: LiveExtras, output: Path | None, locks: ExitStack) -> No
 def lock_folder(
     output: Path | None, name: str, extras: LiveExtras, locks: ExitStack, *, force: bool, in_parts: bool
 ) -> Path:
-    """A new folder, or that of an earlier run in parts, which is continued; other runs are kept out.
+    """A locked folder for the results: a new one, or that of an earlier run in parts, which is continued.
 
-    The state and the recording may lie in it. Raises OutputError.
+    The state file and the recording may lie in it. Raises OutputError.
     """
     if output is not None:
-        locks.enter_context(exclusive(usable(output)))  # before `force` deletes what another one writes
+        locks.enter_context(exclusive(usable(output)))  # before `force` deletes the files of another run
         continued = in_parts and parts_of(output)
         return output if continued or _is_ours(output, extras) else open_run(output, name, force)
     folder = open_run(None, name, force)
@@ -92,7 +94,7 @@ def lock_folder(
 
 
 def _is_ours(folder: Path, extras: LiveExtras) -> bool:
-    """Whether nothing is in a folder but what this run keeps there."""
+    """Whether a folder contains at most this run's state file and recording."""
     kept = [extras.record] if extras.record else []
     kept += [extras.state, lock_file(extras.state)] if extras.state else []
     return all(any(path.resolve().is_relative_to(entry.resolve()) for path in kept) for entry in folder.iterdir())

@@ -1,4 +1,4 @@
-"""The results of a live run: one part after the other, so that every part is closed and can be deleted by itself."""
+"""Writes the results of a live run in consecutive parts, each complete and deletable by itself."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from vidtrack.output.repair import add_parquet, repair
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import ROAD, VIDEO, csv_text, track_rows
-from vidtrack.run.live.retention import Retention, new_part, parts_of, size_of
+from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.sinks import Subject
 
 log = logging.getLogger(__name__)
 
-_LOOK_S = 10.0  # between two looks at the sizes
+_LOOK_S = 10.0  # between two checks of sizes
 
 
 class Parts:
-    """Writes steps of confirmed tracks into the current part.
+    """Writes steps of confirmed tracks to the current part.
 
     root       the run's folder
-    subject    its crossings go into each part's counts.csv
-    decisions  each part has decisions.csv
-    roll_s     length of a part by the clock: 3600 goes from one full hour to the next; None: root is the only part
+    subject    its line crossings are written to each part's counts.csv
+    decisions  whether each part has a decisions.csv
+    roll_s     length of a part [s], aligned to the clock: 3600 begins parts at full hours; None: root is the only part
 
-    Parts that an earlier run could not finish are repaired meanwhile.
+    Unfinished parts of an earlier run are repaired in another thread.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Parts:
             self._later(repair, part)
 
     def write(self, steps: Sequence[Step]) -> None:
-        """Write a batch. Raises StoppedEarly when the disk refuses; the next batch may fit again."""
+        """Write a batch. Raises StoppedEarly on a write error; a later batch may succeed."""
         crossings = ""
         if self._counter is not None:
             crossings = "".join(crossing_lines(self._counter.step(step.index, step.tracks)) for step in steps)
@@ -76,7 +76,7 @@ class Parts:
         (self._part or self._begin()).write(steps, crossings)
 
     def finish(self) -> None:
-        """End the last part, and wait for those that are being finished."""
+        """End the last part, and wait for parts that are being finished."""
         with ExitStack() as stack:
             if self._whole is not None:
                 self._whole.interrupted = False
@@ -87,7 +87,7 @@ class Parts:
             thread.join()
 
     def _roll(self) -> None:
-        """End the part if it is old or large enough."""
+        """End the current part if its period is over or it is too large."""
         large = False
         if self._look():
             self._retention.prune()
@@ -110,11 +110,11 @@ class Parts:
         return self._part
 
     def _period(self) -> int:
-        """Which stretch of the clock this is."""
+        """Number of the current period of `roll_s` seconds."""
         return 0 if self._roll_s is None else int(time.time() // self._roll_s)
 
     def _later(self, finish: Callable[..., object], *of: object) -> None:
-        """Finish a part in another thread, so that the next one is written meanwhile."""
+        """Finish a part in another thread, so that the next part can be written."""
 
         def run() -> None:
             try:
@@ -129,18 +129,18 @@ class Parts:
 
 
 class Part:
-    """The same files as those of a run over a video: tables that grow, and what is made of them at the end.
+    """One part: the same files as those of a run over a video.
 
-    subject  its counter counts on through all parts
+    subject  its line counter continues through all parts
 
-    Raises StoppedEarly when the disk refuses.
+    Raises StoppedEarly on a write error.
     """
 
     def __init__(self, folder: Path, subject: Subject, decisions: bool) -> None:
         self.folder = folder
         self._road = subject.road
         self._columns = VIDEO if subject.road is None else (*VIDEO, *ROAD)
-        with ExitStack() as stack:  # if the disk is full, what is open by then is closed
+        with ExitStack() as stack:  # on a full disk, files already open are closed
             self._summary = subject.summary(folder)
             self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in self._columns) + "\n")
             stack.callback(self._tracks.close)
@@ -157,7 +157,7 @@ class Part:
             self._files = stack.pop_all()
 
     def write(self, steps: Sequence[Step], crossings: str) -> None:
-        """Put the rows of confirmed tracks, and rows of counts.csv, on the disk."""
+        """Write and synchronise the rows of confirmed tracks, and rows of counts.csv."""
         filled = [step for step in steps if len(step.tracks)]
         if filled:
             _write(self._tracks, csv_text(track_rows(filled, self._columns, self._road)))
@@ -172,7 +172,7 @@ class Part:
         count(self._summary, steps)
 
     def finish(self) -> None:
-        """Close the tables, sort them, and add tracks.parquet and tracks.png."""
+        """Close and sort the tables; write tracks.parquet and tracks.png."""
         with ExitStack() as stack:
             self._summary.interrupted = False
             stack.callback(self._summary.close)
@@ -184,14 +184,14 @@ class Part:
 
 
 def count(summary: Summary, steps: Sequence[Step]) -> None:
-    """Bring a summary up to date; if the disk refuses it now, the next one says the same and more."""
+    """Update a summary; a write error is ignored, because the next write contains everything."""
     for step in steps:
         with suppress(StoppedEarly):
             summary.step(step)
 
 
 def _write(file: LineFile, lines: str) -> None:
-    """Bring lines to the disk, safe from a power cut."""
+    """Write lines and synchronise the file with the disk."""
     file.add(lines)
     file.flush()
     file.sync()

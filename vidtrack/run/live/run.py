@@ -1,4 +1,4 @@
-"""A live run: a camera tracked into a folder of results until it is told to stop. Read this file first in `live`."""
+"""A live run: tracks one camera into a folder of results until it is stopped. Read this file first in `live`."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
+from vidtrack.recording.recorder import NoRecorder, Recorder
+from vidtrack.recording.retention import Retention
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
 from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
-from vidtrack.run.live.recorder import NoRecorder, Recorder
-from vidtrack.run.live.retention import Retention
 from vidtrack.run.run import recorded
 from vidtrack.run.sinks import Subject, line_counter
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.traffic.road import road_at
+from vidtrack.traffic.metres import road_at
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection
@@ -32,19 +32,19 @@ from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
 
 _HOUR_S = 3600.0
-_END_S = 1.6  # from `stop` until everything has to be finished
-_LEAST_S = 0.5  # left for finishing, however long the last frame took
+_END_S = 1.6  # from `stop` to the end of the run
+_LEAST_S = 0.5  # least time to finish after the last frame
 
 
 class LiveRun:
-    """Iterates over the steps of a camera while the results are written; use it with `with`.
+    """Context manager that iterates over the steps of a camera and writes the results.
 
     name    of the source, without credentials
-    folder  where the results are
-    board   what the run looks like now, for other threads
+    folder  of the results
+    board   current status, for other threads
 
-    `stop` ends the iteration, and after the first picture nothing else does: a lost camera is opened again for
-    ever, and results that cannot be written are counted.
+    After the first picture only `stop` ends the iteration: a lost camera is reopened without limit, and results that
+    cannot be written are counted.
     Raises SourceError, ConfigError, FormatError, OutputError at the start.
     """
 
@@ -66,9 +66,9 @@ class LiveRun:
         roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
         retention = Retention(live.keep_s, live.keep_bytes)
         self._outputs: Outputs | None = None
-        self._until_s: float | None = None  # when everything has to be finished; None: not told to stop
-        self._in_work = False  # while a frame is processed the checkpoint is half updated and must not be saved
-        with ExitStack() as locks, ExitStack() as stack:  # if a later step fails, what is already open is closed
+        self._until_s: float | None = None  # monotonic time of the end; None: not stopped
+        self._in_work = False  # during a frame the checkpoint is inconsistent and must not be saved
+        with ExitStack() as locks, ExitStack() as stack:  # on an error below, everything already open is closed
             lock_extras(extras, output, locks)
             self._checkpoint_file = NoCheckpointFile() if extras.state is None else CheckpointFile(extras.state)
             self._recorder = (
@@ -79,7 +79,7 @@ class LiveRun:
             stack.enter_context(frame_by_frame(settings.detector.kind))
             self._checkpoint = self._restored(explain=extras.explain)
             if extras.state or extras.record:
-                self._checkpoint.gather()  # what cannot be saved is refused now
+                self._checkpoint.gather()  # raises ConfigError for a detector that cannot be saved
             counter = line_counter(settings, source.width, source.height)
             shown, scene = self._address.shown, self._checkpoint.detector.scene
             self.folder = lock_folder(output, self.name, extras, locks, force=force, in_parts=roll_s is not None)
@@ -95,7 +95,7 @@ class LiveRun:
         return recorded(self._steps(), (*self._outputs.sinks, self.board))
 
     def _steps(self) -> Iterator[Step]:
-        """Each frame with its tracks, after which the checkpoint is whole again."""
+        """Each frame with its tracks; between two steps the checkpoint is consistent."""
         checkpoint = self._checkpoint
         for step in video_steps(self._frames(), checkpoint.detector, checkpoint.tracker, self._settings):
             checkpoint.note(step)
@@ -103,7 +103,7 @@ class LiveRun:
             yield step
 
     def stop(self) -> None:
-        """Let the iteration end after the frame in work; from any thread, or a signal handler."""
+        """End the iteration after the current frame. Safe in any thread and in signal handlers."""
         self._until_s = monotonic() + _END_S
         self._source.stop()
 
@@ -123,7 +123,7 @@ class LiveRun:
             self._checkpoint_file.close(None if self._in_work else self._checkpoint, until_s)
 
     def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
-        """The camera; numbers and times go on from a saved state."""
+        """Open the camera; numbers and times continue from a saved state."""
         live, found = self._settings.live, self._checkpoint_file.found
         if found is None:
             return LiveSource(self._address, live, self._recorder, connect=connect)
@@ -139,7 +139,7 @@ class LiveRun:
         )
 
     def _restored(self, explain: bool) -> Checkpoint:
-        """Detector and tracker, as an earlier run left them if there was one."""
+        """Detector and tracker, restored from the saved state of an earlier run if there is one."""
         source, settings = self._source, self._settings
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height), explain=explain)
         checkpoint = Checkpoint(build_detector(settings), tracker, source.like)
@@ -148,7 +148,7 @@ class LiveRun:
         return checkpoint
 
     def _frames(self) -> Iterator[Frame]:
-        """The frames to track; before each one the checkpoint is offered to the recording and the state file."""
+        """The frames to track; before each one the checkpoint goes to the recording and the state file."""
         checkpoint, recorder, span = self._checkpoint, self._recorder, Span.of(self._settings.source)
         for frame in self._source:
             if frame is None or not span.begun(frame.time_s):
@@ -162,7 +162,7 @@ class LiveRun:
             yield frame
 
     def _reading(self) -> Mapping[str, Any]:
-        """The run's own account, for the summary and the page."""
+        """The run's counters, for the summary and the page."""
         source, stats = self._source, self._source.stats
         began = datetime.fromtimestamp(time.time() - source.latency_s(0.0), UTC)
         return {
@@ -184,7 +184,7 @@ class LiveRun:
         }
 
     def _lost(self) -> dict[str, int]:
-        """Frames, packets and states that could not be written."""
+        """Number of frames, packets and states not written, by output."""
         outputs = {} if self._outputs is None else self._outputs.lost
         return outputs | {"recording": self._recorder.lost, "state": self._checkpoint_file.lost}
 

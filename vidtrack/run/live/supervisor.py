@@ -1,4 +1,4 @@
-"""A camera's process as the parent sees it: asked how it is, told to end, started again when it crashes."""
+"""Supervises a camera's process from the parent: requests its status, stops it, restarts it after a crash."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
-from vidtrack.run.live.retention import parts_of
+from vidtrack.recording.retention import parts_of
 from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, unknown, work
 from vidtrack.video.live.address import redact
 from vidtrack.video.live.backoff import Backoff
@@ -24,17 +24,17 @@ from vidtrack.video.live.backoff import Backoff
 log = logging.getLogger(__name__)
 
 _ANSWER_S = 1.0
-_SPAWN = multiprocessing.get_context("spawn")  # a fork would copy locks that threads hold
+_SPAWN = multiprocessing.get_context("spawn")  # fork would copy locks held by threads
 
 
 class Supervisor:
-    """A camera's process. It is started again, after growing pauses, when it ends without a last word.
+    """Supervises a camera's process, and restarts it, after growing pauses, when it ends without a final status.
 
-    All methods but `tend` may be called from any thread.
+    All methods but `restart_if_due` may be called from any thread.
 
-    job        of the process that runs, or ran last
-    restarts   so many took the place of one before
-    summaries  what the ones before wrote
+    job        of the current or last process
+    restarts   number of restarts
+    summaries  of the earlier processes
     """
 
     def __init__(self, job: Job) -> None:
@@ -44,45 +44,45 @@ class Supervisor:
         self._first = job
         self._shown = redact(job.address)
         self._backoff = Backoff(live.backoff_s, live.backoff_longest_s, Random())
-        self._asking = Lock()
+        self._requesting = Lock()
         self._number = 0
-        self._told = False
+        self._stopped = False
         self._crashes: list[tuple[float, str]] = []
-        self._again_s: float | None = None  # monotonic time of the next start
+        self._restart_s: float | None = None  # monotonic time of the next start
         self._start(job)
 
     @property
     def exit_code(self) -> int | None:
-        """None while it runs; negative if a signal ended it."""
+        """None while the process runs; negative if a signal ended it."""
         return self._process.exitcode
 
     @property
     def sentinel(self) -> int:
-        """Becomes ready when the process ends."""
+        """A handle that becomes ready when the process ends; see multiprocessing.connection.wait."""
         return self._process.sentinel
 
     @property
     def ended(self) -> bool:
-        """Whether it does not run, and will not be started again."""
-        return self.exit_code is not None and self._again_s is None
+        """Whether the process has ended and will not be restarted."""
+        return self.exit_code is not None and self._restart_s is None
 
-    def tend(self) -> None:
-        """Start it again if it crashed, and the pause is over."""
+    def restart_if_due(self) -> None:
+        """Restart the process if it crashed and the pause is over."""
         code = self.exit_code
-        if code is None or self._told:
+        if code is None or self._stopped:
             return
-        if self._again_s is not None:
-            if monotonic() >= self._again_s:
-                self._start_again()
-        elif code != 0 and (self.restarts or not self._last_word()):
+        if self._restart_s is not None:
+            if monotonic() >= self._restart_s:
+                self._restart()
+        elif code != 0 and (self.restarts or not self._has_final_status()):
             pause_s = self._pause_s()
-            self._again_s = monotonic() + pause_s
+            self._restart_s = monotonic() + pause_s
             self._crashes = [*self._crashes, (time.time(), f"{self._why()}; it is started again")][-5:]
             log.warning("%s: %s; it is started again in %.1f s", self._first.name, self._why(), pause_s)
 
     def status(self) -> Mapping[str, Any]:
-        """As `LiveStatus` has it, plain, with `restarts`; what is not known yet is left out. Later the last one."""
-        answer = self._ask(STATUS)
+        """The fields of `LiveStatus` known so far, and `restarts`; the last known ones when the process is gone."""
+        answer = self._request(STATUS)
         if answer is not None:
             self._last = json.loads(answer)
         state = self._last["state"] if self.exit_code is None else "ended" if self.ended else "waiting"
@@ -91,32 +91,32 @@ class Supervisor:
 
     def picture(self) -> bytes | None:
         """The newest annotated picture as JPEG; None without one."""
-        return self._ask(PICTURE) or None
+        return self._request(PICTURE) or None
 
     @property
     def error(self) -> str | None:
-        """Why it ended, if it was not told to and did not reach its end."""
+        """Why the process failed; None if it runs, was stopped or succeeded."""
         code = self.exit_code
-        if not self.ended or not code or (self._told and code < 0):
+        if not self.ended or not code or (self._stopped and code < 0):
             return None
         return self._why()
 
     def stop(self) -> None:
-        """Tell it to end; without waiting."""
-        self._again_s = None
+        """Stop the process. Does not wait."""
+        self._restart_s = None
         if self.exit_code is None:
-            self._told = True
+            self._stopped = True
             self._process.terminate()
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the process."""
         self._process.kill()
 
     def summary(self) -> dict[str, Any]:
-        """What the run of the process that runs, or ran last, wrote."""
+        """summary.json of the current or last process."""
         content: dict[str, Any] = {"source": self._shown}
-        self._ask(STATUS)
-        if self._begun:  # otherwise what lies there is of another run
+        self._request(STATUS)
+        if self._begun:  # otherwise the file belongs to another run
             with suppress(OSError, ValueError):
                 content = json.loads((self.job.folder / "summary.json").read_text(encoding="utf-8"))
         return content
@@ -124,18 +124,18 @@ class Supervisor:
     def _start(self, job: Job) -> None:
         self.job = job
         self._last = unknown(self._shown)
-        self._begun = self._said_goodbye = False
+        self._begun = self._final_status_came = False
         self._started_s = monotonic()
         self._channel, theirs = _SPAWN.Pipe()
         self._process = _SPAWN.Process(target=work, args=(job, theirs), name=job.name, daemon=True)
         self._process.start()
         theirs.close()
 
-    def _start_again(self) -> None:
-        self._again_s = None
+    def _restart(self) -> None:
+        self._restart_s = None
         self.summaries.append(self.summary())
         self.restarts += 1
-        with self._asking:
+        with self._requesting:
             self._channel.close()
             self._start(_continued(self._first, self.restarts + 1))
 
@@ -144,22 +144,22 @@ class Supervisor:
             self._backoff.reset()
         return self._backoff.next_s()
 
-    def _last_word(self) -> bool:
-        """Whether it said why it ended."""
-        self._ask(STATUS)
-        return self._said_goodbye
+    def _has_final_status(self) -> bool:
+        """Whether the process sent a final status."""
+        self._request(STATUS)
+        return self._final_status_came
 
     def _why(self) -> str:
-        if self._last_word() and self._last["problems"]:
+        if self._has_final_status() and self._last["problems"]:
             return str(self._last["problems"][-1][1])
         return f"its process ended with code {self.exit_code}"
 
-    def _ask(self, what: bytes) -> bytes | None:
-        """The answer; None if there is none in time, or never will be."""
-        with self._asking:
+    def _request(self, what: bytes) -> bytes | None:
+        """The answer of the process; None if none comes within the time-out."""
+        with self._requesting:
             self._number += 1
             number = b"%d" % self._number
-            with suppress(OSError):  # it may have ended just now, and what it said before is still to be read
+            with suppress(OSError):  # if the process has just ended, its earlier messages can still be read
                 self._channel.send_bytes(number + b" " + what)
             try:
                 until_s = monotonic() + _ANSWER_S
@@ -168,8 +168,8 @@ class Supervisor:
                     self._begun |= tag == BEGUN
                     if tag == END:
                         self._last = json.loads(content)
-                        self._said_goodbye = True
-                    elif tag == number:  # others came too late for those who asked
+                        self._final_status_came = True
+                    elif tag == number:  # other numbers answer requests that timed out
                         return content
             except (EOFError, OSError):
                 self._channel.close()
@@ -177,7 +177,7 @@ class Supervisor:
 
 
 def _continued(job: Job, start: int) -> Job:
-    """The same job for process number `start`: parts and recordings go on, nothing else is written over."""
+    """The job for process number `start`: parts and recordings continue, other outputs get new names."""
     extras = job.extras
     return replace(
         job,

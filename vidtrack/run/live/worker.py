@@ -1,4 +1,4 @@
-"""One of several cameras in a process of its own: the live run, and what it answers to the parent."""
+"""The process of one of several cameras: its live run, and its answers to the parent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from threading import Lock, Thread
 from types import FrameType
 from typing import Any
 
-from vidtrack.config import Settings
+from vidtrack.config.settings import Settings
 from vidtrack.errors import Error
 from vidtrack.output.status import StatusBoard
 from vidtrack.run.live.outputs import LiveExtras
@@ -26,12 +26,12 @@ from vidtrack.video.live.address import redact
 log = logging.getLogger(__name__)
 
 STATUS, PICTURE, BEGUN, END = b"status", b"picture", b"begun", b"end"
-_SEND_S = 0.5  # for the last word, while another answer may be stuck
+_SEND_S = 0.5  # to send the final status, while another answer may block
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What a process has to do. `prepare` is called there first, with the camera's name."""
+    """Arguments of a camera's process, which first calls `prepare` with the camera's name."""
 
     name: str
     address: str
@@ -42,14 +42,14 @@ class Job:
     prepare: Callable[[str], None]
 
 
-class _Told(BaseException):
-    """SIGTERM, before there is a run to stop."""
+class _Terminated(BaseException):
+    """SIGTERM before the run exists."""
 
 
 def work(job: Job, channel: Connection) -> None:
-    """Track a camera until SIGTERM, or until the parent is gone; the exit code is that of a single live run."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes, and the parent passes it on
-    signal.signal(signal.SIGTERM, _tell)
+    """Track a camera until SIGTERM or the end of the parent; the exit code is that of a single live run."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent sends SIGTERM
+    signal.signal(signal.SIGTERM, _terminate)
     job.prepare(job.name)
     answers = _Answers(job, channel)
     try:
@@ -58,7 +58,7 @@ def work(job: Job, channel: Connection) -> None:
             answers.begin(run.board)
             for _ in run:
                 pass
-    except _Told:
+    except _Terminated:
         answers.end()
     except Error as error:
         log.error("%s", error)
@@ -68,12 +68,12 @@ def work(job: Job, channel: Connection) -> None:
         answers.end()
 
 
-def _tell(number: int, frame: FrameType | None) -> None:
-    raise _Told
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise _Terminated
 
 
 class _Answers:
-    """Answers in a thread what the parent asks: `NUMBER status` or `NUMBER picture`, by `NUMBER content`."""
+    """Thread that answers the parent's requests: `NUMBER status` or `NUMBER picture` with `NUMBER content`."""
 
     def __init__(self, job: Job, channel: Connection) -> None:
         self._board: StatusBoard | None = None
@@ -83,12 +83,12 @@ class _Answers:
         Thread(target=self._run, name="answers", daemon=True).start()
 
     def begin(self, board: StatusBoard) -> None:
-        """There is a run, and its results are in its folder."""
+        """Report that the run has begun and owns its folder."""
         self._board = board
         self._send(BEGUN, b"")
 
     def end(self, error: str | None = None) -> None:
-        """The last word: how it was at the end, and why it ended if it was not told to."""
+        """Send the final status, with the error if there was one."""
         status = self._status() | {"state": "ended"}
         if error is not None:
             status["problems"] = [*status["problems"], (time.time(), error)]
@@ -120,6 +120,6 @@ class _Answers:
 
 
 def unknown(shown: str) -> dict[str, Any]:
-    """The status of a camera that has not delivered yet."""
+    """The status of a camera before its first picture."""
     reading: Mapping[str, Any] = {}
     return {"source": shown, "state": "connecting", "reading": reading, "problems": []}

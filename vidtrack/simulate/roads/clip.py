@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Floats
 from vidtrack.simulate import draw as flat
 from vidtrack.simulate.camera import Camera, camera
 from vidtrack.simulate.clip import check_camera

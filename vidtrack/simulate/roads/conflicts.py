@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.simulate.roads.stage import footprints
 from vidtrack.simulate.scene import touching
 

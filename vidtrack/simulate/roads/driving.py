@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 
 STRONGEST_BRAKING = 8.0  # m/s^2; of tyres on a dry road
 POLITENESS = 0.2

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.simulate.roads.clip import RoadClip
 from vidtrack.simulate.roads.conflicts import conflicts
 from vidtrack.simulate.roads.layout import GroundGate

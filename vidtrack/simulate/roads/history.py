@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.simulate.roads.network import Network
 
 CHANGE_S = 4.0  # for a change of lanes

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.light import AMBIENT, BEAM, RED, WARM, add_spot
 from vidtrack.simulate.moment import Canvas, pixel_centres, rounded
 from vidtrack.simulate.roads.pinhole import NEAR_M, Pinhole

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.ground import ASPHALT, Axes
 from vidtrack.simulate.roads.network import Network
 from vidtrack.simulate.scene import Colour, Part

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 
 STEP_M = 0.5  # between the points of a route
 SAME_WAY = np.radians(55)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.scan import Floats, Mask
+from vidtrack.arrays.types import Floats, Mask
 
 NEAR_M = 0.5  # what is nearer to the camera's plane than this is not drawn
 _NEWTON_STEPS = 12

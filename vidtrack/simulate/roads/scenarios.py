@@ -7,21 +7,9 @@ from itertools import product
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.ground import ASPHALT, GRASS, KERB, PAINT, PAVING, Axes
-from vidtrack.simulate.roads.layout import (
-    ARMS,
-    EAST,
-    LANE_M,
-    MARK_M,
-    WEST,
-    WORN,
-    GroundGate,
-    Layout,
-    at,
-    corner,
-    disc,
-)
+from vidtrack.simulate.roads.layout import ARMS, EAST, LANE_M, MARK_M, WEST, WORN, GroundGate, Layout, at, corner, disc
 from vidtrack.simulate.roads.network import Network, Route, smooth
 from vidtrack.simulate.scene import Part
 

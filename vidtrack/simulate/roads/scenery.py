@@ -7,7 +7,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.draw import SUBPIXEL_BITS, Image
 from vidtrack.simulate.ground import GRASS
 from vidtrack.simulate.moment import pixel_centres

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.simulate.looks import CLOTHES, GLASS, LAMP, TAIL_LAMP, TYRE
 from vidtrack.simulate.roads.vehicles import KINDS, Fleet
 from vidtrack.simulate.scene import Colour

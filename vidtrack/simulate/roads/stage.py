@@ -8,7 +8,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.simulate.draw import Image
 from vidtrack.simulate.roads.pinhole import NEAR_M, Pinhole
 from vidtrack.simulate.roads.solids import Solid

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.scan import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.simulate.roads.driving import Drivers, idm, worth_changing
 from vidtrack.simulate.roads.history import CHANGE_S, History, moved
 from vidtrack.simulate.roads.network import Network

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.simulate.roads.stage import SUBPIXEL_BITS, Actor
 from vidtrack.simulate.truth import Truth
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from vidtrack.scan import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.simulate.looks import CAR_COLOURS
 
 LONG_M = 7.0  # what is longer does not take narrow turns

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.simulate.roads.clip import START, RoadClip
 from vidtrack.simulate.roads.events import Event, events, shown_gates
 from vidtrack.simulate.roads.layout import GroundGate

@@ -1,1 +1,1 @@
-"""Decisions that wait for later scans: track splitting and multiple hypotheses."""
+"""Deferred decisions: track splitting and multiple hypothesis tracking."""

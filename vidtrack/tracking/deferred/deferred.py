@@ -1,4 +1,4 @@
-"""Decisions some scans later: a row is one of the possible histories of a track."""
+"""Deferred decisions: a row is one of the possible histories of a track."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.associate.trust import Trust
-from vidtrack.scan import CONFIRMED, Event, Ints, Mask, Tracks
+from vidtrack.associate.two_stage import TwoStage
+from vidtrack.decision import Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.deferred.forest import Forest
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import CONFIRMED, Tracks
 
 UNSURE = 0.01
 """Factor on the likelihood of a detection with a low score: more of these are false."""
@@ -21,29 +23,29 @@ UNSURE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Deferred:
-    """Scans wait for what comes after them. No measurement is shared.
+    """Each scan is decided some scans later. No measurement is shared.
 
-    forest  the histories of all tracks
-    trust   which scores may start a track
-    births  whether measurements start tracks
+    forest     the histories of all tracks
+    two_stage  which scores may start a track
+    births     whether measurements start tracks
     """
 
     forest: Forest
-    trust: Trust
+    two_stage: TwoStage
     births: bool
 
     STATE = ("forest",)
 
     def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
         """Grow the forest; the register's rows become their successors."""
-        pairs, sure = problem.pairs, self.trust.sure(problem.scan)
+        pairs, sure = problem.pairs, self.two_stage.sure(problem.scan)
         log_l = pairs.log_l + np.where(sure, 0.0, np.log(UNSURE))[pairs.measurement]
         problem = replace(problem, pairs=replace(pairs, log_l=log_l))
         starts = distinct(problem.scan, sure & self.births)
         return Association.exclusive(*self.forest.grow(problem, register, starts, events))
 
     def shown(self, rows: int) -> Mask:
-        """(rows,) one row of each track that is believed at present."""
+        """(rows,) the output row of each track."""
         shown = np.zeros(rows, bool)
         shown[self.forest.shown[self.forest.shown < rows]] = True
         return shown
@@ -58,7 +60,7 @@ class Deferred:
         self.forest.settle(register, t, events)
 
     def confirm(self, ready: Mask, register: Register) -> Mask:
-        """Confirm all rows of the tracks whose shown row is ready (T,), if hardly a history is without them."""
+        """Confirm all rows of the tracks whose shown row is ready (T,), if the track is probable enough."""
         ready = ready & self.forest.sure & self.shown(len(ready))
         register.status[np.isin(register.id, register.id[ready])] = CONFIRMED
         return ready

@@ -6,13 +6,14 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.scan import Decision, Event, Floats, Ints, Mask
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.register import Register
 
 
 class Growth(NamedTuple):
-    """What becomes of the trees in a scan.
+    """The trees after a scan.
 
     problem   what each successor could choose from, limited to the likeliest measurements
     decision  how the successors come from the rows
@@ -63,7 +64,7 @@ class ForestRule(Protocol):
 
 
 class Window:
-    """What each row took in the last scans.
+    """The measurements of each row in the last scans.
 
     past  (T, N) running numbers of the measurements, newest first; -1 for none
     age   (T,) scans since the tree began
@@ -95,7 +96,7 @@ class Window:
         self.past, self.age = self.past[kept], self.age[kept]
 
     def add(self, count: int) -> None:
-        """Rows that took nothing yet."""
+        """Append rows without measurements."""
         self.past = np.concatenate([self.past, np.full((count, self.past.shape[1]), -1)])
         self.age = np.concatenate([self.age, np.full(count, self.past.shape[1])])
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.kbest import k_best
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.deferred.hypotheses import Hypotheses, log_sum
 
 NEVER = -1e6
-"""ln of the likelihood of what cannot be seen. The fewest such factors win."""
+"""ln of the factor that stands for probability zero; hypotheses with the fewest such factors win."""
 
 
 def children(
@@ -109,8 +109,8 @@ def _children(
 def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, young: Mask) -> Mask:
     """(H,) hypotheses that agree with the likeliest of their cluster about one scan in the past.
 
-    Of each leaf: tree (T,), decided (T,) the measurement it took in that scan, young (T,) whether the scan began
-    its tree. Others agree with a track that only one of the two has: one of them has given it up since.
+    Of each leaf: tree (T,), decided (T,) its measurement in that scan, young (T,) whether its tree began in that scan.
+    A track that only one of two hypotheses has is no disagreement: the other has deleted it since.
     """
     agrees = np.ones(len(start) - 1, np.bool_)
     taken = np.empty(tree.max() + 1 if len(tree) else 0, np.int64)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Ints, Mask
 
 
 class Hypotheses(NamedTuple):

@@ -6,22 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
+from vidtrack.decision import Event
 from vidtrack.errors import ConfigError
-from vidtrack.scan import TENTATIVE, Event, Floats, Ints, Mask
 from vidtrack.tracking.deferred.forest import Growth, Window, one_each
 from vidtrack.tracking.deferred.generation import NEVER, agreeing, children, likeliest
 from vidtrack.tracking.deferred.hypotheses import Hypotheses, surviving
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import TENTATIVE
 
 SURE = 0.9
-"""A track is confirmed only when the hypotheses that have it are together at least so probable."""
+"""Smallest total probability of the hypotheses with a track, for its confirmation."""
 
 
 @dataclass(frozen=True, slots=True)
 class MHT:
-    """Multiple hypotheses: what a measurement was is decided scans later, by what came after.
+    """Multiple hypothesis tracking: the origin of a measurement is decided some scans later.
 
     n_scan       a scan is decided this many scans later, as the likeliest hypothesis has it
     hypotheses   largest number kept in each cluster
@@ -30,9 +32,9 @@ class MHT:
     branches     largest number of measurements a leaf may branch to, the likeliest
     new_share    density of the measurements that new targets begin with, per density of false ones
 
-    A track is confirmed when its life cycle says so and hardly a hypothesis doubts it. What is shown is the likeliest
-    hypothesis of the moment, so a later scan may contradict a row already written. Blobs that several vehicles share
-    (Occlusion) are not recognised.
+    A track is confirmed by its life cycle if nearly all hypotheses, by probability, contain it. The output is the
+    likeliest hypothesis after each scan, so a later scan may contradict it. Blobs of several vehicles (Occlusion) are
+    not recognised.
     """
 
     n_scan: int = 3
@@ -66,11 +68,11 @@ class MHT:
 
 
 class HypothesisForest:
-    """Trees of which hypotheses choose leaves.
+    """Track trees; each hypothesis is a set of leaves.
 
     hypotheses  which leaves are true together
     window      what each leaf took in the undecided scans
-    told        (T,) rows whose tree has been shown
+    told        (T,) rows whose tree has been in the output
     """
 
     STATE = ("hypotheses", "window", "sure", "told", "shown")

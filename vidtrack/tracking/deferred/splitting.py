@@ -1,4 +1,4 @@
-"""Track splitting, or branching (Smith and Buechler 1975): each report a track may have had makes a branch of it."""
+"""Track splitting, or branching (Smith and Buechler 1975): a branch for each gated measurement of a track."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
+from vidtrack.decision import Event
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Event, Floats, Ints, Mask
 from vidtrack.tracking.deferred.forest import Growth, Window, one_each
 from vidtrack.tracking.deferred.generation import NEVER, likeliest
 from vidtrack.tracking.register import Register
@@ -17,7 +18,7 @@ from vidtrack.tracking.register import Register
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Track splitting: every gated report, and the miss, continues a track in a branch of its own.
+    """Track splitting: a branch of the track for every gated measurement, and one for the miss.
 
     n_scan       branches that took the same measurements in this many scans are merged
     leaves       largest number of branches kept of each track, the likeliest
@@ -25,8 +26,8 @@ class Split:
     probability  share of true branches that the test of their score admits: the sum of v' S^-1 v over the last
                  n_scan scans is chi-square distributed
 
-    Nothing is exclusive: a measurement may serve several tracks. A branch that had nothing in common with its
-    track's likeliest in n_scan scans, and no miss, becomes a track of its own; what lies in a gate starts none.
+    A measurement may update several tracks. A branch without a miss, and without a measurement in common with its
+    track's likeliest branch, in n_scan scans becomes a separate track. A measurement in a gate starts no track.
     """
 
     n_scan: int = 3
@@ -47,7 +48,7 @@ class Split:
 
 
 class BranchForest:
-    """Trees whose branches know nothing of each other.
+    """Independent track trees, without joint hypotheses.
 
     score  (T, N) v' S^-1 v of the last scans, newest first, zero for a miss
     log_l  (T,) log-likelihood ratio of each branch, target against none
@@ -68,7 +69,7 @@ class BranchForest:
         return np.ones(len(self.window), bool)
 
     def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
-        """Branch, drop what scores badly, merge what has become the same; what is in no gate starts a tree."""
+        """Branch, drop implausible branches, merge duplicates; measurements outside all gates start trees."""
         in_gate = np.zeros(problem.measurements, bool)
         in_gate[problem.pairs.measurement] = True
         born = starts & ~in_gate
@@ -88,7 +89,7 @@ class BranchForest:
         return Growth(problem.of(parent), one_each(parent, taken), born)
 
     def settle(self, register: Register, t: float, events: list[Event]) -> None:
-        """A branch that has nothing in common with its tree's likeliest becomes a tree of its own.
+        """Make a branch without measurements in common with its tree's likeliest branch a separate tree.
 
         Of each tree and each measurement one, the likeliest, and only with what no tree's likeliest took.
         """
@@ -131,13 +132,13 @@ class BranchForest:
         return parent, taken
 
     def _thinned(self, tree: Ints, dim: int) -> Ints:
-        """Branches (rows, ascending) that are plausible, no duplicates, and among the likeliest of their tree."""
+        """Rows, ascending, of plausible branches among the likeliest of their tree, without duplicates."""
         alive = self._plausible(tree, dim)
         alive = alive[self._different(tree[alive], self.window.past[alive], self.window.age[alive], self.log_l[alive])]
         return np.sort(alive[_rank(tree[alive], self.log_l[alive]) < self.rule.leaves])
 
     def _plausible(self, tree: Ints, dim: int) -> Ints:
-        """Rows whose score passes, and the likeliest of each tree whatever its score."""
+        """Rows whose score passes the test, and the likeliest of each tree."""
         updates = (self.window.past[: len(tree)] >= 0) & (self.score > 0)
         limit = chdtri(np.maximum(1, dim * updates.sum(axis=1)), 1 - self.rule.probability)
         return np.flatnonzero((self.score.sum(axis=1) <= limit) | (_rank(tree, self.log_l) == 0))

@@ -1,1 +1,1 @@
-"""Targets too close together to be followed one by one."""
+"""Group tracking of targets too close together for individual tracks."""

@@ -1,4 +1,4 @@
-"""Formations: targets too close together to be followed one by one are followed as groups (paper 001)."""
+"""Formation tracking: targets too close together for individual tracks are tracked as groups (paper 001)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.redundancy import linked
+from vidtrack.decision import Event
 from vidtrack.errors import ConfigError
-from vidtrack.scan import TENTATIVE, Event, Ints, Scan, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.formation.members import Members, rows_of
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import TENTATIVE, Tracks
 
 
 @dataclass(frozen=True, slots=True)
 class Formation:
-    """What makes a group.
+    """Rules of group tracking.
 
     link   px or m; measurements at most this far apart, directly or by way of others, are one group
     merge  px or m; confirmed groups whose centroids are closer become one

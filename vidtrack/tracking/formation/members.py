@@ -1,4 +1,4 @@
-"""Members of groups: who is where in each group, whether this scan showed it or not."""
+"""Members of groups: positions, measured or predicted."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.redundancy import linked
-from vidtrack.scan import Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 from vidtrack.tracking.choices import heaviest
 
 
@@ -18,12 +19,12 @@ class Members(NamedTuple):
     """Members of all groups, one row each.
 
     group        (K,) id of its group
-    z            (K, d) where it is
-    surprise     (K, d) how far from where it was expected
-    measurement  (K,) that it took of the last scan; -1 for none
-    streak       (K,) scans in a row that showed it, up to now
-    sure         (K,) whether it counts
-    apart        (K,) scans for which a gap has parted it from the largest part of its group
+    z            (K, d) position
+    surprise     (K, d) position minus predicted position
+    measurement  (K,) measurement of the last scan; -1 for none
+    streak       (K,) number of last scans in a row with a measurement
+    sure         (K,) whether it counts as a member
+    apart        (K,) scans for which a gap has separated it from the largest part of its group
     """
 
     group: Ints

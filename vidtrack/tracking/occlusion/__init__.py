@@ -1,1 +1,1 @@
-"""Several targets on one measurement: what their tracks take from it."""
+"""Occlusion: tracks of several targets that share one measurement."""

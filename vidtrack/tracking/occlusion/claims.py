@@ -1,16 +1,16 @@
-"""Which tracks share a blob, and which blobs hide somebody: by predicted boxes and by what each track was assigned."""
+"""Which tracks share a blob, and which blobs hide another vehicle, by predicted boxes and assignments."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.estimate.noise import edge_sigma
-from vidtrack.scan import Floats, Ints, Mask
 from vidtrack.tracking.boxes import best_cover
 
 ONE_SIDED = 4.0
-"""Standard deviations an edge is off, while the opposite one is within one, when part of a vehicle is hidden."""
+"""Part of a vehicle is hidden if an edge is off by so many standard deviations, and the opposite one by at most one."""
 
 
 @kernel(error_model="numpy")
@@ -47,7 +47,7 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, cov
     hosts = np.flatnonzero(confirmed & (taken >= 0))
     for t in hosts:
         claims[taken[t]] += 1
-    for t in hosts:  # a nearest neighbour may be everybody's
+    for t in hosts:  # with nearest neighbour several tracks may take a blob
         if claims[taken[t]] > 1:
             shared[t] = taken[t]
     return shared

@@ -1,15 +1,15 @@
-"""Where the tracks on a shared blob are: its edges belong to somebody, its centroid to nobody."""
+"""Positions of the tracks on a shared blob, measured by the blob's edges."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.estimate.noise import edge_variance
-from vidtrack.scan import Floats, Ints, Mask
 
 UNKNOWN = 1e8
-"""Variance of a coordinate that no edge tells about."""
+"""Variance of a coordinate without an edge."""
 
 
 @kernel(error_model="numpy")

@@ -1,10 +1,10 @@
-"""The occlusion model: tracks whose vehicles merge into one blob stay tracks, and are updated by its edges.
+"""The occlusion model: tracks whose vehicles merge into one blob continue, and are updated by its edges.
 
-A confirmed track that got no measurement of its own, but whose predicted box lies on a blob, lives on that
-blob together with whoever else is on it. So does a track whose blob has suddenly become much larger or
-smaller than the vehicle. The blob's centroid belongs to none of them; its edges do: the left edge is that of
-the leftmost track, and so on. Each track is updated by the edges it can claim and otherwise follows its own
-motion, so that it still knows who it is when the blob splits.
+A confirmed track without a measurement of its own, whose predicted box lies on a blob, shares that blob with the other
+tracks on it. So does a track whose blob has suddenly become much larger or smaller than the vehicle. The blob's
+centroid measures none of the vehicles, but its edges do: the left edge is that of the leftmost vehicle, and so on.
+Each track is updated by its own edges and otherwise predicted by its motion model, so that it keeps its identity when
+the blob splits.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.decision import Decision, Event
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.noise import as_if_new, middle_variance
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.scan import Decision, Event, Floats, Ints, Mask, Scan
+from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import pieces
 from vidtrack.tracking.boxes import absolute, overlapping
@@ -33,7 +35,7 @@ SETTLED = 5
 SLOW = 5.0
 """A box follows a blob of another size this many times more slowly than its own."""
 ALONE = Exclusive()
-"""What holds of measurements without an extent."""
+"""The model for measurements without extent."""
 
 
 @dataclass(slots=True)

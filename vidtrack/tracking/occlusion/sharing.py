@@ -1,4 +1,4 @@
-"""What happens when targets share a measurement: the interface, and nothing."""
+"""The interface of models for shared measurements, and the null model."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from typing import Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.decision import Decision, Event
 from vidtrack.estimate.bank import Estimator
-from vidtrack.scan import Decision, Event, Floats, Ints, Mask
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
 
 
 class Sharing(Protocol):
-    """Which tracks share a measurement, and what updates them: `Exclusive`, nobody and nothing, or `Occlusion`.
+    """A model for measurements that tracks share: `Exclusive` (no sharing) or `Occlusion`.
 
-    A view is what the picture shows in a scan; None where measurements have no extent.
+    A view is None if measurements have no extent.
     """
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
@@ -36,7 +37,7 @@ class Sharing(Protocol):
         """(T,) tracks that are no targets but parts of one that they share measurements with."""
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
-        """Note which tracks are together on one of the shared (T,) measurements, and tell of it."""
+        """Update the groups of tracks on the same shared (T,) measurement, with events."""
 
     def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
         """Those of the free measurements born (B,) that are no pieces of known targets, boxes (V, 4)."""
@@ -49,7 +50,7 @@ class Exclusive:
     STATE = ()
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
-        """No track shares any, and all may be of somebody new."""
+        """No track shares a measurement, and all measurements may be of new targets."""
         return np.full(len(confirmed), -1), np.ones(count, bool)
 
     def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
@@ -64,7 +65,7 @@ class Exclusive:
         return np.zeros(len(register), bool)
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
-        """Nobody is together."""
+        """No tracks are merged."""
 
     def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
         """All of them."""

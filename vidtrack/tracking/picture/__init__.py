@@ -1,1 +1,1 @@
-"""What only a picture tells: boxes, the border, and what traffic teaches about the road."""
+"""Tracking in pictures: boxes, the border, and maps learnt from traffic."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats, Mask, Scan
+from vidtrack.scan import Scan
 
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""

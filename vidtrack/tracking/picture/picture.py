@@ -1,4 +1,4 @@
-"""What only a picture tells a tracker: boxes, the border, and the road; and its null sibling."""
+"""Tracking in a picture, with boxes, border and road; and the null object for point measurements."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
-from vidtrack.scan import Floats, Ints, Mask, Scan, Tracks
+from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import absolute, follow, longer
 from vidtrack.tracking.picture.border import EXIT_S, Border
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import Tracks
 
 
 class View(NamedTuple):
-    """What the picture shows in a scan.
+    """Boxes of measurements and tracks in a scan.
 
     blobs      (M, 4) boxes of the measurements
     relative   (M, 4) the same, relative to the measurements
@@ -37,15 +39,15 @@ class View(NamedTuple):
 
 
 class Surroundings(Protocol):
-    """What is known of where targets move: a `Picture`, or `NoPicture`."""
+    """The surroundings of targets: a `Picture`, or `NoPicture`."""
 
     @property
     def area(self) -> float | None:
-        """What is surveyed, in px^2; None: not known."""
+        """Surveyed area [px^2]; None: not known."""
 
     @property
     def road(self) -> Road | None:
-        """What traffic taught about the scene; None: nothing."""
+        """Maps learnt from traffic; None without them."""
 
     def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
         """Change the sizes of boxes as their tracks move from states `before` (T, n) to those of the bank."""
@@ -104,7 +106,7 @@ class NoPicture:
         return np.zeros(len(box))
 
     def learn(self, tracks: Tracks) -> None:
-        """Points teach nothing."""
+        """Do nothing."""
 
 
 class Picture:
@@ -186,6 +188,6 @@ class Picture:
         return size * self.road.caution(xy) if self.road else size
 
     def learn(self, tracks: Tracks) -> None:
-        """Show the road the tracks of a scan."""
+        """Update the road with the tracks of a scan."""
         if self.road:
             self.road.learn(tracks)

@@ -1,4 +1,4 @@
-"""Where the picture moves without traffic: leaves, water, flags, burnt-in clocks."""
+"""Map of places with motion but no traffic: leaves, water, flags, burnt-in clocks."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from vidtrack.scan import TENTATIVE, Floats, Ints, Mask, Tracks
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.tracking.boxes import best_cover, longer
+from vidtrack.tracks import TENTATIVE, Tracks
 
 _CELLS = 20  # across the longer side of the picture
 _FORGET_S = 30.0

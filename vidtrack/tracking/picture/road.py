@@ -1,12 +1,13 @@
-"""What traffic teaches about a scene: how large vehicles are at each place, and where things move that are none."""
+"""Maps learnt from traffic: the size of vehicles at each place, and places with motion but no vehicles."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import Floats, Tracks
+from vidtrack.arrays.types import Floats
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.sizes import SizeField
+from vidtrack.tracks import Tracks
 
 _CAUTION = 3.0  # times as far must a track travel to be confirmed where the picture is restless
 _FASTEST = 1.2  # times as large can a vehicle become from one scan to the next
@@ -25,7 +26,7 @@ class Road:
         self.forget()
 
     def forget(self) -> None:
-        """Nothing is known of the scene any more: the camera looks elsewhere."""
+        """Reset all maps after a change of the camera's view."""
         self.sizes = SizeField(self._width, self._height)
         self.restless = RestlessMap(self._width, self._height)
 

@@ -1,11 +1,12 @@
-"""How large vehicles are at each place of the picture, learnt from those that drove there."""
+"""Typical size of vehicles at each place of the picture, learnt from tracks."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.scan import CONFIRMED, Floats, Ints, Mask, Tracks
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.tracking.boxes import longer
+from vidtrack.tracks import CONFIRMED, Tracks
 
 _SAMPLES = 400  # kept, the newest
 _STRIDE = 1 / 3  # sizes that a vehicle moves between two samples of it
@@ -42,7 +43,7 @@ class SizeField:
 
     @property
     def known(self) -> bool:
-        """Whether vehicles have shown enough to tell what is typical."""
+        """Whether the field is fitted."""
         return bool((self.spread < _SPREAD).all())
 
     def typical(self, box: Floats) -> Floats:

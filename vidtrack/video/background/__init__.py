@@ -1,10 +1,10 @@
-"""Background models: they tell traffic from the scene, which is learnt from earlier frames."""
+"""Background models: foreground by comparison with a scene learnt from earlier frames."""
 
 from __future__ import annotations
 
 from numpy.typing import NDArray
 
-from vidtrack.config import DetectorSettings
+from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background.disturbance import Disturbance
 from vidtrack.video.background.opencv import OpenCV
 from vidtrack.video.background.paper import Paper
@@ -13,10 +13,10 @@ from vidtrack.video.foreground import Background
 
 
 def create(settings: DetectorSettings, scale: float | None = None, keep: NDArray | None = None) -> Background:
-    """The detector `settings.kind`.
+    """The background model `settings.kind`.
 
     scale  processed over source size; None: by the picture's size
-    keep   (h, w) of any size; there is no foreground where this picture is dark
+    keep   (h, w) mask of any size; dark pixels have no foreground
     """
     view = View(scale, keep)
     if settings.kind == "paper":

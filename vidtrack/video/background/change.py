@@ -1,4 +1,4 @@
-"""Tells a change of the whole picture (light, view) from traffic by how much is foreground and how fast it spreads."""
+"""Detects changes of the whole picture (light, view) by the share of foreground and the speed of its spread."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 from vidtrack.video.frame import Image
 
 _CELLS = (12, 8)  # columns and rows of a grid over the picture
@@ -19,9 +19,9 @@ _UNSEEN_S = 2.0  # after a longer gap light or view may have changed: compare wi
 
 
 class Change:
-    """Watches the foreground's share of the picture, and over how much of it the foreground is spread.
+    """Monitors the foreground's share of the picture's pixels, and its share of the cells of a grid.
 
-    A knock of a pixel or two makes few pixels foreground, but along every edge there is.
+    A camera shift of a pixel or two makes few pixels foreground, but in most cells: along all edges.
     """
 
     STATE = ("_start_s", "_steady_s", "_steady_spread", "_time_s", "_recent")
@@ -43,7 +43,7 @@ class Change:
         """Seconds since the picture was last steady, 0 while it is.
 
         mask   (h, w)
-        match  whether most of the scene was found in the picture: what spreads then is a large vehicle
+        match  whether the picture fits the scene: foreground that spreads is then a large vehicle
         """
         share, spread = _shares(mask, *_CELLS)
         changing = self._steady_s < self._time_s
@@ -60,7 +60,7 @@ class Change:
         return 0.0
 
     def skip(self, time_s: float) -> None:
-        """A picture that cannot be compared with the scene says nothing."""
+        """Ignore a picture that cannot be compared with the scene."""
         self._time_s = self._steady_s = time_s
 
 

@@ -22,7 +22,7 @@ _ROWS = 4  # every so many are looked at
 
 
 def contrast(luma: Levels) -> np.float32:
-    """How much of its contrast haze or darkness leaves to the scene (h, w), 0.5..1: vehicles lose as much."""
+    """Contrast of the scene (h, w) relative to clear light, 0.5..1; vehicles lose as much to haze and darkness."""
     rows = luma[::_ROWS]
     edges = np.abs(rows[:, 2:] - rows[:, :-2])
     return (
@@ -44,9 +44,9 @@ def haziness(luma: Levels) -> np.float32:
 
 
 def veil(luma: Image) -> float | None:
-    """Luminance that haze adds to black: what is darkest in a picture (h, w) with traffic is black without it.
+    """Luminance that haze adds to black, from the darkest pixels of a picture (h, w), which are black in clear air.
 
-    None where the darkest does not stand out from the rest: the picture shows nothing black, and tells nothing of haze.
+    None if the darkest pixels do not stand out from the rest: the picture then shows nothing black.
     """
     dark, low, median, high = np.percentile(luma[::_ROWS], (_DARKEST, 25, 50, 75))
     if median - dark < _STANDS_OUT * (high - low):

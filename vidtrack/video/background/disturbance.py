@@ -1,4 +1,4 @@
-"""The disturbance map, made robust: what differs from the learnt scene by more than its measured noise."""
+"""The disturbance map: pixels that differ from the learnt scene by more than the scene's measured noise."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack import plane
-from vidtrack.config import DisturbanceSettings
-from vidtrack.scan import Floats, Ints
-from vidtrack.video.background.camera import Camera
-from vidtrack.video.background.canvas import lay, mark_unseen, settled
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.video import DisturbanceSettings
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, haziness, veil
 from vidtrack.video.background.exposure import follow_gain
@@ -22,6 +20,8 @@ from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
 from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
+from vidtrack.video.camera.camera import Camera
+from vidtrack.video.camera.canvas import lay, mark_unseen, settled
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
@@ -35,7 +35,7 @@ _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but 
 
 
 class Disturbance:
-    """The scene learnt from what is not traffic, and the map of what differs from it."""
+    """The scene, learnt from pixels without traffic, and the map of differences from it."""
 
     STATE = (
         "_view",
@@ -68,7 +68,7 @@ class Disturbance:
         self._changed_s = 0.0  # how long the picture has been another one
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
-        """Foreground of `frame`; what covers a `known` box (K, 4) [scene px] is never absorbed into the scene."""
+        """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""
         picture = smooth(self._view.reduce(frame))
         if not self._scene.luma.size:
             self._scene = self._start(picture, frame.time_s)
@@ -101,7 +101,7 @@ class Disturbance:
     def _map(
         self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
     ) -> tuple[Image, Image, NDArray[np.float32]]:
-        """Mask, weak mask and strength; what is free is learnt. The mask is empty while the whole picture changes.
+        """Mask, weak mask and strength; free pixels are learnt. The mask is empty while the whole picture changes.
 
         span  (h, 2) columns from which to which the picture shows each row of the canvas; None: all of it
         """
@@ -133,7 +133,7 @@ class Disturbance:
         """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
         scene = self._scene
         if not self._camera.at_home:
-            scene = settled(scene, plane.inverse(self._camera.place), self._view.reduced)
+            scene = settled(scene, affine.inverse(self._camera.place), self._view.reduced)
         return self._view.enlarge(Picture(*scene[:3]))
 
     def _start(self, picture: Picture, time_s: float) -> Scene:
@@ -156,7 +156,7 @@ class Disturbance:
         return self._time_s - self._start_s < _UNSURE_S
 
     def _disturbed(self, picture: Picture, scene: Scene, dt: float) -> tuple[NDArray[np.float32], Image, Image]:
-        """Strength, hits (1 disturbed, SHADOW, or 0), and the same from a weaker strength on."""
+        """Strength, hits (1 disturbed, SHADOW, or 0), and hits above a lower threshold."""
         s = self._settings
         strength = np.empty(picture.luma.shape, np.float32)
         weak = np.empty(picture.luma.shape, np.uint8)
@@ -173,14 +173,14 @@ class Disturbance:
         return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:
-        """Remove ghosts, blobs that are in the scene and not in the picture, from mask and scene."""
+        """Remove ghosts (objects in the scene, not in the picture) from mask and scene."""
         settled_s = min(self._settings.ghost_s, _UNSURE_GHOST_S) if self._unsure else self._settings.ghost_s
         row, begin, end = find_ghosts(mask, picture.luma, scene, np.float32(settled_s))
         adopt(picture, scene, row, begin, end)
         paint(mask, row, begin, end, 0)
 
     def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, span: Ints | None) -> None:
-        """Average what is neither foreground, nor close to it, nor shadow."""
+        """Average the pixels that are neither foreground, nor near foreground, nor shadow."""
         s = self._settings
         covered = np.asarray(cv2.dilate(mask, self._guard), np.uint8) if s.guard_px else mask.copy()
         if not s.selective:
@@ -195,7 +195,7 @@ class Disturbance:
         learn(picture, scene, covered, hit, np.float32(weight), np.float32(noise_weight), np.float32(seen_s))
 
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
-        """Absorb what has stood for absorb_s, and lasting shadow, into the scene."""
+        """Absorb pixels covered for absorb_s, and lasting shadow, into the scene."""
         s = self._settings
         shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
         absorb(picture, scene, hit, np.float32(s.absorb_s), np.float32(s.steady_s), np.float32(shadow_s))

@@ -18,7 +18,7 @@ _LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covere
 
 @kernel(error_model="numpy")
 def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
-    """Multiply the scene's luminance by the camera's gain against it, if that is more than learning follows."""
+    """Multiply the scene's luminance by the camera's gain relative to it, if learning is too slow for that gain."""
     g = gain(picture.luma, scene, black)
     if abs(g - np.float32(1)) > _STEP:
         for plane in (scene.luma, scene.former):
@@ -34,9 +34,9 @@ def _amplify(row: Levels, g: np.float32, black: np.float32) -> None:
 
 @kernel(error_model="numpy")
 def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
-    """Median of (Y - black) / (B - black) over the points that were not covered before; 1 if they are too few.
+    """Median of (Y - black) / (B - black) over points that were not covered in the last picture; 1 if too few.
 
-    luma (h, w) uint8. New traffic does not move it while it comes on less than half of the points.
+    luma (h, w) uint8. The median is robust to new traffic on less than half of the points.
     """
     h, w = luma.shape
     stride = max(1, int(np.sqrt(h * w / _POINTS)))
@@ -56,7 +56,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
 
 @kernel
 def _mostly_steady(ratio: Levels) -> bool:
-    """Whether the median of ratio (N,) is so close to 1 that it needs no search."""
+    """Whether the median of ratio (N,) is within _STEP of 1."""
     above = below = 0
     for r in ratio:
         above += r > np.float32(1) + _STEP

@@ -7,7 +7,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.video.background.picture import View
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image

@@ -1,11 +1,11 @@
-"""The disturbance map as paper 004 has it (Halevy and Weinshall): a running average and a fixed threshold."""
+"""The disturbance map of paper 004 (Halevy and Weinshall): a running average and a fixed threshold."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.config import PaperSettings
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
+from vidtrack.config.video import PaperSettings
 from vidtrack.video.background.picture import Picture, View
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -14,7 +14,7 @@ from vidtrack.video.frame import Frame, Image
 class Paper:
     """D = I - A, foreground where |D| > threshold, then A = (1 - w) A + w I; luminance only, per frame.
 
-    A is the average of the frames before; the first frame is the first average and shows nothing.
+    A is the average of the earlier frames. The first frame initialises it and has no foreground.
     """
 
     STATE = ("_view", "_average")

@@ -1,4 +1,4 @@
-"""The picture a detector works on: luminance and half-size chroma, reduced by a whole factor where it is large."""
+"""The processed picture: luminance and half-size chroma, reduced by an integer factor if large."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack import plane
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats
 from vidtrack.errors import Error
-from vidtrack.scan import Floats
 from vidtrack.video.background.filters import LARGEST_STEP, area_average, smoothed
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -33,7 +33,7 @@ class Picture(NamedTuple):
 
 
 class View:
-    """How a source is reduced for a detector; the first frame decides.
+    """The reduction of a source for a detector, set by the first frame.
 
     step   source pixels per processed pixel; small pictures keep at least 2 x 2
     black  luminance of black
@@ -42,7 +42,7 @@ class View:
     STATE = ("_shape", "step", "black")
 
     def __init__(self, scale: float | None, keep: NDArray | None) -> None:
-        """scale: processed over source size, None by the rows; keep (any size): no foreground where it is dark."""
+        """scale: processed over source size, None: by the rows; keep (any size): dark pixels have no foreground."""
         self._scale = scale
         self._keep = keep
         self._shape: tuple[int, int] | None = None
@@ -71,32 +71,32 @@ class View:
         return reduce(frame, self.step)
 
     def foreground(
-        self, mask: Image, strength: NDArray, place: Floats = plane.IDENTITY, motion: Floats = plane.IDENTITY
+        self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY
     ) -> Foreground:
-        """The mask (h, w), 0 and 255, cleared where `keep` is dark, with strength (h, w), and where both are.
+        """The Foreground of a mask (h, w), 0 and 255, cleared where `keep` is dark, and its strength (h, w).
 
         place, motion  (2, 3) from the mask to the scene and to the picture [processed px]
         """
         if self._keep is not None:
             h, w = self.reduced
             keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)
-            if keep.shape != mask.shape or not np.array_equal(place, plane.IDENTITY):
+            if keep.shape != mask.shape or not np.array_equal(place, affine.IDENTITY):
                 back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
                 keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
             mask = np.where(keep > 127, mask, np.uint8(0))
         return Foreground(mask, strength, self.step, *self._views(place, motion))
 
     def _views(self, place: Floats, motion: Floats) -> tuple[Floats | None, Floats | None, Floats]:
-        """From the mask to the scene and from there to the picture, None where they are the same, and where in the
-        scene the picture is (4,): left, top, right, bottom; all in source px.
+        """Maps from mask to scene and from scene to picture, None for the identity, and the picture's left, top, right,
+        bottom (4,) in the scene; all in source px.
         """
         h, w = (side * self.step for side in self.reduced)
-        if np.array_equal(place, plane.IDENTITY) and np.array_equal(motion, plane.IDENTITY):
+        if np.array_equal(place, affine.IDENTITY) and np.array_equal(motion, affine.IDENTITY):
             return None, None, np.array([0.0, 0.0, w, h])
-        to_scene = plane.rescaled(place, self.step)
-        to_picture = plane.after(plane.rescaled(motion, self.step), plane.inverse(to_scene))
+        to_scene = affine.rescaled(place, self.step)
+        to_picture = affine.after(affine.rescaled(motion, self.step), affine.inverse(to_scene))
         upper_left, upper_right, lower_left, lower_right = (
-            plane.points(plane.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
+            affine.points(affine.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
         )
         inside = (
             max(upper_left[0], lower_left[0]), max(upper_left[1], upper_right[1]),
@@ -114,14 +114,14 @@ class View:
 
 
 def reduction(rows: int, scale: float | None) -> int:
-    """Source pixels per processed pixel: 1/scale rounded, or the smallest factor that gets to 580 rows."""
+    """Source pixels per processed pixel: 1/scale rounded, or the smallest factor for at most 580 rows."""
     if scale is not None:
         return max(1, round(1 / scale))
     return max(1, math.ceil(rows / FULL_SIZE_ROWS))
 
 
 def reduced_shape(shape: tuple[int, int], step: int) -> tuple[int, int]:
-    """(h, w) of a picture (H, W) after a reduction by step: even, if anything is reduced."""
+    """(h, w) of a picture (H, W) after a reduction by step; even if step > 1."""
     if step == 1:
         return shape
     return 2 * (shape[0] // (2 * step)), 2 * (shape[1] // (2 * step))
@@ -148,7 +148,7 @@ def smooth(picture: Picture) -> Picture:
 
 
 def _enlarge(plane: NDArray, shape: tuple[int, int], step: int) -> Image:
-    """Bilinear enlargement by step; what the reduction left out repeats the last row and column."""
+    """Bilinear enlargement by step; the last row and column repeat where the reduction left out pixels."""
     h, w = plane.shape[0] * step, plane.shape[1] * step
     grown = cv2.resize(plane.astype(np.float32), (w, h), interpolation=cv2.INTER_LINEAR)
     missing = max(0, shape[0] - h), max(0, shape[1] - w)

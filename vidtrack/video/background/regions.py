@@ -39,11 +39,11 @@ def fill_holes(mask: Image) -> None:
 
 @kernel
 def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -> tuple[Runs, Runs, Runs]:
-    """Runs (row, start, stop) of the ghosts: blobs of objects that are in the scene and no longer in the picture.
+    """Runs (row, start, stop) of the ghosts: objects that are in the scene and no longer in the picture.
 
-    A blob is a ghost if the road is seen again as it was before the object was absorbed into the scene. It is also one
-    if the object's edge is in the scene only: along the blob's border the scene has clearly more contrast (luminance
-    differences over +-3 px, across and down) than the frame, and has been covered for settled_s on average.
+    A blob is a ghost if the picture matches the scene as it was before the object was absorbed. It is also a ghost if
+    the object's edge is in the scene only: along the blob's border the scene has clearly more contrast (luminance
+    differences over +-3 px, horizontal and vertical) than the frame, and has been covered for settled_s on average.
     """
     h, w = mask.shape
     row, start, stop = find_runs(mask, False)

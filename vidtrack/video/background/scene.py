@@ -1,4 +1,4 @@
-"""What the road looks like without traffic, and how it is learnt: luminance, its noise, and chroma."""
+"""The scene without traffic, learnt as running averages of luminance, its noise, and chroma."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.shadow import SHADOW
 from vidtrack.video.frame import Image
@@ -27,14 +27,14 @@ _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it
 
 
 class Scene(NamedTuple):
-    """What is remembered of each pixel, float32 (h, w), chroma at half size.
+    """The state of each pixel, float32 (h, w), chroma at half size.
 
     luma, cb, cr  running averages
     noise         running average of |Y - luma|
-    covered_s     seconds since it was last seen free
-    former        luma before the picture was adopted last, NEVER if it was not
-    cover         running average of the luminance that covers it
-    steady_s      seconds for which that has hardly changed
+    covered_s     seconds since the pixel was last free
+    former        luma before the last adoption of the picture; NEVER without one
+    cover         running average of the luminance while covered
+    steady_s      seconds for which `cover` has hardly changed
     """
 
     luma: Levels
@@ -53,7 +53,7 @@ def no_scene() -> Scene:
 
 
 def start(picture: Picture) -> Scene:
-    """The first frame is the scene: averaging for seconds would smear the traffic into it."""
+    """The scene from the first frame; an average over seconds would contain smeared traffic."""
     luma, cb, cr = (plane.astype(np.float32) for plane in picture)
     shape = luma.shape
     none = np.zeros(shape, np.float32)
@@ -70,7 +70,7 @@ def learn(
     noise_weight: np.float32,
     dt: np.float32,
 ) -> None:  # fmt: skip
-    """One step of the running averages where covered (h, w) uint8 is 0 and hit no SHADOW; else the seconds are counted.
+    """Update the running averages where covered (h, w) uint8 is 0 and hit is not SHADOW; elsewhere count the seconds.
 
     Where covered is UNSEEN nothing changes.
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
@@ -102,7 +102,7 @@ def learn(
 
 @kernel
 def adopt(picture: Picture, scene: Scene, row: Runs, start: Runs, stop: Runs) -> None:
-    """Take the picture for the scene on the runs (row, start, stop), as if it had just begun there."""
+    """Replace the scene by the picture on the runs (row, start, stop), as in `start`."""
     for k in range(len(row)):
         for x in range(start[k], stop[k]):
             _adopt(picture, scene, row[k], x)
@@ -112,9 +112,9 @@ def adopt(picture: Picture, scene: Scene, row: Runs, start: Runs, stop: Runs) ->
 def absorb(
     picture: Picture, scene: Scene, hit: Image, absorb_s: np.float32, steady_s: np.float32, shadow_s: np.float32
 ) -> None:
-    """Take the picture for the scene where it was covered for absorb_s, or for less by what did not change.
+    """Replace the scene by the picture where it was covered for absorb_s, or for steady_s without change.
 
-    steady_s, shadow_s  seconds of cover that are enough where it was the same all the time, or is shadow
+    steady_s, shadow_s  seconds of cover that suffice for unchanged cover, and for shadow
     """
     h, w = hit.shape
     for y in range(h):

@@ -1,4 +1,4 @@
-"""Shadow: the scene seen darker by one factor."""
+"""Shadow detection: the scene darkened by one factor."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
-from vidtrack.scan import Floats
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import connect, find_runs
 
@@ -37,7 +37,7 @@ _TAIL = 0.05  # least share of that peak in the bins beside it that are shadow t
 
 
 class Tolerance(NamedTuple):
-    """What passes for shadow.
+    """Limits of the shadow test.
 
     darkest        least share of the scene's light
     chroma_share   share of the scene's colour by which the chroma planes may miss the factor, beside _CHROMA
@@ -56,9 +56,9 @@ _HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0
 
 
 class Sunlight:
-    """Learns whether the sun casts hard shadows, and how dark, from the structure of the scene that is darker.
+    """Learns whether the sun casts hard shadows, and their darkness, from darkened structure of the scene.
 
-    A body hides the structure. A shadow leaves it, and all shadows of one sun are of the same darkness.
+    A body hides the structure. A shadow keeps it, and all shadows of the sun are equally dark.
     """
 
     STATE = ("_count",)
@@ -72,7 +72,7 @@ class Sunlight:
 
     @property
     def tolerance(self) -> Tolerance:
-        """What passes for shadow in this light."""
+        """The limits of the shadow test in this light."""
         shadow, darkened = self._count[_HARDEST:_MILDEST], self._count[_BINS]
         pairs = shadow[:-1] + shadow[1:]
         least = int(pairs.argmax())
@@ -86,7 +86,7 @@ class Sunlight:
 
 @kernel(error_model="numpy")
 def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: Tolerance, hit: Image) -> Floats:
-    """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's, times one factor r.
+    """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's times one factor r.
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
     Returns (_BINS + 1,): the number of pixels, by r, in which the scene's structure is seen, and that of all in which
@@ -120,7 +120,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
 
 @kernel(inline="always")
 def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
-    """Grey levels by which the scene's colour, times r, is missed, and the colour itself."""
+    """Deviation [grey levels] of the colour from the scene's colour times r, and the scene's colour."""
     blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
     off_blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * blue
     off_red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * red
@@ -129,7 +129,7 @@ def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tu
 
 @kernel(inline="always")
 def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
-    """Luminance differences by which those of the scene, times r, are missed, and these themselves."""
+    """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
     h, w = luma.shape
     up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
     across, along = r * (scene[y, right] - scene[y, left]), r * (scene[down, x] - scene[up, x])
@@ -140,10 +140,11 @@ def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple
 
 @kernel
 def reclaim(hit: Image) -> None:
-    """Set hit (h, w) uint8 from SHADOW back to 1 where the vehicle is seen on at least three of four sides.
+    """Set hit (h, w) uint8 from SHADOW back to 1 where the vehicle is visible on at least three of four sides.
 
-    Dark paint passes for shadow, but shadow lies beside a vehicle and not amid it. A side shows the vehicle if a line
-    of hits leads to a pixel that is not shadow. A region that is nearly all shadow is one: its rest are soft edges.
+    Dark paint passes the shadow test, but shadow lies beside a vehicle and not within it. The vehicle is visible on a
+    side if a line of hits leads to a pixel that is not shadow. A region that is nearly all shadow stays shadow: the
+    rest of it is soft edges.
     """
     row, start, stop = find_runs(hit, False)
     label, count = connect(row, start, stop, 1)

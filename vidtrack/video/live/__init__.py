@@ -1,1 +1,1 @@
-"""Live capture: cameras and streams become frames with true times, whatever happens to the connection."""
+"""Live capture: frames with capture times from cameras and streams, across lost connections."""

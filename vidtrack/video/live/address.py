@@ -1,4 +1,4 @@
-"""Addresses of live sources: what they mean to FFmpeg, and how they may be shown."""
+"""Addresses of live sources: parsing for FFmpeg, and redaction of credentials."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _SECRET_FIELD = re.compile(r"([?&;](?:pass\w*|pwd|user\w*|usr|auth\w*|token|\w*k
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where a live source is.
+    """The address of a live source.
 
-    url      what FFmpeg opens; it may hold a password and is left out of the repr
-    shown    the same without credentials: for logs, errors, results
-    name     what to call the run
-    format   FFmpeg's input format; None: by the address
+    url      for FFmpeg; it may contain a password and is left out of the repr
+    shown    the address without credentials, for logs, errors, results
+    name     default name of the run
+    format   FFmpeg's input format; None: FFmpeg decides by the address
     options  FFmpeg's options for opening it
     """
 
@@ -43,7 +43,7 @@ class Address:
 def parse_address(source: str, timeout_s: float) -> Address:
     """A camera index, a V4L2 device, or an rtsp://, rtsps://, http://, https:// address.
 
-    timeout_s  for FFmpeg's own sockets, beside the reader's
+    timeout_s  of FFmpeg's sockets, in addition to the reader's
 
     Raises SourceError for anything else.
     """
@@ -67,7 +67,7 @@ def parse_address(source: str, timeout_s: float) -> Address:
 def redact(address: str) -> str:
     """The address without user name, password or secret query fields.
 
-    A password may hold "@", "/" or "?" that should have been escaped: rather too much is hidden than too little.
+    A password may contain unescaped "@", "/" or "?", so in doubt more is hidden.
     """
     if _USER.search(address):
         address = re.sub("://.*@", f"://{HIDDEN}@", address)
@@ -75,7 +75,7 @@ def redact(address: str) -> str:
 
 
 def _host(url: str, shown: str) -> str:
-    """Host and port as they may be shown. Raises SourceError where there is none, or no such port."""
+    """Host and port. Raises SourceError if they are missing or invalid."""
     try:
         parts, visible = urlsplit(url), urlsplit(shown)
         named = parts.hostname and parts.port != 0
@@ -87,7 +87,7 @@ def _host(url: str, shown: str) -> str:
 
 
 def _escaped(address: str) -> str:
-    """The address as FFmpeg reads it: without "/", "?" and "#" in the password."""
+    """The address with "/", "?" and "#" in the password escaped for FFmpeg."""
     return _USER.sub(lambda found: "://" + quote(found[1], safe=_MAY_STAY), address, count=1)
 
 

@@ -1,4 +1,4 @@
-"""Waiting between attempts: longer each time, and never all cameras at the same moment."""
+"""Exponential backoff with jitter between connection attempts."""
 
 from __future__ import annotations
 

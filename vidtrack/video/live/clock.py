@@ -1,4 +1,4 @@
-"""When a picture was taken, on this machine's monotonic clock: the camera's spacing, the arrival's truth."""
+"""Capture times of pictures on this machine's monotonic clock, from camera timestamps and arrival times."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ STEP_S = 1e-4  # times of pictures that have none of their own stay apart by thi
 
 
 class CaptureClock:
-    """Turns stamps and arrivals into times that always increase.
+    """Converts timestamps and arrival times into strictly increasing capture times.
 
-    The delay between a stamp and its arrival is never less than the way through the network. So the least delay
-    seen, allowed to grow slowly, leads from the camera's clock to ours, and a picture that a hiccup delays still
-    gets the time it was taken at.
+    The delay between stamp and arrival is at least the network's latency. So the smallest delay seen, with slow growth
+    allowed, is the offset between the camera's clock and ours, and a picture that the network delays keeps its capture
+    time.
 
-    patient  the reader itself may be late (it waits for its consumer): a growing delay says nothing about the camera
+    patient  the reader waits for its consumer, so a growing delay does not count as a pause of the camera
     """
 
     def __init__(self, patient: bool = False) -> None:
@@ -32,7 +32,7 @@ class CaptureClock:
         self._last_stamp_s = -math.inf
 
     def time_s(self, stamp_s: float | None, arrived_s: float) -> float:
-        """Monotonic time at which the picture was there to be sent; stamp_s None where the stream has none."""
+        """Monotonic time at which the camera had the picture ready; stamp_s None if the stream has no stamps."""
         t = arrived_s if stamp_s is None else self._by_stamp(stamp_s, arrived_s)
         self._last_s = max(t, self._last_s + STEP_S)
         return self._last_s

@@ -1,4 +1,4 @@
-"""One connection to a live source: opened, read and decoded until something goes wrong."""
+"""One connection to a live source: open, read and decode until an error."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from vidtrack.video.live.address import Address
 from vidtrack.video.planes import planar
 
 _RAW = "rawvideo"
-_PROBE_S = 2.0  # FFmpeg looks at a stream for up to 5 s by itself; nothing it finds after 2 s matters here
+_PROBE_S = 2.0  # FFmpeg's default is up to 5 s; 2 s suffice here
 
 
 class Refused(SourceError):  # noqa: N818
-    """The source said no, and will say so again: authentication, permission, no video in it."""
+    """The source refuses permanently: authentication, permission, no video stream."""
 
 
 class Stalled(SourceError):  # noqa: N818
-    """The connection stands and nothing comes."""
+    """The connection is open and delivers no data."""
 
 
 class Connection:
     """An open stream.
 
-    fps    nominal frames/s, None if the stream does not say
-    codec  FFmpeg's name of the coding
-    is_raw whether packets are plain pixels; its pictures are then planar
+    fps    nominal frames/s, None if the stream does not state it
+    codec  FFmpeg's name of the codec
+    is_raw whether packets are uncompressed pictures; the pictures are then planar
 
-    options  NAME=VALUE for FFmpeg, beside and above the address's own
+    options  NAME=VALUE for FFmpeg; they override those of the address
 
-    Raises Refused, Stalled or another SourceError when it cannot be opened, never naming a password.
+    Raises Refused, Stalled or another SourceError if it cannot be opened; messages contain no password.
     """
 
     def __init__(self, address: Address, timeout_s: float, options: Sequence[str] = ()) -> None:
@@ -55,13 +55,13 @@ class Connection:
         self._has_stamps = not flags & av.format.Flags.no_timestamps.value  # type: ignore[operator]
 
     def packets(self) -> Iterator[av.Packet]:
-        """Packets of the video. Ends with Stalled after the time-out, or with another SourceError; never by itself."""
+        """Packets of the video. Always ends with an error: Stalled after the time-out, or another SourceError."""
         began = heard = monotonic()
         reason = "the stream ended"
         try:
             for packet in self._container.demux():
                 quiet = monotonic() - heard > 0.9 * self._timeout_s
-                if quiet:  # what comes now is what FFmpeg had held back
+                if quiet:  # these packets come from FFmpeg's buffer
                     break
                 if packet.stream is self.stream and packet.size:
                     heard = monotonic()
@@ -73,22 +73,22 @@ class Connection:
         raise SourceError(f"lost {self._address.shown} after {monotonic() - began:.1f} s: {reason}")
 
     def decode(self, packet: av.Packet | None) -> list[av.VideoFrame]:
-        """The pictures that a packet completes; None: those the decoder holds back. Raises av.FFmpegError."""
+        """The pictures that a packet completes; None flushes the decoder. Raises av.FFmpegError."""
         pictures = self._coder.decode(packet)
         return [planar(picture) for picture in pictures] if self.is_raw else pictures
 
     def stamp_s(self, picture: av.VideoFrame) -> float | None:
-        """The picture's own time, on the camera's clock."""
+        """The picture's timestamp, on the camera's clock."""
         return picture.time if self._has_stamps else None
 
     def start_decoder_anew(self) -> list[av.VideoFrame]:
-        """Forget everything before the next packet, as if it were the first; returns the pictures held back."""
+        """Restart the decoder before the next packet; returns the pictures that it held back."""
         pictures = self.decode(None)
         self._coder.flush_buffers()
         return pictures
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._container.close()
 
 
@@ -114,7 +114,7 @@ def _video_stream(container: av.container.InputContainer, address: Address) -> a
 
 
 def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout_s: float) -> SourceError:
-    """What went wrong, in words that help; FFmpeg's own message would show the password."""
+    """The error with a helpful message; FFmpeg's message would show the password."""
     start = f"cannot open {address.shown}:"
     if isinstance(error, (av.error.HTTPUnauthorizedError, av.error.HTTPForbiddenError)):
         code = "401" if isinstance(error, av.error.HTTPUnauthorizedError) else "403"

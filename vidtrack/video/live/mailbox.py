@@ -1,4 +1,4 @@
-"""What the reader hands to the tracker: a few items, the newest ones."""
+"""The queue between reader and tracker: a few items, the newest."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ Item = TypeVar("Item")
 class Mailbox(Generic[Item]):
     """A bounded queue between two threads.
 
-    depth   items it holds
-    waits   a full box makes `put` wait; otherwise the oldest item is dropped for the new one
+    depth   capacity in items
+    waits   whether `put` waits if the queue is full; else the oldest item is dropped
     """
 
     def __init__(self, depth: int, waits: bool) -> None:
@@ -26,7 +26,7 @@ class Mailbox(Generic[Item]):
         self._error: Exception | None = None
 
     def put(self, item: Item) -> int:
-        """Hand over; returns how many items were dropped for it. After `close` nothing is taken."""
+        """Add an item; returns the number of dropped items. No effect after `close`."""
         with self._changed:
             if self._waits:
                 self._changed.wait_for(lambda: len(self._items) < self._depth or not self._open)
@@ -40,7 +40,7 @@ class Mailbox(Generic[Item]):
             return int(dropped)
 
     def get(self, timeout_s: float) -> Item | None:
-        """The oldest item; None if none came in time. Raises the error the box was closed with, or StopIteration."""
+        """The oldest item; None after the time-out. Once closed and empty: raises the error, or StopIteration."""
         deadline = monotonic() + timeout_s
         with self._changed:
             while not self._items:
@@ -55,7 +55,7 @@ class Mailbox(Generic[Item]):
             return item
 
     def close(self, error: Exception | None = None) -> None:
-        """Take nothing more; `get` gives what is left, then raises `error` or ends."""
+        """Refuse new items; `get` returns the remaining ones, then raises `error` or StopIteration."""
         with self._changed:
             self._open = False
             self._error = error

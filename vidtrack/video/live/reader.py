@@ -1,4 +1,4 @@
-"""The thread that keeps a camera connected and takes its pictures."""
+"""The thread that reads a camera and reconnects it."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from typing import Any
 
 import av
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.backoff import Backoff
 from vidtrack.video.live.clock import CaptureClock
 from vidtrack.video.live.connection import Connection, Refused, Stalled
 from vidtrack.video.live.mailbox import Mailbox
+from vidtrack.video.live.packet_sink import PacketSink, Place
 from vidtrack.video.live.stats import LiveStats
-from vidtrack.video.live.tape import Place, Tape
 from vidtrack.video.planes import to_frame
 
 log = logging.getLogger(__name__)
 
 _TRIES = 3
-_EDGE_S = 0.003  # a packet that had to be waited for so long has only now arrived
-_BEHIND_S = 1.0  # without such a packet, decoding is too slow and goes on with the next key picture
+_EDGE_S = 0.003  # a packet after a longer wait has just arrived
+_BEHIND_S = 1.0  # without such a packet for longer, decoding is too slow and skips to the next key picture
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A picture as it came in.
+    """A received picture.
 
-    frame  its planes; time_s is on the monotonic clock, index has no meaning yet
-    fps    nominal rate of its stream, None if unknown
-    place  of its packet in the recording
+    frame  its planes; time_s is on the monotonic clock, index is not set yet
+    fps    nominal rate of the stream, None if unknown
+    place  place of its packet in the recording
     """
 
     frame: Frame
@@ -45,11 +45,11 @@ class Shot:
 
 
 class Reader:
-    """Connects, reads, decodes, and connects again with growing pauses, until `stop`.
+    """Connects, reads, decodes, and reconnects with increasing pauses, until `stop`.
 
-    connect  makes a Connection
-    shots    where pictures go; closed with an error when the source cannot be opened at the start
-    alive_s  monotonic time of the thread's last sign of life
+    connect  opens a Connection
+    shots    queue for pictures; closed with an error if the source cannot be opened at the start
+    alive_s  monotonic time of the thread's last activity
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Reader:
         shots: Mailbox[Shot],
         stats: LiveStats,
         settings: LiveSettings,
-        tape: Tape,
+        recorder: PacketSink,
         clock: CaptureClock,
     ) -> None:
         self._connect = connect
@@ -66,18 +66,18 @@ class Reader:
         self._stats = stats
         self._settings = settings
         self._backoff = Backoff(settings.backoff_s, settings.backoff_longest_s, Random())
-        self._tape = tape
+        self._recorder = recorder
         self._clock = clock
         self._stopping = Event()
         self._failures = 0  # since the last picture
         self._connections = 0
         self.alive_s = monotonic()
-        # A daemon: FFmpeg cannot always be interrupted, and the program must end when it is told to.
+        # A daemon: FFmpeg cannot always be interrupted, and the program must be able to end.
         self._thread = Thread(target=self._run, name="camera", daemon=True)
         self._thread.start()
 
     def stop(self, timeout_s: float) -> None:
-        """End as soon as FFmpeg returns; wait so long for it."""
+        """Stop the thread once FFmpeg returns; wait at most timeout_s for it."""
         self._stopping.set()
         self._thread.join(timeout_s)
 
@@ -93,12 +93,12 @@ class Reader:
                 if never_seen and (isinstance(error, Refused) or self._failures == _TRIES):
                     self._shots.close(error)
                     break
-                self._complain(error, "trying again" if never_seen else "trying again for as long as it takes")
+                self._report_failure(error, "trying again" if never_seen else "trying again for as long as it takes")
                 self._wait()
         self._stats.state = "ended"
 
-    def _complain(self, error: SourceError, then: str) -> None:
-        """Tell the first failure; those that follow until a picture comes are only noted."""
+    def _report_failure(self, error: SourceError, then: str) -> None:
+        """Warn of the first failure; further failures before the next picture are only noted."""
         self._stats.stalls += isinstance(error, Stalled)
         if self._failures == 1:
             self._stats.warn(f"{error}; {then}")
@@ -113,7 +113,7 @@ class Reader:
             self._stopping.wait(min(left, self._settings.timeout_s))
 
     def _read(self) -> None:
-        """One connection, from its opening to its end, which is an error, or to `stop`."""
+        """Run one connection until `stop`; every other end is an error."""
         self._stats.state = "connecting"
         self.alive_s = monotonic()
         connection = self._connect()
@@ -122,11 +122,11 @@ class Reader:
             self._clock.reconnected()
             self._read_packets(connection)
         finally:
-            self._tape.hang_up()
+            self._recorder.end_part()
             connection.close()
 
     def _read_packets(self, connection: Connection) -> None:
-        """Decode everything, and deliver from where it is live: after what FFmpeg gathered while it looked at it."""
+        """Decode all packets; deliver pictures only after the packets that FFmpeg buffered while probing."""
         live = skipping = False
         edge_s = pictured_s = asked_s = monotonic()
         for packet in connection.packets():
@@ -139,11 +139,11 @@ class Reader:
             live = live or slow or edge_s == now_s
             if packet.is_keyframe or (slow and not self._settings.every_frame):
                 skipping = not packet.is_keyframe
-            if self._tape.cut(connection, packet):
+            if self._recorder.cut(connection, packet):
                 self._deliver(connection, connection.start_decoder_anew(), now_s)
-            packet.opaque = self._tape.place()
+            packet.opaque = self._recorder.place()
             pictures = [] if skipping else self._decoded(connection, packet)
-            self._tape.take(packet, pictures, now_s)
+            self._recorder.take(packet, pictures, now_s)
             self._stats.frames_dropped += skipping
             if pictures:
                 pictured_s = now_s
@@ -154,7 +154,7 @@ class Reader:
             asked_s = monotonic()
 
     def _decoded(self, connection: Connection, packet: av.Packet) -> list[av.VideoFrame]:
-        """The whole pictures that the packet completes; a patched one would look like traffic."""
+        """The undamaged pictures that the packet completes; a concealed one would look like traffic."""
         try:
             pictures = connection.decode(packet)
         except av.FFmpegError as error:
@@ -166,18 +166,18 @@ class Reader:
         return [picture for picture in pictures if not picture.is_corrupt]
 
     def _deliver(self, connection: Connection, pictures: list[av.VideoFrame], now_s: float) -> None:
-        """Put pictures with their times into the box."""
+        """Put pictures with their times into the queue."""
         for picture in pictures:
-            self._welcome(connection, picture)
+            self._report_stream(connection, picture)
             time_s = self._clock.time_s(connection.stamp_s(picture), now_s)
             self._stats.arrived(now_s)
-            place: Any = picture.opaque or self._tape.place()
+            place: Any = picture.opaque or self._recorder.place()
             shot = Shot(to_frame(0, time_s, picture), connection.fps, place)
             if not self._stopping.is_set():
                 self._stats.frames_dropped += self._shots.put(shot)
 
-    def _welcome(self, connection: Connection, picture: av.VideoFrame) -> None:
-        """Say what changed when pictures come again."""
+    def _report_stream(self, connection: Connection, picture: av.VideoFrame) -> None:
+        """Report changes of the stream when pictures arrive again."""
         if self._stats.state == "running":
             return
         self._stats.state = "running"

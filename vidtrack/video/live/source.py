@@ -1,4 +1,4 @@
-"""A live source as frames: the newest ones, with true times, for as long as somebody iterates."""
+"""A live source as an iterator of the newest frames, with capture times."""
 
 from __future__ import annotations
 
@@ -7,52 +7,52 @@ from dataclasses import replace
 from time import monotonic
 from types import TracebackType
 
-from vidtrack.config import LiveSettings
+from vidtrack.config.live import LiveSettings
 from vidtrack.video.clock import FALLBACK_FPS
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import Address
 from vidtrack.video.live.clock import CaptureClock
 from vidtrack.video.live.connection import Connection
 from vidtrack.video.live.mailbox import Mailbox
+from vidtrack.video.live.packet_sink import NoPacketSink, PacketSink, Place
 from vidtrack.video.live.reader import Reader, Shot
 from vidtrack.video.live.stats import LiveStats
-from vidtrack.video.live.tape import NoTape, Place, Tape
 from vidtrack.video.planes import matched
 
 IDLE_S = 0.25
-"""How long an iteration waits for a frame before it says that there is none."""
+"""s; an iteration returns None after so long without a frame."""
 
 _NEWEST, _EVERY = 2, 16  # frames that may wait for the tracker
-_STUCK = 4  # time-outs without a sign of life after which a reading thread is given up
-_LATE_S = 5.0  # with every frame tracked, a delay that has to be told
-_END_S = 0.3  # that a thread gets to end by itself
+_STUCK = 4  # time-outs without activity after which a reader thread is replaced
+_LATE_S = 5.0  # with every frame tracked, a longer delay gives a warning
+_END_S = 0.3  # time for a thread to end
 
 
 class LiveSource:
-    """Frames of a live source; None when none came for IDLE_S. Iterate from one thread.
+    """Frames of a live source; None after IDLE_S without a frame. Iterate from one thread.
 
-    like           a frame of the size and kind of all
+    like           a frame of the size and kind of all frames
     width, height  of the first picture [px]; later ones of another size are scaled to it
     fps            nominal frames/s
-    stats          what came and what went wrong
-    place          where the last frame is in the recording
+    stats          counts of frames and problems
+    place          place of the last frame in the recording
     origin_s       monotonic time of time_s = 0
 
     settings   of the capture
-    tape       takes the packets; None: nothing does
+    recorder   receives the packets; None: no recording
     first      number of the first frame
     origin_s   None: the first picture has time 0
-    like       a frame of the size and kind that all are brought to; None: the first one
-    connect    how a connection is made; None: to the address, by FFmpeg
+    like       all frames are converted to its size and kind; None: those of the first frame
+    connect    opens a connection; None: to the address, by FFmpeg
 
-    Opening waits for the first picture. Raises SourceError if the source refuses, or fails three times before it.
+    Opening waits for the first picture. Raises SourceError if the source refuses, or fails three times before that.
     """
 
     def __init__(
         self,
         address: Address,
         settings: LiveSettings,
-        tape: Tape | None = None,
+        recorder: PacketSink | None = None,
         *,
         first: int = 0,
         origin_s: float | None = None,
@@ -62,7 +62,7 @@ class LiveSource:
         self._address = address
         self._settings = settings
         self._connect = connect or (lambda: Connection(address, settings.timeout_s, settings.ffmpeg))
-        self._tape = tape or NoTape()
+        self._recorder = recorder or NoPacketSink()
         self._shots: Mailbox[Shot] = Mailbox(_EVERY if settings.every_frame else _NEWEST, waits=settings.every_frame)
         self._clock = CaptureClock(patient=settings.every_frame)
         self._index = first
@@ -101,11 +101,11 @@ class LiveSource:
         return matched(frame, self.like)
 
     def latency_s(self, time_s: float) -> float:
-        """How long ago a frame's time was."""
+        """Age [s] of a frame with this time."""
         return monotonic() - self.origin_s - time_s
 
     def stop(self) -> None:
-        """Let the iteration end soon; from any thread, or a signal handler."""
+        """End the iteration soon; safe from any thread and from signal handlers."""
         self._stopped = True
 
     def __enter__(self) -> LiveSource:
@@ -122,7 +122,7 @@ class LiveSource:
         self._reader.stop(_END_S)
 
     def _read_on(self) -> Reader:
-        return Reader(self._connect, self._shots, self.stats, self._settings, self._tape, self._clock)
+        return Reader(self._connect, self._shots, self.stats, self._settings, self._recorder, self._clock)
 
     def _first_shot(self) -> Shot:
         try:
@@ -134,7 +134,7 @@ class LiveSource:
         return shot
 
     def _watch(self) -> None:
-        """Replace a reading thread that hangs inside a driver, where no time-out reaches."""
+        """Replace a reader thread that hangs in a driver without time-out."""
         if monotonic() - self._reader.alive_s > _STUCK * self._settings.timeout_s:
             self.stats.stalls += 1
             self.stats.warn(f"reading {self._address.shown} hangs in the system; it is opened anew")

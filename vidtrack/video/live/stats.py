@@ -1,4 +1,4 @@
-"""What happened to a live source so far."""
+"""Statistics of a live source."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _REMEMBERED = 20
 
 @dataclass(slots=True)
 class LiveStats(SourceStats):
-    """Counts that grow while a camera is read, and what it does now.
+    """Counters and state of a camera.
 
-    received    pictures that came, read or dropped
-    reconnects  connections made after the first
-    stalls      times that it was connected and nothing came
+    received    pictures received, read or dropped
+    reconnects  connections after the first
+    stalls      time-outs of an open connection
     state       "connecting", "running", "waiting" (before another attempt) or "ended"
-    problems    (Unix time [s], what) of the last problems
+    problems    (Unix time [s], message) of the last problems
     """
 
     received: int = 0
@@ -30,12 +30,12 @@ class LiveStats(SourceStats):
     _arrivals: deque[float] = field(default_factory=lambda: deque(maxlen=100), repr=False)
 
     def warn(self, message: str) -> None:
-        """Log a warning and keep it among the last problems: a camera may have thousands in a year."""
+        """Log a warning and keep it among the last problems; the list is bounded."""
         self.note(message)
         log.warning(message)
 
     def note(self, message: str) -> None:
-        """Keep a problem without telling it."""
+        """Keep a problem without logging it."""
         self.problems.append((time.time(), message))
 
     def arrived(self, now_s: float) -> None:
@@ -44,6 +44,6 @@ class LiveStats(SourceStats):
         self._arrivals.append(now_s)
 
     def rate(self, now_s: float) -> float:
-        """Pictures per second lately, falling when none come."""
+        """Recent pictures per second; it falls while none arrive."""
         times = list(self._arrivals)
         return (len(times) - 1) / max(now_s - times[0], 1e-3) if len(times) > 1 else 0.0

@@ -1,1 +1,1 @@
-"""What a source is like, measured from its pictures: time, light, noise, shake, compression."""
+"""Quality of a source, measured from its pictures: timing, light, noise, shake, compression."""

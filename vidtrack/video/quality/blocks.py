@@ -1,4 +1,4 @@
-"""Blocks of strong compression: steps at every eighth row and column."""
+"""Compression blocks: steps at every eighth row and column."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lamps on alternating current: the light of the whole picture, or of its rows, swings at one frequency."""
+"""Flicker of lamps on alternating current: periodic brightness of the whole picture, or of its rows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.video.quality.samples import Samples
 
 _DARK, _BRIGHT = 24, 235  # grey levels between which a ratio means something
@@ -16,12 +16,12 @@ _OUTSTANDING = 5  # times the median amplitude; noise reaches 3
 
 @dataclass(frozen=True, slots=True)
 class Flicker:
-    """Amplitudes are of a sine, as a share of the light.
+    """Flicker; amplitudes are those of a sine, as a share of the light.
 
-    whole         of the whole picture
-    whole_hz      its frequency as the camera sees it, which is not the lamps'
-    bands         of rows against the whole picture, from a shutter that opens row by row
-    bands_hz      the same for them
+    whole         amplitude of the whole picture
+    whole_hz      its frequency in the pictures, an alias of the lamps' frequency
+    bands         amplitude of rows relative to the whole picture, from a rolling shutter
+    bands_hz      its frequency in the pictures
     """
 
     whole: float = 0.0
@@ -31,13 +31,13 @@ class Flicker:
 
 
 def flicker(samples: Samples, rate: float) -> Flicker:
-    """Of pictures at a rate [1/s]; zero if they are too few to tell."""
+    """Flicker of pictures at a rate [1/s]; zero if there are too few pictures."""
     luma = samples.luma.astype(np.float32)
     if len(luma) < _FEWEST:
         return Flicker()
     scene = np.median(luma, axis=0)
     usable = (scene > _DARK) & (scene < _BRIGHT)
-    rows = usable.mean(axis=1) > 0.5  # the others tell more of traffic than of light
+    rows = usable.mean(axis=1) > 0.5  # the other rows are dark, bright or covered
     if not rows.any():
         return Flicker()
     ratio = np.where(usable[rows], luma[:, rows] - samples.black, np.nan) / (scene[rows] - samples.black)
@@ -47,7 +47,7 @@ def flicker(samples: Samples, rate: float) -> Flicker:
 
 
 def _strongest(gain: Floats, rate: float) -> tuple[float, float]:
-    """Amplitude and frequency [Hz] of the strongest sine that stands out in series (K, N): median over the N."""
+    """Amplitude and frequency [Hz] of the strongest significant sine in series (K, N); median over the N series."""
     series = gain - gain.mean(axis=0)
     window = np.hanning(len(series))[:, None]
     amplitude = np.median(np.abs(np.fft.rfft(series * window, axis=0)), axis=1) * 2 / window.sum()

@@ -15,12 +15,12 @@ _LEVELS = 255.0
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """Levels are 0 (black) to 255 (white), whatever range the source uses.
+    """Brightness and noise; levels are scaled from 0 (black) to 255 (white).
 
     brightness    mean level
-    bright        level that 5 % of the picture are above
-    black_share, white_share   of the picture, too dark or too bright for any detail
-    noise         standard deviation of a pixel from picture to picture where nothing moves, in levels of the source
+    bright        95th percentile of the level
+    black_share, white_share   shares of the picture that are clipped
+    noise         standard deviation of a still pixel from picture to picture, in levels of the source
     """
 
     brightness: float
@@ -31,7 +31,7 @@ class Light:
 
 
 def light(samples: Samples) -> Light:
-    """Of pictures that hold still but for the traffic."""
+    """Light of pictures with a fixed view."""
     luma, black, white = samples.luma, samples.black, samples.white
     level = np.clip((luma.astype(np.float32) - black) * (_LEVELS / (white - black)), 0, _LEVELS)
     return Light(
@@ -46,8 +46,7 @@ def light(samples: Samples) -> Light:
 def _noise(samples: Samples) -> float:
     """Median over the pixels of sqrt(pi)/2 E|difference|, which is sigma if the noise is Gaussian.
 
-    A row's median difference is light, not noise; pictures that repeat the one before have none; nor have clipped
-    pixels.
+    A row's median difference counts as light. Repeated pictures and clipped pixels are left out.
     """
     luma = samples.luma.astype(np.int16)
     change = np.diff(luma, axis=0)[~samples.repeats[1:]]

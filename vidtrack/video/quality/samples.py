@@ -1,4 +1,4 @@
-"""A sparse grid of points of every picture, over time: light and noise are measured on it."""
+"""A sparse grid of pixels of every picture, for light and noise."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _REMEMBERED = 1500  # pictures; 30 MB
 
 
 class Samples:
-    """Luminance on a grid that leaves out pixels and averages none, so that noise stays what it is.
+    """Luminance on a grid of single pixels, without averages, so that the noise is unchanged.
 
     black, white  the luminance of black and white in this source
     repeats       (K,) whether all pixels of a picture equal those of the one before

@@ -1,4 +1,4 @@
-"""How the camera moves: phase correlation of each picture with an earlier one, in tiles that vote."""
+"""Camera shake: phase correlation of each picture with an earlier one, median over tiles."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.scan import Floats
+from vidtrack.arrays.types import Floats
 from vidtrack.video.frame import Frame
 
 _COLUMNS = 512  # pictures are reduced to at most so many
 _TILES = (4, 3)  # columns and rows: traffic fills less than half of them
-_TEXTURE = 3.0  # grey levels; standard deviation below which a tile shows nothing to hold on to
+_TEXTURE = 3.0  # grey levels; tiles with a smaller standard deviation are not used
 _FEWEST = 4  # tiles with texture
 _ANCHORED_S = 1.0
 _OFTEN = 90  # percentile: gusts count, a lorry that fills the picture once does not
@@ -22,9 +22,9 @@ _OFTEN = 90  # percentile: gusts count, a lorry that fills the picture once does
 
 @dataclass(frozen=True, slots=True)
 class Shake:
-    """Displacements in source pixels; None where the picture has nothing to hold on to.
+    """Displacements in source pixels; None if the picture has too little texture.
 
-    px        from one picture to the next, exceeded one time in ten
+    px        90th percentile of the displacement from one picture to the next
     drift_px  from the first picture to the last
     """
 
@@ -33,7 +33,7 @@ class Shake:
 
 
 class ShakeMeter:
-    """Measures where each picture is against one of up to a second before: by then traffic has moved on."""
+    """Measures the displacement of each picture against one up to a second older."""
 
     def __init__(self) -> None:
         self._anchor: NDArray[np.float32] | None = None
@@ -57,7 +57,7 @@ class ShakeMeter:
             self._anchor, self._anchor_s, self._anchor_at = picture, frame.time_s, self._places[-1]
 
     def result(self) -> Shake:
-        """Of all pictures so far."""
+        """The shake of all pictures so far."""
         if len(self._places) < 2:
             return Shake(None, None)
         places = np.array(self._places)
@@ -66,7 +66,7 @@ class ShakeMeter:
 
 
 def _shift(anchor: NDArray[np.float32], current: NDArray[np.float32]) -> Floats | None:
-    """(2,) median over the tiles with texture; None if they are too few."""
+    """(2,) median displacement of the tiles with texture; None if there are too few."""
     columns, rows = _TILES
     h, w = anchor.shape[0] // rows, anchor.shape[1] // columns
     if min(h, w) < 8:

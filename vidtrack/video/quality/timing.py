@@ -1,4 +1,4 @@
-"""How regular the pictures come."""
+"""Regularity of the picture times."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.scan import Floats, Mask
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.video.clock import stamp_rate
 
 _GAP = 1.5  # usual intervals; a longer one lacks a picture
@@ -15,14 +15,14 @@ _STILL_S = 0.3  # pictures that are all alike for longer show a scene in which n
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Of the pictures' times.
+    """Statistics of the pictures' times.
 
-    pictures       so many were timed
-    rate           pictures per second, gaps left out
-    jitter         standard deviation of the intervals without gaps, in usual intervals
-    missing_share  pictures that the gaps would have held, of all
+    pictures       number of pictures
+    rate           pictures per second, without gaps
+    jitter         standard deviation of the intervals without gaps, relative to the usual interval
+    missing_share  share of pictures missing in gaps
     longest_gap_s  longest interval
-    repeated_share pictures that only repeat the one before
+    repeated_share share of pictures that repeat the one before
     """
 
     pictures: int
@@ -34,7 +34,7 @@ class Timing:
 
 
 def timing(times: Floats, repeats: Mask) -> Timing:
-    """Of pictures at times (K,) [s], K of at least 2; repeats (J,) of some of them, in order."""
+    """Timing of pictures at times (K,) [s], K >= 2; repeats (J,) of some of them, in order."""
     intervals = np.diff(times)
     rate = stamp_rate(times) or 0.0
     whole = np.maximum(1, np.rint(intervals * rate))
@@ -51,7 +51,7 @@ def timing(times: Floats, repeats: Mask) -> Timing:
 
 
 def _repeated_share(repeats: Mask, rate: float) -> float:
-    """Share of the repeats (J,) among pictures in motion: a scene in which nothing moves repeats itself for long."""
+    """Share of the repeats (J,), without long runs of repeats, which show a still scene."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], repeats, [False]]).astype(int)))
     length = edges[1::2] - edges[::2]
     still = length > max(1.0, _STILL_S * rate)

@@ -1,0 +1,53 @@
+"""Ways without a gap."""
+
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from road_runs import hide, usual_ways, way, write_run
+
+from vidtrack.output.export import road_run
+from vidtrack.output.export.pieces import pieces
+from vidtrack.output.export.road_run import open_road_run
+
+SEEN = st.lists(st.lists(st.booleans(), min_size=12, max_size=12), min_size=1, max_size=4).filter(
+    lambda tracks: any(map(any, tracks))
+)
+
+
+@settings(max_examples=60)
+@given(SEEN, st.integers(1, 20))
+def test_pieces_hold_every_position_once_and_are_as_long_as_can_be(seen, batch):
+    before = road_run._BATCH
+    road_run._BATCH = batch
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            ways = [hide(way(k, range(12)), np.flatnonzero(~np.array(shown))) for k, shown in enumerate(seen)]
+            found = list(pieces(open_road_run(write_run(Path(folder), *ways))))
+    finally:
+        road_run._BATCH = before
+    frames = {(piece.track, piece.number): piece.rows.frame.tolist() for piece in found}
+    assert len(frames) == len(found)
+    for track, shown in enumerate(seen):
+        own = [frames[key] for key in sorted(key for key in frames if key[0] == track)]
+        assert [frame for piece in own for frame in piece] == np.flatnonzero(shown).tolist()
+        assert all(piece == list(range(piece[0], piece[-1] + 1)) for piece in own)
+        assert all(first[-1] + 1 < second[0] for first, second in pairwise(own))
+
+
+def test_a_piece_comes_out_before_the_run_is_read_to_its_end(tmp_path, monkeypatch):
+    run = open_road_run(write_run(tmp_path, way(1, range(10)), way(2, range(400))))
+    monkeypatch.setattr(road_run, "_BATCH", 20)
+    read = []
+    tables = road_run.RoadRun.tables
+    monkeypatch.setattr(road_run.RoadRun, "tables", lambda self: (read.append(len(t)) or t for t in tables(self)))
+    assert next(pieces(run)).track == 1
+    assert sum(read) < 60
+
+
+def test_a_guess_that_was_confirmed_stays_and_the_last_one_goes(tmp_path):
+    (lorry,) = (piece for piece in pieces(open_road_run(write_run(tmp_path, *usual_ways()))) if piece.track == 9)
+    assert lorry.rows.frame.tolist() == list(range(20, 61))

@@ -1,0 +1,176 @@
+"""The folder of a report: what the page says, what the spreadsheets hold, and that neither runs anything."""
+
+import csv
+import html
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from made_up_day import SITE, busy_day, write_day, write_run
+
+from vidtrack.cli import cli
+from vidtrack.errors import ConfigError, OutputError, SourceError
+from vidtrack.output.report.report import write_report
+from vidtrack.traffic.report.findings import read_findings
+
+
+def report(folder, scene=None):
+    made = folder.parent / "report"
+    made.mkdir()
+    write_report(made, read_findings(folder), scene)
+    return made
+
+
+def table(path):
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def words(made):
+    page = (made / "report.html").read_text(encoding="utf-8").partition("<body>")[2]
+    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page)))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("busy")
+    return folder, report(busy_day(folder / "day"))
+
+
+def test_page_pictures_and_spreadsheets_agree(made):
+    folder, out = made
+    found = read_findings(folder / "day")
+    rows = table(out / "turning_movements.csv")
+    trips = int((found.numbers("trips", "complete") > 0).sum())
+    assert sum(int(row["all"] or 0) for row in rows) == trips
+    assert sum(int(row["trips"]) for row in table(out / "origin_destination.csv")) == trips
+    text = words(out)
+    assert f"Whole trips {trips}" in text
+    (whole, *_) = table(out / "peak_hour.csv")
+    assert f"Peak hour {whole['begin'][-5:]}–{whole['end'][-5:]} {whole['vehicles']} vehicles" in text
+    assert f"Peak hour factor {float(whole['peak_hour_factor']):.2f}" in text
+    for name in ("turning_movements", "origin_destination", "speeds", "flow", "queues", "coverage"):
+        assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_page_needs_nothing_from_elsewhere(made):
+    page = (made[1] / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"https?:|<script|<link|<iframe|@import|url\(|srcset", page)
+    sources = re.findall(r'(?:src|href)="([^"]{22})', page)
+    assert len(sources) == 5
+    assert set(sources) == {"data:image/png;base64,"}
+
+
+def test_nobody_watched_is_said_and_not_zero(made):
+    _, out = made
+    gap = [row for row in table(out / "turning_movements.csv") if row["coverage"] == "0"]
+    assert [row["begin"] for row in gap] == [f"2026-06-01 12:{minute:02d}" for minute in (0, 15, 30, 45)]
+    assert {value for row in gap for name, value in row.items() if name not in ("begin", "end", "coverage")} == {""}
+    flows = [row for row in table(out / "flow_and_queues.csv") if row["coverage"] == "0"]
+    assert {(row["flow_per_h"], row["queue"]) for row in flows} == {("", "")}
+    page = (out / "report.html").read_text(encoding="utf-8")
+    hatched = re.findall(r'<tr class="none">.*?</tr>', page, re.S)
+    assert len(hatched) == 4
+    assert not any(re.search(r"<td[^>]*>\s*\d", row) for row in hatched)
+
+
+def test_what_there_is_no_data_for_is_left_out_in_words(made):
+    text = words(made[1])
+    assert text.count("Left out: the tracks of the run gone are no longer where they were measured.") == 2
+    assert not (made[1] / "heat_map.png").exists()
+
+
+def test_a_site_without_metres_has_no_queues_and_no_speeds(tmp_path):
+    text = words(report(write_day(tmp_path / "day", [4, 5, 6, 7], metres=False)))
+    assert "Left out: no speed was measured" in text
+    assert "Left out: without a calibration nobody knows whether a vehicle stands." in text
+    assert "The angles are those of the picture" in text
+
+
+def test_less_than_an_hour_has_no_peak_hour(tmp_path):
+    made = report(write_day(tmp_path / "day", [4, 5, 6]))
+    assert "Left out: no hour of whole intervals was watched." in words(made)
+    assert not (made / "peak_hour.csv").exists()
+
+
+def test_no_trips_at_all(tmp_path):
+    text = words(report(write_day(tmp_path / "day", [1], legs=("north", None))))
+    assert "Whole trips 0" in text
+    empty = write_day(tmp_path / "other" / "day", [0, 0, 0, 0])
+    assert "Left out: no vehicle was counted." in words(report(empty))
+
+
+HOSTILE = [
+    "<script>alert(1)</script>",
+    '=HYPERLINK("x","y")',
+    "a, b",
+    '"quoted"',
+    "$x$ \\alpha",
+    "+1",
+    "@SUM(A1)",
+    "\t=1",
+]
+
+
+def test_names_run_nothing_in_a_browser_or_a_spreadsheet(tmp_path):
+    pairs = [(name, "south") for name in HOSTILE]
+    made = report(
+        write_day(tmp_path / "day", [range(1, 9)] * 4, legs=pairs, name="<img src=x onerror=alert(1)> & =1+1")
+    )
+    page = (made / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"<script|<img src=x", page)
+    for name in HOSTILE:
+        assert name in html.unescape(page)
+    rows = table(made / "origin_destination.csv")
+    trips = {row["from"].removeprefix("'").strip(): row["trips"] for row in rows}
+    assert [trips[name.strip()] for name in HOSTILE] == [str(4 * k) for k in range(1, 9)]
+    for path in made.glob("*.csv"):
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for row in csv.reader(file):
+                assert not any(re.match(r"\s*[=+@]|\s*-\D", cell) for cell in row), (path.name, row)
+
+
+def test_a_picture_lies_under_the_arrows(tmp_path, made):
+    scene = np.zeros((720, 1280, 3), np.uint8)
+    other = report(write_day(tmp_path / "day", [4]), scene)
+    assert "Without the scene" in words(made[1])
+    assert "Without the scene" not in words(other)
+
+
+def command(*arguments):
+    cli.main(["report", *map(str, arguments)], standalone_mode=False)
+
+
+def test_the_command_writes_the_folder_and_says_where(tmp_path, monkeypatch, capsys):
+    write_day(tmp_path / "day", [4, 5, 6, 7])
+    monkeypatch.chdir(tmp_path)
+    command("day")
+    assert capsys.readouterr().out == f"{Path('runs/day-report')}\n"
+    assert (tmp_path / "runs/day-report/report.html").is_file()
+
+
+def test_what_the_command_refuses(tmp_path):
+    day = write_day(tmp_path / "day", [4, 5, 6, 7])
+    with pytest.raises(OutputError, match="is what is to be read"):
+        command(day, "-o", day, "--force")
+    with pytest.raises(SourceError, match="is not a folder; give one that vidtrack measure wrote"):
+        command(tmp_path / "nothing")
+    cv2.imwrite(str(tmp_path / "square.png"), np.zeros((500, 500, 3), np.uint8))
+    with pytest.raises(ConfigError, match="not the same shape"):
+        command(day, "-o", tmp_path / "out", "--picture", tmp_path / "square.png")
+    assert not (tmp_path / "out").exists()
+
+
+def test_from_a_run_to_its_report(tmp_path, monkeypatch):
+    """Two vehicles: one drives from the north to the south, one stands aside."""
+    monkeypatch.chdir(tmp_path)
+    write_run(tmp_path / "run", 20.0)
+    (tmp_path / "site.toml").write_text(SITE.format(name="cross", calibration=""))
+    cli.main(["measure", "run", "--site", "site.toml", "-o", "measures", "-q"], standalone_mode=False)
+    command("measures", "-o", "out")
+    (movement,) = [row for row in table(tmp_path / "out" / "origin_destination.csv") if row["trips"] != "0"]
+    assert movement == {"from": "north", "to": "south", "turn": "through", "trips": "1"}
+    assert (tmp_path / "out" / "time_space.png").is_file()
+    assert "Whole trips 1" in words(tmp_path / "out")

@@ -1,0 +1,43 @@
+"""The page in a real browser, on a telephone, without a network."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from made_up_day import MOVEMENTS, write_day
+
+from vidtrack.output.report.report import write_report
+from vidtrack.traffic.report.findings import read_findings
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (Debian's package chromium)")
+
+
+def test_every_picture_shows_and_nothing_is_wider_than_the_screen(tmp_path):
+    write_day(tmp_path / "day", np.ones((4, 12)), speeds=np.arange(40), legs=MOVEMENTS)
+    out = tmp_path / "report"
+    out.mkdir()
+    write_report(out, read_findings(tmp_path / "day"), None)
+    page = (out / "report.html").read_text(encoding="utf-8")
+    look = (
+        "<script>addEventListener('load', () => { const images = [...document.images];"
+        "document.title = `pictures ${images.filter(one => one.naturalWidth > 0).length} of ${images.length}, "
+        "wide ${document.documentElement.scrollWidth}`; })</script>"
+    )
+    # the page forbids scripts; this copy allows the one that looks at it
+    page = page.replace("default-src 'none';", "default-src 'none'; script-src 'unsafe-inline';")
+    (out / "looked-at.html").write_text(page.replace("</body>", look + "</body>"), encoding="utf-8")
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--disable-dev-shm-usage"]
+    command += [
+        f"--user-data-dir={tmp_path / 'profile'}",
+        "--window-size=500,1200",
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+    ]
+    command += ["--dump-dom", (out / "looked-at.html").as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    seen, images, width = map(int, re.search(r"<title>pictures (\d+) of (\d+), wide (\d+)", dom).groups())
+    assert (seen, images) == (5, 5)
+    assert width <= 500

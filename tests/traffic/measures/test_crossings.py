@@ -1,0 +1,195 @@
+"""Crossings of gates: known answers, and brute force against the compiled look at rows."""
+
+import numpy as np
+import pytest
+from drawn_runs import CALIBRATED, along, site, straight, write_run
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidtrack.traffic.measures.crossings import confidence, following
+from vidtrack.traffic.measures.gates import gates_of
+from vidtrack.traffic.measures.measure import measured
+from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.rows import Rows
+
+
+def crossings(run, place=None):
+    return measured([run], place or site()).tables["crossings"].to_pylist()
+
+
+def test_a_vehicle_passes_all_gates_at_known_times(tmp_path):
+    run = write_run(tmp_path / "run", [straight(7, 2.0, 50, 240, 100, 5)])
+    rows = crossings(run)
+    assert [(row["gate"], row["direction"], row["track_id"]) for row in rows] == [
+        ("west", "right", 7),
+        ("middle", "right", 7),
+        ("east", "right", 7),
+    ]
+    bend = 320 - 20 * 40 / 279  # the middle gate at y = 240
+    assert [row["time_s"] for row in rows] == pytest.approx([2.5, 2 + (bend - 50) / 100, 6.5], abs=1e-3)
+    assert rows[0]["utc"].isoformat() == "2026-06-01T05:00:02.500000+00:00"
+    assert all(row["speed_kmh"] is None for row in rows)
+    assert all(row["confidence"] > 0.99 and row["reason"] == "seen" for row in rows)
+
+
+def test_metres_give_speeds_lengths_and_gaps(tmp_path):
+    tracks = [straight(1, 1.0, 50, 240, 100, 5), straight(2, 3.0, 50, 241, 100, 5), straight(3, 3.5, 50, 100, 100, 5)]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    rows = [row for row in crossings(run, site(CALIBRATED)) if row["gate"] == "west"]
+    assert [row["speed_kmh"] for row in rows] == pytest.approx([36, 36, 36])
+    assert [row["speed_sigma_kmh"] for row in rows] == pytest.approx([1, 1, 1])
+    assert [row["headway_s"] for row in rows] == [None, pytest.approx(2.0, abs=0.01), None]  # 3 is in another lane
+    assert rows[1]["gap_s"] == pytest.approx(2.0 - 4.0 / 10, abs=0.01)
+    assert [row["along_m"] for row in rows] == pytest.approx([24, 24.1, 10], abs=0.2)
+
+
+def test_sections_give_speeds_without_a_calibration(tmp_path):
+    place = site(sections={"all": {"from": "west", "to": "east", "length_m": 80.0}})
+    run = write_run(tmp_path / "run", [straight(1, 1.0, 50, 240, 100, 5)])
+    speeds = {row["gate"]: row["speed_kmh"] for row in crossings(run, place)}
+    assert speeds == {"west": None, "middle": None, "east": pytest.approx(72, rel=1e-3)}
+
+
+def test_jitter_on_a_gate_does_not_count(tmp_path):
+    t = np.arange(0, 8, 0.04)
+    x = np.interp(t, [0, 2, 6, 8], [60, 100, 100, 140]) + np.where((t > 2) & (t < 6), 2 * (-1) ** np.arange(len(t)), 0)
+    rows = crossings(write_run(tmp_path / "run", [along(1, t, x)]))
+    assert [(row["gate"], row["direction"]) for row in rows] == [("west", "right")]
+
+
+def test_who_turns_back_on_the_gate_has_not_passed_and_who_turns_beyond_it_has_twice(tmp_path):
+    t = np.arange(0, 4, 0.04)
+    near, far = (np.interp(t, [0, 2, 4], [60, turn, 60]) for turn in (102, 140))
+    assert crossings(write_run(tmp_path / "near", [along(1, t, near)])) == []
+    rows = crossings(write_run(tmp_path / "far", [along(1, t, far)]))
+    assert [row["direction"] for row in rows] == ["right", "left"]
+
+
+def test_a_track_counts_once_per_gate_and_direction(tmp_path):
+    t = np.arange(0, 8, 0.04)
+    x = np.interp(t, [0, 2, 4, 6, 8], [60, 140, 60, 140, 60])
+    rows = crossings(write_run(tmp_path / "run", [along(1, t, x)]))
+    assert [row["direction"] for row in rows] == ["right", "left"]
+
+
+def test_last_seen_just_beyond_a_gate_counts_and_coasted_only_does_not(tmp_path):
+    t = np.arange(0, 2, 0.04)
+    x = np.linspace(60, 101, len(t))
+    seen = crossings(write_run(tmp_path / "seen", [along(1, t, x)]))
+    assert len(seen) == 1
+    assert seen[0]["confidence"] < 0.99
+    words = np.where(x > 95, "coasting", "confirmed")
+    assert crossings(write_run(tmp_path / "lost", [along(1, t, x)], status=words)) == []
+
+
+def test_beside_the_end_of_a_gate_is_not_over_it(tmp_path):
+    place = site(gates={"short": {"line": [[100, 0], [100, 100]]}})
+    assert crossings(write_run(tmp_path / "run", [straight(1, 0, 50, 240, 100, 3)]), place) == []
+
+
+def test_csv_and_parquet_give_the_same(tmp_path):
+    tracks = [straight(1, 1.0, 50, 240, 100, 5), straight(2, 3.0, 50, 250, 90, 5)]
+    runs = [write_run(tmp_path / str(csv), tracks, metres=True, csv=csv) for csv in (True, False)]
+    first, second = (measured([run], site(CALIBRATED)).tables for run in runs)
+    assert all(first[name].equals(second[name]) for name in first)
+
+
+POINT = st.tuples(st.floats(0, 640), st.floats(0, 480))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.lists(POINT, min_size=2, max_size=8), min_size=1, max_size=4), st.integers(1, 7))
+def test_passings_are_those_of_brute_force(paths, size):
+    """Steps that meet the middle gate, pairs of opposite ones within the margin taken away, then the first of each."""
+    gates = gates_of(site(gates={"bend": {"line": [[300, 0], [340, 200], [300, 479]]}}), None)
+    rows = sorted((k, track) for track, path in enumerate(paths) for k in range(len(path)))
+    xy = np.array([paths[track][k] for k, track in rows])
+    count, margin = len(rows), 8.0
+    unknown = np.full(count, np.nan)
+    yes = np.ones(count, bool)
+    t = np.array([float(k) for k, _ in rows])
+    number = np.array([track for _, track in rows])
+    whole = Rows(number, t, yes, ~yes, xy, unknown, np.full(count, margin), np.zeros((count, 2)), *(unknown,) * 4)
+    passing = Passing(gates, 50.0)
+    for first in range(0, count, size):  # blocks of any size give the same
+        passing.add(whole.only(np.arange(first, min(first + size, count))))
+    found = passing.passed()
+    expected = [
+        event for track, path in enumerate(paths) for event in brute_force(np.array(path), gates, margin, track)
+    ]
+    got = zip(found.track.tolist(), found.side.tolist(), found.t.round(6).tolist(), strict=True)
+    assert sorted(got) == sorted((track, side, round(when, 6)) for track, side, when in expected)
+
+
+def brute_force(path, gates, margin, track):
+    passed = []
+    for k in range(1, len(path)):
+        met = []
+        for x1, y1, x2, y2 in gates.segment:
+            a, b = np.array([x1, y1]), np.array([x2, y2])
+            sides = [(b - a)[0] * (p - a)[1] - (b - a)[1] * (p - a)[0] for p in path[k - 1 : k + 1]]
+            if (sides[0] >= 0) != (sides[1] >= 0):
+                share = sides[0] / (sides[0] - sides[1])
+                point = path[k - 1] + share * (path[k] - path[k - 1])
+                if 0 <= (point - a) @ (b - a) < (b - a) @ (b - a):
+                    met.append((int(sides[1] >= 0), share))
+        net = sum(1 if side else -1 for side, _ in met)
+        if net:
+            passed.append([k, int(net > 0), k - 1 + met[-1][1]])
+    kept = []
+    for k, side, when in passed:
+        if kept and kept[-1][1] != side:
+            since = [distance(path[i], gates) for i in range(kept[-1][0], k)]
+            if max(since) <= margin:
+                kept.pop()
+                continue
+        kept.append([k, side, when])
+    first = {}
+    for _, side, when in kept:
+        first.setdefault(side, when)
+    return [(track, side, when) for side, when in first.items()]
+
+
+def distance(point, gates):
+    nearest = []
+    for x1, y1, x2, y2 in gates.segment:
+        a, b = np.array([x1, y1]), np.array([x2, y2])
+        share = np.clip((point - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        nearest.append(np.linalg.norm(point - a - share * (b - a)))
+    return min(nearest)
+
+
+def passed_of(t, gate, side, along, speed):
+    n = len(t)
+    ones, yes = np.ones(n), np.ones(n, bool)
+    return Passed(t, gate, np.arange(n), side, along, ones, ones, ones, yes, ~yes, speed, ones, ones)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.floats(0, 100), st.integers(0, 1), st.integers(0, 1), st.floats(0, 9)), max_size=10))
+def test_headways_are_those_of_brute_force(events):
+    events = sorted(events, key=lambda event: event[0])
+    t, gate, side, along_m = (np.array([event[k] for event in events], dtype=kind) for k, kind in enumerate("fiif"))
+    passed = passed_of(t.astype(float), gate, side, along_m.astype(float), np.full(len(t), 10.0))
+    spans = np.array([[0.0, 50.0], [50.0, 101.0]])
+    found = following(passed, np.full(len(t), 5.0), spans, metres=True)
+    for i in range(len(t)):
+        ahead = [
+            passed.t[j]
+            for j in range(i)
+            if (gate[j], side[j]) == (gate[i], side[i])
+            and abs(passed.along[j] - passed.along[i]) < 1.75
+            and (passed.t[j] < 50) == (passed.t[i] < 50)
+        ]
+        if ahead:
+            assert found.headway[i] == pytest.approx(passed.t[i] - ahead[-1])
+            assert found.gap[i] == pytest.approx(max(passed.t[i] - ahead[-1] - 0.5, 0))
+        else:
+            assert np.isnan(found.headway[i])
+
+
+def test_confidence_grows_with_the_distance_on_both_sides():
+    passed = passed_of(np.arange(3.0), np.zeros(3, int), np.zeros(3, int), np.zeros(3), np.ones(3))
+    object.__setattr__(passed, "before", np.array([0.0, 1.0, 9.0]))
+    object.__setattr__(passed, "after", np.array([9.0, 9.0, 9.0]))
+    assert confidence(passed) == pytest.approx([0.5, 0.8413, 1.0], abs=1e-4)

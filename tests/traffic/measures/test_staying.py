@@ -1,0 +1,85 @@
+"""Stays in zones, and queues: known answers and brute force."""
+
+import numpy as np
+import pytest
+from drawn_runs import CALIBRATED, along, site, straight, write_run
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vidtrack.traffic.measures.measure import measured
+from vidtrack.traffic.measures.queues import queues_of
+from vidtrack.traffic.measures.staying import Stays
+
+ZONES = {"zones": {"box": {"polygon": [[200, 100], [400, 100], [400, 400], [200, 400]]}}}
+
+
+def stopping(track, start_s, stop_px, wait_s, y=240.0):
+    """Drives at 100 px/s to a place, stands, and drives on."""
+    arrive = start_s + (stop_px - 50) / 100
+    leave = arrive + wait_s
+    t = np.arange(round(start_s * 25), round((leave + (580 - stop_px) / 100) * 25)) / 25
+    return along(track, t, np.interp(t, [start_s, arrive, leave, leave + 9], [50, stop_px, stop_px, stop_px + 900]), y)
+
+
+def test_a_stay_has_its_times_and_how_long_the_vehicle_stood(tmp_path):
+    run = write_run(tmp_path / "run", [stopping(1, 2.0, 300, 5.0)], metres=True)
+    rows = measured([run], site(CALIBRATED | ZONES)).tables["stays"].to_pylist()
+    assert len(rows) == 1
+    assert (rows[0]["zone"], rows[0]["came"], rows[0]["left"]) == ("box", True, True)
+    assert rows[0]["begin_s"] == pytest.approx(3.5, abs=0.03)
+    assert rows[0]["stay_s"] == pytest.approx(7.0, abs=0.05)
+    assert rows[0]["standing_s"] == pytest.approx(5.0, abs=0.1)
+
+
+def test_without_a_calibration_standing_is_not_known(tmp_path):
+    run = write_run(tmp_path / "run", [stopping(1, 2.0, 300, 5.0)])
+    tables = measured([run], site(**ZONES)).tables
+    assert tables["stays"].to_pylist()[0]["standing_s"] is None
+    assert len(tables["queues"]) == 0
+
+
+def test_who_is_there_at_the_end_has_not_left(tmp_path):
+    run = write_run(tmp_path / "run", [straight(1, 0.0, 300, 240, 0, 59)], metres=True)
+    row = measured([run], site(CALIBRATED | ZONES)).tables["stays"].to_pylist()[0]
+    assert (row["came"], row["left"], row["stay_s"]) == (False, False, pytest.approx(59))
+
+
+def test_three_wait_one_behind_the_other(tmp_path):
+    tracks = [stopping(1, 2.0, 300, 12.0), stopping(2, 4.0, 230, 11.0), stopping(3, 6.0, 160, 10.0)]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    rows = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()
+    assert len(rows) == 1
+    assert (rows[0]["leg"], rows[0]["vehicles"]) == ("west", 3)
+    assert rows[0]["begin_s"] == pytest.approx(4.5, abs=0.1)
+    assert rows[0]["end_s"] == pytest.approx(17.1, abs=0.1)
+    assert rows[0]["length_m"] == pytest.approx(14 + 4, abs=0.2)  # from the front of the first to the rear of the last
+
+
+STANDING = st.tuples(st.integers(0, 200), st.integers(1, 60), st.integers(-1, 1), st.integers(0, 50))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(STANDING, max_size=12))
+def test_queues_are_those_of_brute_force(events):
+    events = sorted({(begin, leg): (begin, wait, leg, x) for begin, wait, leg, x in events}.values())
+    begin, wait, leg, x = (np.array([event[k] for event in events], int) for k in range(4))
+    n, yes = len(events), np.ones(len(events), bool)
+    xy = np.column_stack([x, np.zeros(n)]).astype(float)
+    stays = Stays(
+        np.zeros(n, int), np.arange(n), begin.astype(float), (begin + wait).astype(float), xy[:, 0], yes, yes, xy
+    )
+    found = queues_of(stays, leg, np.full(n, 4.0))
+    got = list(zip(found.leg, found.begin, found.end, found.vehicles, found.length, strict=True))
+    expected = []
+    for one in (0, 1):
+        groups = []
+        for event in (event for event in events if event[2] == one):
+            if groups and event[0] - max(b + w for b, w, _, _ in groups[-1]) <= 2:
+                groups[-1].append(event)
+            else:
+                groups.append([event])
+        for group in groups:
+            most = max(sum(b <= when < b + w for b, w, _, _ in group) for when, *_ in group)
+            far = max(abs(event[3] - group[0][3]) for event in group) + 4
+            expected.append((one, group[0][0], max(b + w for b, w, _, _ in group), most, far))
+    assert sorted(got) == sorted(expected)

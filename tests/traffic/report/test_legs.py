@@ -1,0 +1,22 @@
+"""Flow and queue of each leg."""
+
+import numpy as np
+from made_up_day import write_day
+
+from vidtrack.traffic.report.findings import read_findings
+from vidtrack.traffic.report.legs import legs_of
+
+
+def test_flow_is_of_the_watched_time_and_a_gap_is_not_zero(tmp_path):
+    folder = write_day(tmp_path / "day", [6, 0, 3, 0], [1, 0, 0.5, 1])
+    (leg,) = legs_of(read_findings(folder))
+    assert leg.leg == "north"
+    np.testing.assert_allclose(leg.flow, [24, np.nan, 24, 0])
+    np.testing.assert_allclose(leg.queue, [0, np.nan, 0, 0])
+
+
+def test_the_longest_queue_of_each_interval_that_it_lasts_into(tmp_path):
+    queues = [("north", 100, 200, 3, 20.0), ("north", 800, 1000, 5, 31.0), ("south", 100, 200, 9, 60.0)]
+    (leg,) = legs_of(read_findings(write_day(tmp_path / "day", [6, 6, 6], queues=queues)))
+    assert leg.queue.tolist() == [5, 5, 0]
+    assert leg.queue_m.tolist() == [31, 31, 0]

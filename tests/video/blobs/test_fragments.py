@@ -1,0 +1,86 @@
+"""Which regions are pieces of one vehicle, and which pixels of a region belong to which vehicle."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vidtrack.video.blobs.fragments import together
+from vidtrack.video.blobs.nearest import nearest_box
+
+CAR = (40.0, 20.0)
+NOBODY = np.empty((0, 4))
+
+
+def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None):
+    """Group of each box (R, 4), where it is known that vehicles are as large as `typical`; None: it is not."""
+    box = np.asarray(box, float)
+    usual = np.tile(np.full(2, np.nan) if typical is None else typical, (len(box), 1))
+    area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
+    link = np.arange(len(box)) if link is None else np.asarray(link)
+    group, count = together(box, area, link, np.asarray(predicted, float), usual, True, 0.7, gap)
+    assert sorted(set(group.tolist())) == list(range(count))
+    return group.tolist()
+
+
+@pytest.mark.parametrize("typical", [CAR, None])
+def test_pieces_inside_one_predicted_vehicle_are_one(typical):
+    pieces = [[10, 10, 30, 20], [41, 10, 9, 20], [200, 100, 8, 8]]
+    assert grouped(pieces, [[9, 9, 42, 22]], typical) == [0, 0, 1]
+    assert grouped(pieces, [[9, 9, 42, 22]], typical, gap=0.0) == ([0, 0, 1] if typical else [0, 1, 2])
+
+
+@pytest.mark.parametrize("typical", [CAR, None])
+def test_two_regions_that_are_each_like_a_vehicle_are_two_whoever_was_predicted(typical):
+    assert grouped([[10, 10, 35, 18], [30, 30, 35, 18]], [[8, 8, 60, 42]], typical, gap=0.5) == [0, 1]
+
+
+def test_a_small_piece_beside_a_vehicle_belongs_to_it_though_nobody_predicted_it():
+    assert grouped([[10, 10, 30, 20], [44, 12, 6, 10]]) == [0, 0]
+    assert grouped([[10, 10, 30, 20], [60, 12, 6, 10]]) == [0, 1]  # too far
+    assert grouped([[10, 10, 40, 20], [52, 12, 15, 18]]) == [0, 1]  # more than a vehicle
+    assert grouped([[10, 10, 30, 20], [44, 12, 6, 10]], typical=None) == [0, 1]
+
+
+@pytest.mark.parametrize("typical", [CAR, None])
+def test_pieces_that_weak_foreground_links_are_one_unless_each_is_a_vehicle(typical):
+    pieces = [[10, 10, 30, 6], [20, 18, 12, 4]]
+    assert grouped(pieces, typical=None) == [0, 1]
+    assert grouped(pieces, typical=typical, link=[0, 0]) == [0, 0]
+    assert grouped(pieces, [pieces[0], pieces[1]], typical=None, link=[0, 0]) == [0, 1]
+    assert grouped([[10, 10, 35, 18], [50, 10, 35, 18]], typical=typical, link=[0, 0]) == [0, 1]
+
+
+def test_a_region_of_two_predicted_vehicles_is_a_piece_of_neither():
+    assert grouped([[10, 10, 60, 12], [32, 23, 6, 4]], [[9, 8, 30, 20], [40, 8, 32, 20]], None, gap=0.3) == [0, 1]
+
+
+@given(st.permutations(range(5)))
+def test_the_order_of_regions_does_not_matter(order):
+    boxes = np.array([[10, 10, 30, 20], [41, 10, 9, 20], [200, 100, 8, 8], [100, 50, 20, 20], [122, 50, 6, 12]], float)
+    group = grouped(boxes[list(order)], [[9, 9, 42, 22]])
+    pairs = {frozenset((order[i], order[j])) for i in range(5) for j in range(i) if group[i] == group[j]}
+    assert pairs == {frozenset((0, 1)), frozenset((3, 4))}
+
+
+def test_each_pixel_goes_to_the_nearest_predicted_vehicle():
+    inside, box = np.ones((20, 80), np.uint8), np.array([100, 50, 80, 20])
+    label, count = nearest_box(inside, box, np.array([[100.0, 50, 40, 20], [140.0, 50, 40, 20]]))
+    assert count == 2
+    assert (label[:, :40] == 0).all()
+    assert (label[:, 40:] == 1).all()
+
+
+def test_a_large_vehicle_takes_more_of_a_region_than_a_small_one():
+    inside, box = np.ones((20, 90), np.uint8), np.array([0, 0, 90, 20])
+    label, _ = nearest_box(inside, box, np.array([[0.0, 0, 60, 20], [60.0, 0, 30, 20]]))
+    assert abs((label == label[0, 0]).sum() / 20 - 60) <= 1
+
+
+def test_boxes_that_the_region_does_not_fill_or_that_lie_on_another_have_no_part_in_it():
+    inside, box = np.ones((20, 80), np.uint8), np.array([0, 0, 80, 20])
+    left, right = [0.0, 0, 40, 20], [40.0, 0, 40, 20]
+    assert nearest_box(inside, box, np.array([left, [60.0, 0, 80, 20]]))[1] == 0
+    assert nearest_box(inside, box, np.array([left, [5.0, 0, 40, 20]]))[1] == 0
+    assert nearest_box(inside, box, np.array([left, [5.0, 0, 40, 20], right]))[1] == 2
+    assert nearest_box(inside, box, NOBODY)[1] == 0

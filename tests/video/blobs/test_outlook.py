@@ -1,0 +1,38 @@
+"""What is said while tracking goes on about what the tracker cannot do."""
+
+import numpy as np
+import pytest
+
+from vidtrack.tracking.picture.road import Road
+from vidtrack.video.blobs.outlook import Outlook
+from vidtrack.video.foreground import Foreground
+from vidtrack.video.frame import Frame
+
+EMPTY = np.zeros((120, 160), np.uint8)
+
+
+def said(level, road, seconds=20):
+    """All that is said in so many seconds of pictures of this luminance."""
+    outlook, foreground = Outlook(), Foreground(EMPTY, EMPTY.astype(np.float32), 1)
+    pictures = (Frame(k, 0.2 * k, np.full((120, 160), level, np.uint8)) for k in range(5 * seconds))
+    return [what for frame in pictures for what in outlook.look(frame, foreground, road)]
+
+
+def test_a_dark_picture_is_said_once():
+    assert len([what for what in said(20, Road(160, 120)) if "black" in what]) == 1
+
+
+def test_an_ordinary_picture_is_not_worth_a_word():
+    assert said(90, Road(160, 120)) == []
+
+
+@pytest.mark.parametrize(("share", "times"), [(0.5, 1), (0.1, 0)])
+def test_a_restless_picture_is_said_once(share, times):
+    road = Road(160, 120)
+    starts = road.restless.starts
+    starts[: round(share * len(starts))] = 10
+    assert len([what for what in said(90, road) if "traffic" in what]) == times
+
+
+def test_what_does_not_last_is_not_said():
+    assert said(20, Road(160, 120), seconds=3) == []

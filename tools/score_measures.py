@@ -1,0 +1,163 @@
+"""Score `vidtrack measure` against the exact events of simulated roads.
+
+    python tools/score_measures.py CLIP...
+
+Each CLIP is a folder of `vidtrack simulate road|junction-3d|roundabout|motorway`; with tracks in CLIP/run (`vidtrack
+track CLIP/video.avi --site CLIP/site.toml -o CLIP/run`) these are scored as well. First the exact states are measured
+as if they were tracks: what is missed then is missed by the geometry.
+
+A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
+same legs whose two times are within 1 s.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from scipy.optimize import linear_sum_assignment
+
+from vidtrack.traffic.measures.measure import measured
+from vidtrack.traffic.site import read_site
+
+TOLERANCE_S = 1.0
+FPS = 25.0
+SIGMA = 0.01  # of exact states, in the units of their columns
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def exact_run(clip: Path, folder: Path) -> None:
+    """A run whose tracks are the exact states."""
+    states = rows_of(clip / "road_truth.csv")
+    column = {name: np.array([float(row[name]) for row in states]) for name in states[0] if name != "class"}
+    boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)[:, 2:6]
+    count = len(states)
+    small, none = np.full(count, SIGMA), np.zeros(count)
+    table = {
+        "time_s": column["time_s"],
+        "track_id": column["target_id"].astype(np.int64),
+        "status": np.full(count, "confirmed"),
+        **{name: column[name] for name in ("x_m", "y_m", "speed_kmh", "length_m")},
+        **dict.fromkeys(("sigma_x_m", "sigma_y_m", "speed_sigma_kmh", "length_sigma_m"), small),
+        "speed_shared_sigma_kmh": none,
+        "heading_deg": 90 - column["heading_deg"],
+        **dict.fromkeys(("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px"), none),
+        **dict(zip(("left_px", "top_px", "width_px", "height_px"), boxes.T, strict=True)),
+    }
+    folder.mkdir()
+    pq.write_table(pa.table(table), folder / "tracks.parquet")
+    frames = int(column["frame"].max())
+    summary = {"frames": frames, "media_s": float(column["time_s"].max()), "fps": FPS, "width": 1280, "height": 720}
+    (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": 0.0}}}))
+
+
+def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:
+    """Pairs of (place, times...): the same place, all times within the tolerance; as many as possible, then nearest."""
+    cost = np.full((len(truth), len(found)), 1e3)
+    for i, (place, *times) in enumerate(truth):
+        for j, (other, *others) in enumerate(found):
+            off = np.abs(np.array(times) - others).max()
+            if place == other and off <= TOLERANCE_S:
+                cost[i, j] = off
+    rows, columns = linear_sum_assignment(cost)
+    return [(i, j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1e3]
+
+
+def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
+    """Whether a track lies on the vehicle of an event at that time, with an IoU of 0.3 or more."""
+    boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)
+    frame = round(float(event["time_s"]) * FPS)
+    true = boxes[(boxes[:, 0] == frame + 1) & (boxes[:, 1] == int(event["target_id"])), 2:6]
+    table = pq.read_table(run / "tracks.parquet")
+    there = np.abs(table["time_s"].to_numpy() - frame / FPS) < 0.5 / FPS
+    box = np.column_stack([table[f"{name}_px"].to_numpy() for name in ("left", "top", "width", "height")])[there]
+    for left, top, width, height in true:
+        wide = np.minimum(box[:, 0] + box[:, 2], left + width) - np.maximum(box[:, 0], left)
+        high = np.minimum(box[:, 1] + box[:, 3], top + height) - np.maximum(box[:, 1], top)
+        common = np.maximum(wide, 0) * np.maximum(high, 0)
+        if (common >= 0.3 * (width * height + box[:, 2] * box[:, 3] - common)).any():
+            return True
+    return False
+
+
+def score(clip: Path, run: Path) -> dict[str, float]:
+    """Crossings and movements: how many there were, were found, and were right; errors of speed [km/h]."""
+    events = rows_of(clip / "road_events.csv")
+    found = measured([str(run)], read_site(clip / "site.toml")).tables
+    crossings, trips = found["crossings"].to_pylist(), found["trips"].to_pylist()
+    true = [event for event in events if event["event"] == "crossing"]
+    pairs = paired(
+        [((event["place"], event["direction"]), float(event["time_s"])) for event in true],
+        [((row["gate"], row["direction"]), row["time_s"]) for row in crossings],
+    )
+    off, sigma = [], []
+    for i, j in pairs:
+        row = crossings[j]
+        if row["speed_kmh"] is not None:
+            off.append(row["speed_kmh"] - float(true[i]["speed_kmh"]))
+            sigma.append(np.hypot(row["speed_sigma_kmh"], row["speed_shared_sigma_kmh"]))
+    moved = [event for event in events if event["event"] == "movement"]
+    whole = [row for row in trips if row["complete"]]
+    right = paired(
+        [((event["from_leg"], event["to_leg"]), float(event["time_s"]), float(event["end_s"])) for event in moved],
+        [((row["from_leg"], row["to_leg"]), row["begin_s"], row["end_s"]) for row in whole],
+    )
+    return {
+        "true": len(true),
+        "found": len(crossings),
+        "hit": len(pairs),
+        "movements": len(moved),
+        "trips": len(whole),
+        "right": len(right),
+        "untracked": sum(not tracked(clip, run, true[i]) for i in set(range(len(true))) - {i for i, _ in pairs}),
+        "off": np.array(off),
+        "sigma": np.array(sigma),
+    }
+
+
+def told(name: str, results: list[dict[str, float]]) -> str:
+    counts = ("true", "found", "hit", "movements", "trips", "right", "untracked")
+    total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
+    off, sigma = (np.concatenate([result[key] for result in results]) for key in ("off", "sigma"))
+    inside = np.mean(np.abs(off) <= 1.96 * sigma)
+    return (
+        f"| {name} | {total['true']:.0f} | {total['hit'] / total['true']:.3f} | {total['hit'] / total['found']:.3f} "
+        f"| {total['movements']:.0f} | {total['right'] / total['movements']:.3f} "
+        f"| {total['right'] / total['trips']:.3f} | {np.median(off):+.2f}, {np.median(np.abs(off)):.2f} "
+        f"| {inside:.2f} | {len(off) / total['hit']:.2f} | {total['untracked']:.0f} |"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("clips", nargs="+", type=Path)
+    clips = parser.parse_args().clips
+    of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"
+    print(f"| clip | crossings | {of} | movements | {of} | {speed} | missed without a track |")
+    exact, real = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for number, clip in enumerate(clips):
+            perfect = Path(folder, str(number))
+            exact_run(clip, perfect)
+            exact.append(score(clip, perfect))
+            print(told(f"{clip.name}, exact", exact[-1:]))
+            if (clip / "run").is_dir():
+                real.append(score(clip, clip / "run"))
+                print(told(clip.name, real[-1:]))
+    print(told("all, exact", exact))
+    if real:
+        print(told("all", real))
+
+
+if __name__ == "__main__":
+    main()

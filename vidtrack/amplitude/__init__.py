@@ -1,0 +1,1 @@
+"""Amplitudes: densities, CFAR, information reduction, optimal detection thresholds."""

@@ -1,0 +1,1 @@
+"""Arrays: their types, affine maps, sorted rows, and checks of user input."""

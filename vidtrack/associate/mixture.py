@@ -1,0 +1,54 @@
+"""Gate and likelihood of tracks whose predicted measurement is a Gaussian mixture: interacting multiple models."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from vidtrack.arrays.rows import starts
+from vidtrack.arrays.types import Ints
+from vidtrack.associate.gate import Gate, Pairs
+from vidtrack.estimate.bank import Modes
+from vidtrack.estimate.kernels import TURN
+from vidtrack.estimate.sensor import wrapped
+from vidtrack.scan import Scan
+
+LEAST_MODE = 0.01
+"""Least probability of a mode that has a gate; the likelihood counts all modes."""
+
+
+def mixture_pairs(gate: Gate, modes: Modes, scan: Scan, run: Ints | None = None, angles: tuple[int, ...] = ()) -> Pairs:
+    """Pairs inside the gate of any mode.
+
+    log_l  (N,) ln of the sum over the modes of weight N(v; 0, S); cost follows from it
+    d2, nis, log_s  of the mode that explains the measurement best
+    """
+    weight, zhat, cov = modes
+    count, rows, dim = zhat.shape
+    each = [gate.pairs(zhat[j], cov[j], scan, run, angles) for j in range(count)]
+    open_to = [weight[j, pairs.row] >= LEAST_MODE for j, pairs in enumerate(each)]
+    keys = [(pairs.row * len(scan) + pairs.measurement)[mask] for pairs, mask in zip(each, open_to, strict=True)]
+    key = np.unique(np.concatenate(keys))
+    row, measurement = key // max(1, len(scan)), key % max(1, len(scan))
+    v = np.stack([wrapped(scan.z[measurement] - mean[row], angles) for mean in zhat])
+    S = cov[:, row] + scan.R[measurement]
+    d2 = np.einsum("rni,rni->rn", v, np.linalg.solve(S, v[..., None])[..., 0])
+    log_s = np.linalg.slogdet(S)[1]
+    with np.errstate(divide="ignore"):
+        log_l = np.log(weight[:, row]) - 0.5 * (d2 + log_s + dim * np.log(TURN))
+    best = log_l.argmax(axis=0)
+    at = np.arange(len(key))
+    total = logsumexp(log_l, axis=0)
+    return replace(
+        each[0],
+        row=row,
+        measurement=measurement,
+        d2=d2[best, at],
+        nis=d2[best, at],
+        log_s=log_s[best, at],
+        log_l=total,
+        cost=-2 * total - dim * np.log(TURN),
+        start=starts(row, rows),
+    )

@@ -1,0 +1,44 @@
+"""Two-stage association by score: low-scored detections continue tracks, but start none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Mask
+from vidtrack.associate.hard import Associator
+from vidtrack.associate.problem import Problem
+from vidtrack.decision import Decision
+from vidtrack.scan import Scan
+
+
+@dataclass(frozen=True, slots=True)
+class TwoStage:
+    """Two-stage association by score (as in ByteTrack, Zhang et al. 2022).
+
+    Detections with a score of at least `least` are sure; without scores all are. Tracks are associated with sure
+    detections first, and the tracks left over with the others. Only sure detections start, confirm and keep tracks.
+    """
+
+    least: float
+
+    def sure(self, scan: Scan) -> Mask:
+        """(M,) the scan's sure detections."""
+        return np.ones(len(scan), bool) if scan.score is None else scan.score >= self.least
+
+    def decide(self, associate: Associator, problem: Problem, rows: Mask, sure: Mask) -> Decision:
+        """The decision about rows (T,): measurements that are `sure` (M,) in the first stage, others in the second."""
+        pairs = problem.pairs
+        asked, first_round = rows[pairs.row], sure[pairs.measurement]
+        first = associate.decide(problem.only(asked & first_round))
+        second_round = asked & ~first_round
+        if not np.count_nonzero(second_round):
+            return first
+        missed = first.beta0 > 0.5
+        second = associate.decide(problem.only(second_round & missed[pairs.row]))
+        return first.without(missed).joined(second)
+
+
+SINGLE_STAGE = TwoStage(-np.inf)
+"""One stage: all detections are sure."""

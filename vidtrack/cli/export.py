@@ -1,0 +1,69 @@
+"""`vidtrack export`: the tracks of a finished run in the formats of other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from vidtrack.cli.options import Options, common, receives, start_log
+from vidtrack.output.export.registry import FORMATS
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions(Options):
+    """What `vidtrack export` is told."""
+
+    run: Path
+    form: str
+    site: Path | None
+
+
+_HELP = f"""Write the tracks of the folder RUN, made with `vidtrack track --site`, in a format of other programs.
+
+Rows outside the calibrated part of the picture have no position and are left out.
+
+\b
+{chr(10).join(f"{name:10}  {form.writes}" for name, form in FORMATS.items())}
+"""
+
+
+@click.command(
+    name="export",
+    help=_HELP,
+    short_help="Tracks in metres for other programs.",
+    epilog="""\b
+Examples:
+  vidtrack export runs/motorway --as geojson
+  vidtrack export runs/motorway --as sumo -o fcd
+  vidtrack export runs/motorway --as ssam --site site.toml""",
+)
+@click.argument("run", type=click.Path(path_type=Path))
+@common("Folder to write.  [default: runs/RUN-FORMAT]")
+@click.option("--as", "form", type=click.Choice(list(FORMATS)), required=True, help="The format.")
+@click.option("--site", type=click.Path(path_type=Path), metavar="SITE.toml", help="[default: the site of the run]")
+@receives(ExportOptions)
+def command(options: ExportOptions) -> None:
+    """Export a run."""
+    from contextlib import suppress
+
+    from vidtrack.errors import Error
+    from vidtrack.output.export.registry import export
+    from vidtrack.output.export.road_run import open_road_run
+    from vidtrack.output.folder import open_folder
+
+    start_log(options.verbose, options.quiet)
+    run = open_road_run(options.run, options.site)
+    folder = open_folder(options.output, f"{options.run.resolve().name}-{options.form}", options.force)
+    try:
+        export(run, options.form, folder)
+    except Error:
+        with suppress(OSError):
+            folder.rmdir()  # if nothing else is in it
+        raise
+    if not options.quiet:
+        tracks = f"{len(run.vehicles.track)} track{'s' if len(run.vehicles.track) > 1 else ''}"
+        positions = f"{run.positions} of {run.rows} rows have a position in metres"
+        click.echo(f"site {run.site.camera.name}; {tracks}; {positions}", err=True)
+    click.echo(folder)

@@ -1,0 +1,77 @@
+"""`vidtrack measure`: traffic figures from finished runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from vidtrack.cli.json_file import json_option
+from vidtrack.cli.options import Options, common, receives, start_log
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureOptions(Options):
+    """What `vidtrack measure` is told."""
+
+    runs: tuple[str, ...]
+    site: Path
+    json_to: str | None
+
+
+@click.command(
+    name="measure",
+    short_help="Traffic figures of a site from finished runs.",
+    epilog="""\b
+Examples:
+  vidtrack measure runs/traffic --site site.toml
+  vidtrack measure hour-07 hour-08 hour-09 --site site.toml -o monday
+  vidtrack measure cam1@2026-06-01T07:00:00+02:00 --site site.toml --json -""",
+)
+@click.argument("runs", metavar="RUN...", nargs=-1, required=True)
+@click.option(
+    "--site", required=True, type=click.Path(path_type=Path), metavar="SITE.toml", help="Gates and calibration."
+)
+@common("Folder for the tables.  [default: runs/SITE]")
+@json_option
+@receives(MeasureOptions)
+def command(options: MeasureOptions) -> None:
+    """Crossings, trips, intervals, stays, queues and checks from finished runs, without tracking again.
+
+    All RUNs are of one site and one day: files of hours, or a live run with its parts. RUN@TIME gives the time of a
+    run's first picture; without it a live run knows its own, and a file goes on where the one before it ended.
+    """
+    from vidtrack.cli.json_file import write_json
+    from vidtrack.output.figures import write_figures
+    from vidtrack.output.folder import open_folder, replacing
+    from vidtrack.recording.retention import parts_of
+    from vidtrack.traffic.measures.measure import measured
+    from vidtrack.traffic.site import read_site
+
+    start_log(options.verbose, options.quiet)
+    site = read_site(options.site)
+    runs = [part for run in options.runs for part in ([str(part) for part in parts_of(Path(run))] or [run])]
+    found = measured(runs, site)
+    folder = open_folder(options.output, options.site.stem, options.force)
+    write_figures(folder, found.tables, found.report)
+    with replacing(folder / "site.toml") as new:  # the report draws its gates
+        new.write_bytes(options.site.read_bytes())
+    if options.json_to is not None:
+        write_json(found.report, options.json_to)
+    if not options.quiet:
+        click.echo(_told(found.report), err=True)
+    if options.json_to != "-":
+        click.echo(folder)
+
+
+def _told(report: dict[str, Any]) -> str:
+    """One line: what was found."""
+    wrong = sum(movement["trips"] for movement in report["impossible_movements"])
+    return (
+        f"vidtrack: watched {report['watched_s']:.0f} s: {report['crossings']} crossings, "
+        f"{report['complete_trips']} whole trips of {report['trips']}, {report['joins']} broken tracks joined; "
+        f"{wrong} trips over impossible movements, {report['appeared']} vehicles appeared between the gates, "
+        f"{report['vanished']} vanished"
+    )

@@ -1,0 +1,52 @@
+"""`vidtrack report`: what was measured at a site, as one hands it out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from vidtrack.cli.options import Options, common, receives, start_log
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportOptions(Options):
+    """What `vidtrack report` is told."""
+
+    measures: Path
+    picture: str | None
+
+
+@click.command(
+    name="report",
+    short_help="A site's report as a page, pictures and spreadsheets.",
+    epilog="""\b
+Examples:
+  vidtrack report runs/site
+  vidtrack report monday -o monday-report --picture traffic.mp4
+  vidtrack report monday --picture empty-road.png""",
+)
+@click.argument("measures", type=click.Path(path_type=Path))
+@common("Folder for the report.  [default: runs/MEASURES-report]")
+@click.option("--picture", metavar="IMAGE|VIDEO", help="Draw the arrows over this, or over its first picture.")
+@receives(ReportOptions)
+def command(options: ReportOptions) -> None:
+    """Turning movements, peak hour, speeds, queues and checks of MEASURES, a folder that `vidtrack measure` wrote.
+
+    Writes report.html, one file that needs nothing else, and its pictures and tables as PNG and CSV.
+    """
+    from vidtrack.cli.calibrate import first_picture
+    from vidtrack.output.folder import open_folder, refuse_overwriting
+    from vidtrack.output.report.report import write_report
+    from vidtrack.traffic.report.findings import read_findings
+
+    start_log(options.verbose, options.quiet)
+    found = read_findings(options.measures)
+    refuse_overwriting(options.measures, options.output)
+    scene = None if options.picture is None else first_picture(options.picture)
+    if scene is not None:
+        found.site.scaled(scene.shape[1], scene.shape[0])  # refuses a picture of another shape
+    folder = open_folder(options.output, f"{options.measures.resolve().name}-report", options.force)
+    write_report(folder, found, scene)
+    click.echo(folder)

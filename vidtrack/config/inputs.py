@@ -1,0 +1,104 @@
+"""The settings that have an effect on each kind of input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from typing import Any
+
+
+class Input(StrEnum):
+    """Kinds of input; the values are their names in messages."""
+
+    VIDEO = "a video"
+    CAMERA = "a camera"
+    DETECTIONS = "stored detections"
+    RADAR = "radar plots"
+
+
+_OWN = {
+    Input.VIDEO: ("detector", "blobs"),
+    Input.CAMERA: ("detector", "blobs", "live"),
+    Input.DETECTIONS: ("detections",),
+    Input.RADAR: ("radar",),
+}
+"""Groups for one kind of input only; `source`, `tracker` and `output` are common."""
+
+_OF_PICTURES = (
+    *("tracker.box_s", "tracker.confirm_s", "tracker.confirm_travel", "tracker.detection_probability"),
+    *("tracker.idle_s", "tracker.idle_travel", "tracker.restless"),
+    *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s"),
+    *("source.scale", "source.mask", "output.video_crf", "output.jpeg_quality"),
+)
+_UNREAD = {
+    Input.VIDEO: ("detections", "radar", "live", "tracker.redundant"),
+    Input.CAMERA: ("detections", "radar", "tracker.redundant"),
+    Input.DETECTIONS: (
+        *("detector", "blobs", "radar", "live"),
+        *_OF_PICTURES,
+        *("tracker.confirm_hits", "tracker.confirm_window"),
+    ),
+    Input.RADAR: (
+        *("detector", "blobs", "detections", "live", "source"),
+        *_OF_PICTURES,
+        *("tracker.accel", "tracker.cross", "tracker.hold_s", "tracker.speed"),
+        *("tracker.life", "tracker.coast_s", "tracker.clutter_density", "tracker.euclidean_radius_px"),
+        *("output.lines", "output.site", "output.link", "output.link_s", "output.trail_s", "output.rerun_picture_s"),
+    ),
+}
+"""Groups and settings without effect on an input."""
+
+_NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
+    "detector.disturbance": ("detector.kind", ("disturbance",)),
+    "detector.disturbance.chroma_threshold": ("detector.disturbance.chroma", (True,)),
+    "detector.disturbance.amid": ("detector.disturbance.shadow", (True,)),
+    "detector.disturbance.guard_px": ("detector.disturbance.selective", (True,)),
+    "detector.disturbance.ghost_s": ("detector.disturbance.ghosts", (True,)),
+    "detector.disturbance.still_s": ("detector.disturbance.registration", (True,)),
+    "detector.paper": ("detector.kind", ("paper",)),
+    "tracker.n_scan": ("tracker.method", ("split", "mht")),
+    "tracker.euclidean_radius_px": ("tracker.distance", ("euclidean",)),
+    "tracker.confirm_hits": ("tracker.life", ("m-of-n",)),
+    "tracker.confirm_window": ("tracker.life", ("m-of-n",)),
+    "tracker.idle_s": ("tracker.life", ("m-of-n",)),
+    "tracker.false_track": ("tracker.life", ("llr",)),
+    "tracker.missed_track": ("tracker.life", ("llr",)),
+    "tracker.blob_overlap": ("tracker.merged_blobs", (True,)),
+    "tracker.group_cover": ("tracker.merged_blobs", (True,)),
+    "tracker.hidden_s": ("tracker.merged_blobs", (True,)),
+    "detections.confirm_hits": ("tracker.life", ("m-of-n",)),
+    "detections.confirm_window": ("tracker.life", ("m-of-n",)),
+    "radar.euclidean_radius_m": ("tracker.distance", ("euclidean",)),
+    "radar.particles": ("radar.estimator", ("particle",)),
+    "radar.resampling": ("radar.estimator", ("particle",)),
+    "radar.glint": ("radar.estimator", ("particle",)),
+    "radar.quiet_accel": ("radar.estimator", ("imm",)),
+    "radar.quiet_s": ("radar.estimator", ("imm",)),
+    "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
+    "output.smooth_lag_s": ("output.smooth", (True,)),
+}
+"""Groups and settings that have an effect only if another setting has one of these values."""
+_OTHER_LIFE = {Input.RADAR: "radar.life"}
+
+
+def reads(kind: Input, name: str) -> bool:
+    """Whether the setting has an effect on this kind of input."""
+    return not any(_is_within(name, unread) for unread in _UNREAD[kind])
+
+
+def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Settings on which the effect of this one depends, each with its required values."""
+    if name == "output.link_s":  # stored detections are linked by default
+        yield "output.link", (True, None) if kind is Input.DETECTIONS else (True,)
+    for part, (other, values) in _NEEDS.items():
+        if _is_within(name, part):
+            yield _OTHER_LIFE.get(kind, other) if other == "tracker.life" else other, values
+
+
+def is_own(kind: Input, name: str) -> bool:
+    """Whether the setting is in a group for this kind of input only."""
+    return any(_is_within(name, group) for group in _OWN[kind])
+
+
+def _is_within(name: str, group: str) -> bool:
+    return name == group or name.startswith(f"{group}.")

@@ -1,0 +1,159 @@
+"""Reads settings from defaults, then a TOML file, then `--set a.b=value`.
+
+The error for a wrong key or value contains the nearest name or the allowed range.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from vidtrack.config.group import read_toml
+from vidtrack.config.inputs import Input, is_own, needs, reads
+from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError
+
+
+def load(
+    path: str | Path | None = None,
+    assignments: Iterable[str | tuple[str, Any]] = (),
+    base: Mapping[str, Any] | None = None,
+    kind: Input | None = None,
+) -> Settings:
+    """Settings from defaults, a TOML file and assignments ("a.b=value" or (name, value)); later ones take precedence.
+
+    base  nested settings between the defaults and the file
+    kind  of the input: settings without effect on it are refused; None: unknown, nothing is refused
+
+    A file may contain groups for other kinds of input, and settings at their defaults.
+    Raises ConfigError for an unreadable file, an unknown key, a bad value, or a setting without effect.
+    """
+    filed = {} if path is None else read_toml(Path(path), "settings")
+    assigned = [_split(one) if isinstance(one, str) else one for one in assignments]
+    tree = merged(base or {}, filed)
+    if kind is not None and filed:
+        alone, usual = parse(tree), Settings()
+        own = (name for name in _leaves(filed) if is_own(kind, name))
+        _refuse_idle(kind, alone, [name for name in own if value_of(alone, name) != value_of(usual, name)])
+    for name, value in assigned:
+        _assign(tree, name.split("."), value)
+    settings = parse(tree)
+    if kind is not None:
+        _refuse_idle(kind, settings, [name for name, _ in assigned])
+    return settings
+
+
+def parse(tree: Mapping[str, Any]) -> Settings:
+    """Settings from nested mappings. Raises ConfigError for an unknown key or a bad value."""
+    try:
+        return Settings.model_validate(tree)
+    except ValidationError as error:
+        raise ConfigError("\n".join(_complaint(detail) for detail in error.errors())) from None
+
+
+def merged(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested settings: `base` overridden by `tree`."""
+    both = dict(base) | dict(tree)
+    groups = (name for name in tree if isinstance(base.get(name), dict) and isinstance(tree[name], dict))
+    return both | {name: merged(base[name], tree[name]) for name in groups}
+
+
+def value_of(settings: BaseModel, name: str) -> Any:
+    """The value of a setting by its dotted name."""
+    value: Any = settings
+    for part in name.split("."):
+        value = getattr(value, part)
+    return value
+
+
+def _refuse_idle(kind: Input, settings: Settings, asked: Iterable[str]) -> None:
+    """Raise ConfigError for given settings that have no effect on this kind of input."""
+    complaints = []
+    for name in asked:
+        missing = [(other, values) for other, values in needs(kind, name) if value_of(settings, other) not in values]
+        if not reads(kind, name):
+            near = _nearest(name, (other for other in _leaves(Settings().model_dump()) if reads(kind, other)))
+            complaints.append(f"setting {name} has no effect on {kind}{near}")
+        elif missing:
+            other, values = missing[0]
+            wanted = " or ".join(_as_written(value) for value in values)
+            now = _as_written(value_of(settings, other))
+            complaints.append(f"setting {name} has no effect with {other}={now}; it needs {other}={wanted}")
+    if complaints:
+        raise ConfigError("\n".join(complaints))
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """The name to suggest: the same name in another group, or a similar name."""
+    of_last: dict[str, str] = {}
+    for other in known:
+        of_last.setdefault(other.rpartition(".")[2], other)
+    near = difflib.get_close_matches(name.rpartition(".")[2], of_last, n=1, cutoff=0.7)
+    return f"; the nearest that has is {of_last[near[0]]}" if near else "; see vidtrack config --explain"
+
+
+def _as_written(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterable[str]:
+    """Dotted names of the values in nested settings."""
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name
+
+
+def _split(assignment: str) -> tuple[str, Any]:
+    name, equals, text = assignment.partition("=")
+    if not equals or not name.strip():
+        raise ConfigError(f"--set {assignment!r}: write it as group.name=value")
+    return name.strip(), _value(text.strip())
+
+
+def _value(text: str) -> Any:
+    """A TOML value, else the text itself: `--set tracker.method=nn` needs no quotes."""
+    if text.lower() in ("none", "null"):
+        return None
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _assign(tree: dict[str, Any], keys: list[str], value: Any) -> None:
+    for key in keys[:-1]:
+        below = tree.setdefault(key, {})
+        if not isinstance(below, dict):
+            raise ConfigError(f"setting {'.'.join(keys)}: {key} is a value, not a group")
+        tree = below
+    tree[keys[-1]] = value
+
+
+def _complaint(detail: Any) -> str:
+    """One line per error: the setting, its value, and the allowed values."""
+    path = [str(part) for part in detail["loc"]]
+    name = ".".join(path)
+    if detail["type"] == "extra_forbidden":
+        near = difflib.get_close_matches(name, list(names()), n=1, cutoff=0.4)
+        hint = f"; did you mean {near[0]}?" if near else "; see vidtrack config --explain"
+        return f"unknown setting {name}{hint}"
+    if detail["type"] == "model_type":
+        return f"setting {name} = {detail['input']!r}: this is a group; give one of its settings, {name}.NAME"
+    message = detail["msg"].removeprefix("Value error, ")
+    return f"setting {name} = {detail['input']!r}: {message[0].lower()}{message[1:]}"
+
+
+def names(group: type[BaseModel] = Settings, prefix: str = "") -> Iterable[str]:
+    """Dotted names of all settings and groups."""
+    for name, info in group.model_fields.items():
+        yield prefix + name
+        kind = info.annotation
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            yield from names(kind, f"{prefix}{name}.")

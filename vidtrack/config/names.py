@@ -1,0 +1,13 @@
+"""Names of the available methods, filters and detectors, for settings, command line and factories."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Detector = Literal["disturbance", "paper", "mog2", "knn"]
+Method = Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"]
+Distance = Literal["mahalanobis", "decoupled", "euclidean"]
+Life = Literal["m-of-n", "llr"]
+Estimator = Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"]
+Model = Literal["cv", "ca", "singer", "ct"]
+Resampling = Literal["none", "multinomial", "residual", "stratified", "systematic", "error-signal"]

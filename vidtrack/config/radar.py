@@ -1,0 +1,61 @@
+"""Settings of radar runs."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from vidtrack.config.group import Group
+from vidtrack.config.names import Estimator, Life, Model, Resampling
+
+
+class RadarSettings(Group):
+    """Radar plots: metres, seconds, degrees; x east, y north, z up, azimuth clockwise from north."""
+
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """m; x, y, z of the radar, the origin of range and azimuth"""
+    sigma_range_m: float = Field(50.0, gt=0)
+    """m; standard deviation of a range where the file has no column sigma_range_m"""
+    sigma_azimuth_deg: float = Field(0.3, gt=0, le=45)
+    """degrees; the same of an azimuth"""
+    sigma_elevation_deg: float = Field(0.3, gt=0, le=45)
+    """degrees; the same of an elevation"""
+    sigma_position_m: float = Field(50.0, gt=0)
+    """m; the same of x, y and z"""
+    sigma_doppler_m_s: float = Field(2.0, gt=0)
+    """m/s; the same of a range rate"""
+    skip_bad_rows: bool = False
+    """invalid rows are left out and counted; false: they end the run"""
+    estimator: Estimator = "kalman"
+    """kalman, converted: plots become unbiased positions; ekf, ukf, particle: range and angles stay; imm: two models"""
+    model: Model = "cv"
+    """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
+    detection_probability: float | None = Field(0.9, gt=0, lt=1)
+    """probability that a scan shows a target; None: from the tracks so far"""
+    clutter_density: float | None = Field(None, gt=0)
+    """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from unassociated plots"""
+    max_speed: float = Field(400.0, gt=0)
+    """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
+    accel: float = Field(8.0, gt=0)
+    """m/s^2; standard deviation of a target's acceleration"""
+    hold_s: float = Field(4.0, gt=0)
+    """s; correlation time of the acceleration"""
+    quiet_accel: float = Field(1.0, gt=0)
+    """m/s^2; standard deviation of the acceleration in imm's quiet mode; its other mode is radar.model"""
+    quiet_s: float = Field(60.0, gt=0)
+    """s; mean time that imm's quiet mode lasts"""
+    manoeuvre_s: float = Field(15.0, gt=0)
+    """s; mean time that imm's other mode lasts"""
+    particles: int = Field(2000, ge=2)
+    """samples of each track in the particle filter"""
+    resampling: Resampling = "systematic"
+    """how particles are resampled; none: never; error-signal: near the plot (paper 003)"""
+    glint: float = Field(0.0, ge=0, lt=1)
+    """share of a plot's errors that are five times as large, for the particle filter"""
+    euclidean_radius_m: float = Field(2000.0, gt=0)
+    """m; gate of the euclidean distance"""
+    life: Life = "llr"
+    """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
+    coast_scans: int = Field(5, ge=1, le=62)
+    """a track ends after this many scans without a plot"""
+    trail_s: float = Field(60.0, ge=0)
+    """s; length of a target's trail in rerun"""

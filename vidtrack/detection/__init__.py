@@ -1,1 +1,0 @@
-"""When a radar says "there is something": amplitude densities, CFAR, information reduction, optimal thresholds."""

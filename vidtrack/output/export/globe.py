@@ -1,0 +1,49 @@
+"""From a site's metres to longitude and latitude."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats
+from vidtrack.errors import ConfigError
+from vidtrack.traffic.site import Site
+
+if TYPE_CHECKING:
+    import pyproj
+
+
+def system_of(site: Site) -> pyproj.CRS | None:
+    """The coordinate system of the site's metres; None where they have no place on the map. Raises ConfigError."""
+    import pyproj
+
+    calibration = site.calibration
+    if calibration is None or calibration.epsg is None or not calibration.picture:
+        return None
+    try:
+        return pyproj.CRS.from_epsg(calibration.epsg)
+    except pyproj.exceptions.CRSError:
+        raise ConfigError(f"calibration.epsg = {calibration.epsg}: no such coordinate system") from None
+
+
+def to_globe(site: Site, name: str) -> Callable[[Floats], Floats]:
+    """A function from metres (N, 2) to longitudes and latitudes (N, 2), in degrees of WGS84.
+
+    name  of the format that needs it, for the message. Raises ConfigError for a site that is not on the map.
+    """
+    import pyproj
+
+    system = system_of(site)
+    if system is None:
+        raise ConfigError(
+            f"{name} needs places on the globe, and the calibration of the site {site.camera.name} has none: give it "
+            "ground points in a metric coordinate system with its number, for example epsg = 25832"
+        )
+    transformer = pyproj.Transformer.from_crs(system, 4326, always_xy=True)
+
+    def degrees(xy: Floats) -> Floats:
+        return np.column_stack(transformer.transform(xy[:, 0], xy[:, 1]))
+
+    return degrees

@@ -1,0 +1,267 @@
+"""The positions of a finished run on the road, a batch at a time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.errors import ConfigError, FormatError, SourceError
+from vidtrack.traffic.site import Site, read_site
+
+_BATCH = 1 << 16
+"""Rows in memory at a time."""
+_NEEDED = ("frame", "time_s", "track_id", "status", "x_m", "y_m", "speed_kmh", "heading_deg", "length_m", "width_m")
+UNKNOWN = "unknown"
+"""Class of a vehicle whose length is in none of the site's classes, or not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """N positions in order of frame.
+
+    frame, track   (N,)
+    time           (N,) s since the video's first picture
+    xy             (N, 2) m, middles of the footprints
+    speed          (N,) m/s
+    heading        (N,) rad, clockwise from north; NaN before the vehicle has moved
+    length, width  (N,) m; NaN without a heading
+    """
+
+    frame: Ints
+    track: Ints
+    time: Floats
+    xy: Floats
+    speed: Floats
+    heading: Floats
+    length: Floats
+    width: Floats
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def select(self, rows: Ints | Mask | slice) -> Rows:
+        """The given rows."""
+        return Rows(*(getattr(self, name)[rows] for name in self.__slots__))
+
+    @classmethod
+    def of(cls, table: pa.Table) -> Rows:
+        """The rows of a table with the columns of tracks.parquet."""
+        value = {name: table[name].to_numpy() for name in table.column_names}
+        return cls(
+            frame=value["frame"],
+            track=value["track_id"],
+            time=value["time_s"],
+            xy=np.column_stack([value["x_m"], value["y_m"]]),
+            speed=value["speed_kmh"] / 3.6,
+            heading=np.radians(value["heading_deg"]),
+            length=value["length_m"],
+            width=value["width_m"],
+        )
+
+    @property
+    def ahead(self) -> Floats:
+        """(N, 2) unit vectors along the vehicles."""
+        return np.column_stack([np.sin(self.heading), np.cos(self.heading)])
+
+    @property
+    def front(self) -> Floats:
+        """(N, 2) m, the middles of the front bumpers."""
+        return self.xy + self.length[:, None] / 2 * self.ahead
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicles:
+    """The T tracks of a run that have positions, in order of their numbers.
+
+    track    (T,)
+    until    (T,) the last frame in which the track was seen; what follows is a guess that nothing confirmed
+    length   (T,) m, mean over the track, weighted by the inverse variances; NaN where it is not known
+    kind     (T,) class by the length, from the site's classes
+    """
+
+    track: Ints
+    until: Ints
+    length: Floats
+    kind: np.ndarray
+
+    def row(self, track: Ints) -> Ints:
+        """(N,) where tracks (N,) are in these arrays."""
+        return np.searchsorted(self.track, track)
+
+
+@dataclass(frozen=True, slots=True)
+class RoadRun:
+    """A finished run of a video at a calibrated site.
+
+    fps         frames/s of the source; None where it says nothing
+    corner      (2,) m; west and south of all positions
+    extent      (2,) m; of all positions, to the east and to the north
+    rows, positions   in the table of tracks, and those of them with a position
+    """
+
+    folder: Path
+    site: Site
+    fps: float | None
+    vehicles: Vehicles
+    corner: Floats
+    extent: Floats
+    rows: int
+    positions: int
+
+    @property
+    def start(self) -> datetime | None:
+        """Time of the video's first picture, in UTC."""
+        start = self.site.camera.start
+        return None if start is None else start.astimezone(UTC)
+
+    def tables(self) -> Iterator[pa.Table]:
+        """All columns of the rows that are exported, in order of frame.
+
+        Rows without a position are left out, and those after a track was last seen.
+        """
+        last = -1
+        for table in _batches(self.folder):
+            frame = table["frame"].to_numpy()
+            if len(frame) and (frame[0] < last or (np.diff(frame) < 0).any()):
+                raise FormatError(f"{self.folder / 'tracks.parquet'} is damaged: its rows are not in order of frame")
+            last = frame[-1] if len(frame) else last
+            yield table.filter(pa.array(self._kept(table)))
+
+    def batches(self) -> Iterator[Rows]:
+        """What `tables` yields, as arrays."""
+        return (Rows.of(table.select(_NEEDED)) for table in self.tables() if len(table))
+
+    def _kept(self, table: pa.Table) -> Mask:
+        known = _known(table)
+        track, frame = table["track_id"].to_numpy(), table["frame"].to_numpy()
+        known[known] = frame[known] <= self.vehicles.until[self.vehicles.row(track[known])]
+        return known
+
+
+def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
+    """A run folder whose tracks have metres.
+
+    site  its site.toml; None: where the run found it
+
+    Raises ConfigError for a run without metres or a site that is not there, FormatError for a folder that is no
+    finished run, and SourceError where no vehicle was inside the calibration.
+    """
+    summary = _summary(folder)
+    _check_columns(folder)
+    drawn = read_site(_site_of(summary, folder) if site is None else site)
+    look = _FirstLook()
+    for table in _batches(folder, (*_NEEDED[2:6], "frame", "length_m", "length_sigma_m")):
+        look.add(table)
+    if not look.positions:
+        raise SourceError(
+            f"{folder} has no positions in metres: no vehicle was found inside the points of the site's calibration"
+        )
+    vehicles = look.vehicles(drawn)
+    return RoadRun(
+        folder, drawn, summary.get("fps"), vehicles, look.low, look.high - look.low, look.rows, look.positions
+    )
+
+
+class _FirstLook:
+    """What must be known of a run before its first row is written; holds a few numbers a track."""
+
+    def __init__(self) -> None:
+        self.rows = self.positions = 0
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+        self._parts: list[Floats] = []
+
+    def add(self, table: pa.Table) -> None:
+        """Take a batch."""
+        self.rows += len(table)
+        table = table.filter(pa.array(_known(table)))
+        self.positions += len(table)
+        if not len(table):
+            return
+        track, index = np.unique(table["track_id"].to_numpy(), return_inverse=True)
+        xy = np.column_stack([table["x_m"].to_numpy(), table["y_m"].to_numpy()])
+        self.low, self.high = np.minimum(self.low, xy.min(axis=0)), np.maximum(self.high, xy.max(axis=0))
+        seen = table["status"].to_numpy(zero_copy_only=False) != "coasting"
+        until = np.full(len(track), -1)
+        np.maximum.at(until, index[seen], table["frame"].to_numpy()[seen])
+        length, sigma = table["length_m"].to_numpy(), table["length_sigma_m"].to_numpy()
+        weight = np.where(np.isfinite(length), 1 / sigma**2, 0.0)
+        sums = [np.bincount(index, values, len(track)) for values in (weight * np.nan_to_num(length), weight)]
+        self._parts.append(np.column_stack([track, until, *sums]))
+
+    def vehicles(self, site: Site) -> Vehicles:
+        """Those of all batches."""
+        parts = np.concatenate(self._parts)
+        track, index = np.unique(parts[:, 0].astype(np.int64), return_inverse=True)
+        until = np.full(len(track), -1)
+        np.maximum.at(until, index, parts[:, 1].astype(np.int64))
+        lengths, weights = (np.bincount(index, parts[:, k]) for k in (2, 3))
+        length = np.divide(lengths, weights, out=np.full(len(track), np.nan), where=weights > 0)
+        return Vehicles(track, until, length, _kinds(site, length))
+
+
+def _kinds(site: Site, length: Floats) -> np.ndarray:
+    """(T,) the class of each length."""
+    fits = [(low <= length) & (length < high) for low, high in site.classes.values()]
+    return np.select(fits, list(site.classes), UNKNOWN) if fits else np.full(len(length), UNKNOWN)
+
+
+def _known(table: pa.Table) -> Mask:
+    """(N,) the rows that have a position."""
+    return np.isfinite(table["x_m"].to_numpy() + table["y_m"].to_numpy())
+
+
+def _batches(folder: Path, columns: tuple[str, ...] | None = None) -> Iterator[pa.Table]:
+    path = folder / "tracks.parquet"
+    try:
+        with pq.ParquetFile(path) as file:
+            for batch in file.iter_batches(_BATCH, columns=columns):
+                yield pa.Table.from_batches([batch])
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    path = folder / "summary.json"
+    try:
+        summary: dict[str, Any] = json.loads(path.read_text())
+        if not isinstance(summary["settings"]["output"], dict):
+            raise TypeError("settings.output is no table")
+    except (FileNotFoundError, NotADirectoryError):
+        raise FormatError(
+            f"{folder} is not a run: it has no summary.json; of a live run give one of its parts"
+        ) from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise FormatError(f"{path} is damaged ({error}); vidtrack repair {folder} may help") from None
+    return summary
+
+
+def _check_columns(folder: Path) -> None:
+    path = folder / "tracks.parquet"
+    if not path.is_file():
+        raise FormatError(f"{folder} has no tracks.parquet; vidtrack repair {folder} makes it from tracks.csv")
+    try:
+        names = set(pq.read_schema(path).names)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
+    if not set(_NEEDED) <= names:
+        what = "is a run of radar plots" if "scan" in names else "has no positions in metres"
+        raise ConfigError(f"{folder} {what}; only runs of vidtrack track --site with a [calibration] can be exported")
+
+
+def _site_of(summary: dict[str, Any], folder: Path) -> Path:
+    """The site that the run was given. Raises ConfigError where it is not there any more."""
+    named = summary["settings"]["output"].get("site")
+    if named is None or not Path(named).is_file():
+        raise ConfigError(
+            f"the site of {folder}, {named}, is not there from this folder; give it with --site SITE.toml"
+        )
+    return Path(named)

@@ -1,0 +1,1 @@
+"""The report of a site as a page, pictures and spreadsheets."""

@@ -1,0 +1,1 @@
+"""Recordings of the tracker's inputs and decisions for the rerun viewer."""

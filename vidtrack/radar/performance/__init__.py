@@ -1,0 +1,1 @@
+"""Performance prediction for a radar tracker: theory and Monte Carlo runs."""

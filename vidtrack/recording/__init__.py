@@ -1,0 +1,1 @@
+"""Recordings of live cameras: writing them during the run, reading them as a source, deleting them by age and size."""

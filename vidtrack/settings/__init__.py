@@ -1,1 +1,0 @@
-"""Groups of settings that `vidtrack.config` puts together."""

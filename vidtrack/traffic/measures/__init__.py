@@ -1,0 +1,1 @@
+"""Traffic figures of a site, from the tables of finished runs."""

@@ -1,0 +1,92 @@
+"""The gates of a site where vehicles are: on the road with a calibration, else in the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.errors import ConfigError
+from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.lines import Line
+from vidtrack.traffic.polyline import turn
+from vidtrack.traffic.site import Gate, Site
+
+_LENS_STEPS = 8
+"""Pieces of a gate's segment on the road where a lens bends it"""
+_NEAR_PX = 0.5
+"""px; beside the middle of a gate, to see which side of it lies where on the road"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Gates:
+    """G gates of S segments in all.
+
+    names, legs, roles   (G,)
+    segment    (S, 4) x1, y1, x2, y2 in metres or pixels
+    begin      (S,) distance of the segment's first end along its gate, in the same unit
+    first      (G + 1,) segment at which each gate begins
+    directions (G,) names of passing to the side of a gate where `polyline.turn` is negative, and to the other one
+    """
+
+    names: tuple[str, ...]
+    legs: tuple[str, ...]
+    roles: tuple[str, ...]
+    segment: Floats
+    begin: Floats
+    first: Ints
+    directions: tuple[tuple[str, str], ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def role(self, *wanted: str) -> Mask:
+        """(G,) whether a gate has one of these roles."""
+        return np.isin(np.array(self.roles, dtype=str), wanted)
+
+
+def gates_of(site: Site, ground: Ground | None) -> Gates:
+    """Raises ConfigError for a site without gates, and for a gate that is not on the road's plane."""
+    if not site.gates:
+        raise ConfigError(f"the site {site.camera.name} has no gates; draw at least one: [gates.NAME] with a line")
+    lines = {name: _on_road(name, gate, ground) for name, gate in site.gates.items()}
+    pieces = [np.column_stack([line[:-1], line[1:]]) for line in lines.values()]
+    lengths = [np.hypot(*(piece[:, 2:] - piece[:, :2]).T) for piece in pieces]
+    return Gates(
+        tuple(lines),
+        tuple(gate.leg or name for name, gate in site.gates.items()),
+        tuple(gate.role for gate in site.gates.values()),
+        np.concatenate(pieces),
+        np.concatenate([np.cumsum(length) - length for length in lengths]),
+        np.cumsum([0, *map(len, pieces)]),
+        tuple(_directions(name, gate, ground) for name, gate in site.gates.items()),
+    )
+
+
+def _on_road(name: str, gate: Gate, ground: Ground | None) -> Floats:
+    """(N, 2) the corners of a gate where vehicles are."""
+    line = np.array(gate.line)
+    if ground is None:
+        return line
+    if ground.lens is not None:
+        steps = np.arange(_LENS_STEPS) / _LENS_STEPS
+        inner = line[:-1, None] + steps[:, None] * np.diff(line, axis=0)[:, None]
+        line = np.vstack([inner.reshape(-1, 2), line[-1]])
+    with np.errstate(invalid="ignore"):
+        road = ground.metres(line)
+    if not np.isfinite(road).all():
+        raise ConfigError(f"the gate {name} reaches above the horizon of the calibration; draw it on the road")
+    return road
+
+
+def _directions(name: str, gate: Gate, ground: Ground | None) -> tuple[str, str]:
+    """Names of passing to the negative side and to the positive one: the way in the picture."""
+    (x1, y1), (x2, y2) = gate.line[0], gate.line[-1]
+    against, along = Line(name, x1, y1, x2, y2).directions
+    ends = np.array([[x1, y1], [x2, y2]])
+    normal = np.array([-(y2 - y1), x2 - x1]) / np.hypot(x2 - x1, y2 - y1)
+    points = np.vstack([ends, ends.mean(axis=0) + _NEAR_PX * normal])
+    if ground is not None:
+        points = ground.metres(points)
+    return (against, along) if turn(*points) > 0 else (along, against)

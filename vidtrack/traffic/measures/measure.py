@@ -1,0 +1,313 @@
+"""From finished runs at a site to its traffic figures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from vidtrack.errors import ConfigError
+from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.measures.checks import balance, movements
+from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
+from vidtrack.traffic.measures.gates import Gates, gates_of
+from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
+from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.lives import Lives, class_of
+from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.queues import queues_of
+from vidtrack.traffic.measures.rows import Reader
+from vidtrack.traffic.measures.runs import Day, open_day
+from vidtrack.traffic.measures.staying import Staying, outlines_of
+from vidtrack.traffic.measures.tables import stamps, table
+from vidtrack.traffic.measures.trips import at_edge, trips_of
+from vidtrack.traffic.site import Site
+
+REACH_M, REACH_PX = 10.0, 100.0
+"""How far from a gate distances are looked at: many times what positions are off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """The tables by name, and in plain data what was watched and what the checks say."""
+
+    tables: dict[str, pa.Table]
+    report: dict[str, Any]
+
+
+def measured(runs: Sequence[str], site: Site) -> Measures:
+    """The figures of all runs together, each FOLDER or FOLDER@TIME as `open_day` has it.
+
+    Raises ConfigError, SourceError or FormatError for what cannot be used.
+    """
+    day = open_day(runs, site.camera.start)
+    sizes = sorted({recording.size for recording in day.recordings})
+    if len(sizes) > 1 and site.calibration is None:
+        raise ConfigError("the runs have pictures of several sizes; give the site a calibration, or measure each alone")
+    drawn = {size: site.scaled(*size) for size in sizes}
+    grounds = {size: None if one.calibration is None else calibrated(one) for size, one in drawn.items()}
+    gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
+    reach = REACH_PX if site.calibration is None else REACH_M
+    outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
+    reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
+    staying = Staying(outlines, metres=site.calibration is not None)
+    for rows in reader:
+        for part in (passing, lives, staying):
+            part.add(rows)
+    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
+
+
+class _Figures:
+    """All figures of a day, from what is left of its tracks."""
+
+    def __init__(
+        self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives, staying: Staying
+    ) -> None:
+        self.day, self.site, self.gates, self.staying = day, site, gates, staying
+        self.metres = site.calibration is not None
+        self.spans = day.spans
+        self.session, self.track_id = reader.names
+        tracks = len(self.track_id)
+        self.head, self.tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
+        self.joins = self._joins(passed)
+        self.vehicle = self.joins.vehicles(tracks)
+        across = self._across()
+        self.probability = np.concatenate([confidence(passed), self.joins.probability[across.track]])
+        self.reason = [*reasons(passed), *(["joined"] * len(across))]
+        passed = passed.and_also(across.of(self.joins.before[across.track]))
+        order = np.argsort(passed.t, kind="stable")
+        self.passed, self.probability = passed.only(order), self.probability[order]
+        self.reason = [self.reason[k] for k in order.tolist()]
+        if not self.metres:
+            self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
+        begin = np.full(tracks, np.inf)
+        end = -begin
+        np.fmin.at(begin, self.vehicle, self.head.t)
+        np.fmax.at(end, self.vehicle, self.tail.t)
+        self.trips = trips_of(self.passed, gates, self.vehicle[self.passed.track], begin, end, self.spans)
+        zone = site.camera.start
+        self.edges = edges_of(self.spans, site.report.interval_s, day.utc, None if zone is None else zone.tzinfo)
+        self.watched = coverage(self.spans, self.edges)
+
+    def measures(self) -> Measures:
+        """The tables and the report."""
+        moved = movements(self.trips, self.passed, self.gates)
+        allowed = self.site.movements.allowed
+        impossible = {pair: count for pair, count in moved.items() if allowed and pair not in allowed}
+        tables = {
+            "crossings": self._crossings(),
+            "trips": self._trips(allowed),
+            "intervals": self._intervals(),
+            "stays": self._stays(),
+            "queues": self._queues(),
+            "checks": self._checks(),
+        }
+        report = {
+            "site": self.site.camera.name,
+            "metres": self.metres,
+            "runs": [
+                {
+                    "folder": str(one.folder),
+                    "begin_s": round(one.begin_s, 3),
+                    "end_s": round(one.end_s, 3),
+                    "run": one.session,
+                }
+                for one in self.day.recordings
+            ],
+            "utc_of_time_0": None if self.day.utc is None else self.day.utc.isoformat(),
+            "watched_s": round(float(np.diff(self.spans).sum()), 3),
+            "tracks": len(self.track_id),
+            "crossings": len(self.passed),
+            "trips": len(self.trips.vehicle),
+            "complete_trips": int(self.trips.complete.sum()),
+            "joins": len(self.joins.before),
+            "movements": [{"from": a, "to": b, "trips": count} for (a, b), count in sorted(moved.items())],
+            "impossible_movements": [
+                {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
+            ],
+            "appeared": int(self.trips.appeared.sum()),
+            "vanished": int(self.trips.vanished.sum()),
+        }
+        return Measures(tables, report)
+
+    def _joins(self, passed: Passed) -> Joins:
+        """Joins of tracks that end before an exit, and of those that begin after an entry."""
+        tracks = len(self.track_id)
+        if not self.metres:
+            return Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
+        left, entered = np.zeros((2, tracks), bool)
+        left[passed.track[self.gates.role("exit", "both")[passed.gate]]] = True
+        entered[passed.track[self.gates.role("entry", "both")[passed.gate]]] = True
+        ends = ~left & np.isfinite(self.tail.t) & ~at_edge(self.tail.t, self.spans[:, 1])
+        begins = ~entered & np.isfinite(self.head.t) & ~at_edge(self.head.t, self.spans[:, 0])
+        return joined(self.tail, self.head, self.length, ends, begins, float(np.diff(self.spans).sum()))
+
+    def _across(self) -> Passed:
+        """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
+        passing = Passing(self.gates, REACH_M)
+        passing.add(gap_rows(self.tail, self.head, self.joins))
+        return passing.passed()
+
+    def _sections(self) -> list[tuple[int, int, float]]:
+        names = self.gates.names
+        sections = self.site.sections.values()
+        return [(names.index(one.from_gate), names.index(one.to_gate), one.length_m) for one in sections]
+
+    def _crossings(self) -> pa.Table:
+        passed, metres = self.passed, self.metres
+        length = self.length[passed.track]
+        after = following(passed, length, self.spans, metres)
+        gate, direction = way_names(self.gates, passed)
+        return table(
+            {
+                "time_s": ("s", passed.t),
+                "utc": ("utc", stamps(self.day.utc, passed.t)),
+                "gate": ("", gate),
+                "direction": ("", direction),
+                "run": ("n", self.session[passed.track]),
+                "track_id": ("n", self.track_id[passed.track]),
+                "class": ("", class_of(length, self.site.classes)),
+                "length_m": ("m", length),
+                "speed_kmh": ("km/h", 3.6 * passed.speed),
+                "speed_sigma_kmh": ("km/h", 3.6 * passed.speed_sigma),
+                "speed_shared_sigma_kmh": ("km/h", 3.6 * passed.speed_shared),
+                "gap_s": ("s", after.gap),
+                "headway_s": ("s", after.headway),
+                ("along_m" if metres else "along_px"): ("m" if metres else "px", passed.along),
+                "confidence": ("1", self.probability),
+                "reason": ("", self.reason),
+            }
+        )
+
+    def _trips(self, allowed: tuple[tuple[str, str], ...]) -> pa.Table:
+        trips, gates, passed = self.trips, self.gates, self.passed
+        gate = np.append(passed.gate, len(gates))  # the last one: of no passing
+        names, legs = [*gates.names, None], [*gates.legs, None]
+        entry, exit_ = gate[trips.entry].tolist(), gate[trips.exit].tolist()
+        from_leg, to_leg = [legs[g] for g in entry], [legs[g] for g in exit_]
+        complete = trips.complete.tolist()
+        possible = [
+            (pair in allowed) if whole and allowed else None
+            for whole, pair in zip(complete, zip(from_leg, to_leg, strict=True), strict=True)
+        ]
+        count = np.bincount(self.vehicle, minlength=len(self.vehicle))[trips.vehicle]
+        sure = np.ones(len(self.vehicle))
+        np.multiply.at(sure, self.vehicle[self.joins.after], self.joins.probability)
+        length = self.length[trips.vehicle]
+        return table(
+            {
+                "run": ("n", self.session[trips.vehicle]),
+                "track_id": ("n", self.track_id[trips.vehicle]),
+                "class": ("", class_of(length, self.site.classes)),
+                "length_m": ("m", length),
+                "entry_gate": ("", [names[g] for g in entry]),
+                "exit_gate": ("", [names[g] for g in exit_]),
+                "from_leg": ("", from_leg),
+                "to_leg": ("", to_leg),
+                "begin_s": ("s", trips.from_s),
+                "end_s": ("s", trips.to_s),
+                "begin_utc": ("utc", stamps(self.day.utc, trips.from_s)),
+                "end_utc": ("utc", stamps(self.day.utc, trips.to_s)),
+                "complete": ("yes", complete),
+                "possible": ("yes", possible),
+                "reason": ("", trips.reasons()),
+                "tracks": ("n", count),
+                "join_confidence": ("1", sure[trips.vehicle]),
+            }
+        )
+
+    def _intervals(self) -> pa.Table:
+        gates, bins = self.gates, len(self.watched)
+        ways = 2 * len(gates)
+        length = self.length[self.passed.track]
+        found = figures(self.passed, self.probability, length, self.edges, self.watched, ways)
+        gate = [name for name in gates.names for _ in range(2 * bins)]
+        direction = [way for pair in gates.directions for way in pair for _ in range(bins)]
+        return table(
+            {
+                "gate": ("", gate),
+                "direction": ("", direction),
+                **self._when(ways),
+                "count": ("n", found.count.ravel()),
+                "count_low": ("n", found.low.ravel()),
+                "count_high": ("n", found.high.ravel()),
+                "flow_per_h": ("1/h", found.flow.ravel()),
+                "time_mean_speed_kmh": ("km/h", 3.6 * found.time_mean.ravel()),
+                "speed_sigma_kmh": ("km/h", 3.6 * found.own.ravel()),
+                "speed_shared_sigma_kmh": ("km/h", 3.6 * found.shared.ravel()),
+                "space_mean_speed_kmh": ("km/h", 3.6 * found.space_mean.ravel()),
+                "v85_kmh": ("km/h", 3.6 * found.v85.ravel()),
+                "occupancy": ("1", found.occupancy.ravel()),
+                "density_per_km": ("1/km", found.density.ravel()),
+            }
+        )
+
+    def _stays(self) -> pa.Table:
+        stays, names = self.staying.in_zones(self.vehicle), list(self.site.zones)
+        length = self.length[stays.vehicle]
+        return table(
+            {
+                "zone": ("", [names[zone] for zone in stays.zone.tolist()]),
+                "run": ("n", self.session[stays.vehicle]),
+                "track_id": ("n", self.track_id[stays.vehicle]),
+                "class": ("", class_of(length, self.site.classes)),
+                "begin_s": ("s", stays.begin),
+                "end_s": ("s", stays.end),
+                "begin_utc": ("utc", stamps(self.day.utc, stays.begin)),
+                "end_utc": ("utc", stamps(self.day.utc, stays.end)),
+                "stay_s": ("s", stays.end - stays.begin),
+                "standing_s": ("s", stays.stood),
+                "came": ("yes", stays.came),
+                "left": ("yes", stays.left),
+            }
+        )
+
+    def _queues(self) -> pa.Table:
+        """Queues of vehicles by the legs that their trips began on."""
+        standing, legs = self.staying.standing(self.vehicle), self.site.legs
+        number = np.array([legs.index(name) for name in self.gates.legs])
+        entered = self.trips.entry >= 0
+        leg, left_s = np.full(len(self.vehicle), -1), np.full(len(self.vehicle), -np.inf)
+        leg[self.trips.vehicle[entered]] = number[self.passed.gate[self.trips.entry[entered]]]
+        left_s[self.trips.vehicle] = self.trips.to_s
+        inside = standing.begin < left_s[standing.vehicle]
+        found = queues_of(standing, np.where(inside, leg[standing.vehicle], -1), self.length[standing.vehicle])
+        return table(
+            {
+                "leg": ("", [legs[k] for k in found.leg.tolist()]),
+                "begin_s": ("s", found.begin),
+                "end_s": ("s", found.end),
+                "begin_utc": ("utc", stamps(self.day.utc, found.begin)),
+                "end_utc": ("utc", stamps(self.day.utc, found.end)),
+                "vehicles": ("n", found.vehicles),
+                "length_m": ("m", found.length),
+            }
+        )
+
+    def _checks(self) -> pa.Table:
+        found = balance(self.trips, self.edges, self.watched)
+        return table(
+            {
+                **self._when(1),
+                "inflow": ("n", found.inflow),
+                "outflow": ("n", found.outflow),
+                "stored": ("n", found.stored),
+                "left_over": ("n", found.left_over),
+                "appeared": ("n", found.appeared),
+                "vanished": ("n", found.vanished),
+            }
+        )
+
+    def _when(self, times: int) -> dict[str, tuple[str, Any]]:
+        """Begin, end and coverage of the intervals, all of them so many times."""
+        begin, end = np.tile(self.edges[:-1], times), np.tile(self.edges[1:], times)
+        return {
+            "begin_s": ("s", begin),
+            "end_s": ("s", end),
+            "begin_utc": ("utc", stamps(self.day.utc, begin)),
+            "end_utc": ("utc", stamps(self.day.utc, end)),
+            "coverage": ("1", np.tile(self.watched, times)),
+        }

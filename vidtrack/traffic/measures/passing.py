@@ -1,0 +1,257 @@
+"""When tracks pass gates: one look at each row, in order of time, whatever the rows before it were stored in.
+
+A track passes a gate when the step between two of its positions meets the gate's line. If it then comes back before it
+was away from the gate by its margin, neither passing counts: it jitters or stands on the line. One that is last seen
+beyond the gate has passed, however near.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
+from vidtrack.traffic.measures.gates import Gates
+from vidtrack.traffic.measures.rows import Rows
+
+TIME, ALONG, SIGMA, SPEED, SPEED_SIGMA, SPEED_SHARED, BEFORE, AFTER = range(8)
+GATE, TRACK, SIDE, LAST, SEEN, SHOWN, MERGED = range(7)
+_T, _X, _Y, _SIGMA, _SPEED, _SPEED_SIGMA, _SPEED_SHARED = range(7)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passed:
+    """P passings of gates, in order of time.
+
+    t             (P,) s
+    gate, track   (P,) numbers
+    side          (P,) 1: to the side where `polyline.turn` is positive; 0: to the other one
+    along         (P,) place on the gate, from its first end, in the unit of positions
+    sigma         (P,) standard deviation of the track's position there
+    before, after (P,) largest distances from the gate that the track was seen at before and after
+    shown, merged (P,) the picture shows the track just then; it shares a blob
+    speed, speed_sigma, speed_shared   (P,) in the unit of positions per second
+    """
+
+    t: Floats
+    gate: Ints
+    track: Ints
+    side: Ints
+    along: Floats
+    sigma: Floats
+    before: Floats
+    after: Floats
+    shown: Mask
+    merged: Mask
+    speed: Floats
+    speed_sigma: Floats
+    speed_shared: Floats
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def only(self, chosen: Mask | Ints) -> Passed:
+        """The passings of a mask or of indices."""
+        return Passed(*(getattr(self, column.name)[chosen] for column in fields(self)))
+
+    def and_also(self, other: Passed) -> Passed:
+        """Both, these first."""
+        names = [column.name for column in fields(self)]
+        return Passed(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def of(self, track: Ints) -> Passed:
+        """The same passings of other tracks (P,)."""
+        return replace(self, track=track)
+
+    def with_speeds(self, speed: Floats, own: Floats, shared: Floats) -> Passed:
+        """The same passings with other speeds (P,) and standard deviations."""
+        return replace(self, speed=speed, speed_sigma=own, speed_shared=shared)
+
+
+class Passing:
+    """Takes blocks of rows in order of time; remembers each track's last position and its side of each gate.
+
+    reach  distances from a gate beyond it are taken for this, in the unit of positions
+    """
+
+    def __init__(self, gates: Gates, reach: float) -> None:
+        self._gates = gates
+        self._reach = reach
+        segment, first = gates.segment, gates.first
+        low = np.minimum(segment[:, :2], segment[:, 2:])
+        high = np.maximum(segment[:, :2], segment[:, 2:])
+        self._frame = np.column_stack(
+            [
+                np.minimum.reduceat(low, first[:-1]) - reach,
+                np.maximum.reduceat(high, first[:-1]) + reach,
+            ]
+        )
+        self._state = np.full((0, 7), np.nan)
+        self._far = np.zeros((0, len(gates)))
+        self._last = np.full((0, len(gates)), -1)
+        self._real = np.zeros((0, 8))
+        self._whole = np.zeros((0, 7), np.int64)
+        self._count = 0
+
+    def add(self, rows: Rows) -> None:
+        """Look at some rows."""
+        if len(rows) == 0:
+            return
+        tracks = int(rows.track.max()) + 1
+        if tracks > len(self._state):
+            more = max(tracks, 2 * len(self._state))
+            self._state, self._far = _longer(self._state, more, np.nan), _longer(self._far, more, 0.0)
+            self._last = _longer(self._last, more, -1)
+        speed = np.hypot(rows.v[:, 0], rows.v[:, 1])
+        values = np.column_stack([rows.t, rows.xy, rows.sigma, speed, rows.speed_sigma, rows.speed_shared])
+        row = 0
+        while row < len(rows):
+            if self._count + len(self._gates) > len(self._whole):
+                more = 2 * len(self._whole) + 64 * len(self._gates)
+                self._real, self._whole = _longer(self._real, more, 0.0), _longer(self._whole, more, 0)
+            row, self._count = _look(
+                row, self._count, values, rows.track, rows.margin, rows.seen, rows.merged,
+                self._gates.segment, self._gates.begin, self._gates.first, self._frame, self._reach,
+                self._state, self._far, self._last, self._real, self._whole,
+            )  # fmt: skip
+
+    def passed(self) -> Passed:
+        """All passings so far, each track once per gate and side. What is not seen beyond the gate does not count."""
+        real, whole = self._real[: self._count], self._whole[: self._count]
+        kept = np.flatnonzero((whole[:, GATE] >= 0) & (whole[:, SEEN] > 0))
+        kept = kept[np.lexsort((kept, real[kept, TIME]))]
+        _, first = np.unique(whole[kept][:, [TRACK, GATE, SIDE]], axis=0, return_index=True)
+        kept = kept[np.sort(first)]
+        real, whole = real[kept], whole[kept]
+        return Passed(
+            t=real[:, TIME],
+            gate=whole[:, GATE],
+            track=whole[:, TRACK],
+            side=whole[:, SIDE],
+            along=real[:, ALONG],
+            sigma=real[:, SIGMA],
+            before=real[:, BEFORE],
+            after=real[:, AFTER],
+            shown=whole[:, SHOWN] > 0,
+            merged=whole[:, MERGED] > 0,
+            speed=real[:, SPEED],
+            speed_sigma=real[:, SPEED_SIGMA],
+            speed_shared=real[:, SPEED_SHARED],
+        )
+
+
+def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:
+    """(length, ...) the values, and `fill` after them."""
+    longer = np.full((length, *values.shape[1:]), fill, values.dtype)
+    longer[: len(values)] = values
+    return longer
+
+
+@kernel
+def _look(
+    row: int, count: int, values: Floats, track: Ints, margin: Floats, seen: Mask, merged: Mask,
+    segment: Floats, begin: Floats, first: Ints, frame: Floats, reach: float,
+    state: Floats, far: Floats, last: Ints, real: Floats, whole: Ints,
+) -> tuple[int, int]:  # fmt: skip
+    """Look at rows from `row` on until all are done or the passings need more room; the next row and passing.
+
+    values  (N, 7) of rows; state (T, 7) the last ones of each track
+    frame   (G, 4) around each gate, `reach` beyond it
+    far     (T, G) largest distance from the gate since the track passed it last; last (T, G) that passing, or -1
+    real, whole   the passings: columns TIME... and GATE...
+    """
+    gates = len(first) - 1
+    for i in range(row, len(track)):
+        if count + gates > len(whole):
+            return i, count
+        x, y, k = values[i, _X], values[i, _Y], track[i]
+        if np.isnan(x):
+            continue
+        x0, y0 = state[k, _X], state[k, _Y]
+        for g in range(gates):
+            left, low, right, high = frame[g, 0], frame[g, 1], frame[g, 2], frame[g, 3]
+            side = -1
+            if not (
+                np.isnan(x0)
+                or max(x, x0) < left + reach
+                or min(x, x0) > right - reach
+                or max(y, y0) < low + reach
+                or min(y, y0) > high - reach
+            ):
+                side, share, along = _met(x0, y0, x, y, segment, begin, first[g], first[g + 1])
+            passing = last[k, g]
+            if side >= 0:
+                if passing >= 0 and far[k, g] <= margin[i] and whole[passing, SIDE] != side:
+                    whole[passing, GATE] = -1
+                    last[k, g] = whole[passing, LAST]
+                    far[k, g] = real[passing, BEFORE]
+                else:
+                    _note(real[count], values[i], state[k], share)
+                    real[count, ALONG] = along
+                    real[count, BEFORE] = far[k, g]
+                    whole[count, GATE], whole[count, TRACK], whole[count, SIDE] = g, k, side
+                    whole[count, LAST], whole[count, SEEN] = passing, 0
+                    whole[count, SHOWN], whole[count, MERGED] = seen[i], merged[i]
+                    far[k, g] = 0.0
+                    last[k, g] = count
+                    count += 1
+                passing = last[k, g]
+            if far[k, g] < reach:
+                inside = left <= x <= right and low <= y <= high
+                away = _distance(x, y, segment, first[g], first[g + 1]) if inside else reach
+                far[k, g] = max(far[k, g], min(away, reach))
+            if passing >= 0:
+                real[passing, AFTER] = far[k, g]
+                whole[passing, SEEN] |= seen[i]
+        state[k] = values[i]
+    return len(track), count
+
+
+@kernel
+def _met(
+    x0: float, y0: float, x: float, y: float, segment: Floats, begin: Floats, first: int, end: int
+) -> tuple[int, float, float]:
+    """The side that a step passes a gate to (-1: it does not pass), the share of the step until then, and the place
+    along the gate. A step that passes to and fro does not pass."""
+    net, share, along = 0, 0.0, 0.0
+    for s in range(first, end):
+        ax, ay, bx, by = segment[s, 0], segment[s, 1], segment[s, 2], segment[s, 3]
+        dx, dy = bx - ax, by - ay
+        before = dx * (y0 - ay) - dy * (x0 - ax)
+        after = dx * (y - ay) - dy * (x - ax)
+        if (before >= 0) == (after >= 0):
+            continue
+        part = before / (before - after)
+        place = ((x0 + part * (x - x0) - ax) * dx + (y0 + part * (y - y0) - ay) * dy) / (dx * dx + dy * dy)
+        if 0 <= place < 1 or (s == end - 1 and place == 1):
+            net += 1 if after >= 0 else -1
+            share, along = part, begin[s] + place * np.hypot(dx, dy)
+    return (-1 if net == 0 else int(net > 0)), share, along
+
+
+@kernel
+def _distance(x: float, y: float, segment: Floats, first: int, end: int) -> float:
+    """Distance of a point from a gate."""
+    nearest = np.inf
+    for s in range(first, end):
+        ax, ay = segment[s, 0], segment[s, 1]
+        dx, dy = segment[s, 2] - ax, segment[s, 3] - ay
+        place = min(max(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+        nearest = min(nearest, np.hypot(x - ax - place * dx, y - ay - place * dy))
+    return nearest
+
+
+@kernel
+def _note(passing: Floats, now: Floats, before: Floats, share: float) -> None:
+    """Write down the values between two rows; where one of them has none, those of the other."""
+    for value, at in ((_T, TIME), (_SIGMA, SIGMA), (_SPEED, SPEED), (_SPEED_SIGMA, SPEED_SIGMA),
+                      (_SPEED_SHARED, SPEED_SHARED)):  # fmt: skip
+        a, b = before[value], now[value]
+        if np.isnan(a):
+            passing[at] = b
+        elif np.isnan(b):
+            passing[at] = a
+        else:
+            passing[at] = a + share * (b - a)

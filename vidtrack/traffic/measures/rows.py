@@ -1,0 +1,267 @@
+"""The rows of finished runs, a block at a time: only the columns that figures need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.errors import ConfigError, FormatError
+from vidtrack.traffic.footprint import Footprints, footprint
+from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.measures.runs import Day, Recording
+
+BLOCK = 1 << 18
+"""Rows that are in memory at a time: 25 columns of 2 MB."""
+_PICTURE = ("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "width_px", "height_px")
+_ALWAYS = ("time_s", "track_id", "status")
+_ROAD = (
+    *("x_m", "y_m", "sigma_x_m", "sigma_y_m", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"),
+    *("heading_deg", "length_m", "length_sigma_m"),
+)
+_BOX = ("left_px", "top_px", "width_px", "height_px")
+_STATE = (
+    *("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "sigma_vx_px_s", "sigma_vy_px_s"),
+    *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *_BOX),
+)
+ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
+"""What is read of a run with metres."""
+_NOT_SEEN = "coasting"
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """N rows in order of time; NaN where a value is not known.
+
+    track    (N,) vehicles' numbers over the whole day, from 0
+    t        (N,) s, of the site
+    seen     (N,) the picture of that time shows the track
+    merged   (N,) it shares a blob with others
+    xy       (N, 2) where it is: the middle of the footprint in metres with a calibration, else the middle of the
+             blob in pixels
+    sigma    (N,) standard deviation of its own position error, in the unit of xy
+    margin   (N,) how far it must pass a gate by, in the unit of xy
+    v        (N, 2) its velocity, in the unit of xy per second
+    speed_sigma, speed_shared   (N,) m/s; standard deviations of the speed on the road, own and by the calibration
+    length, length_sigma   (N,) m
+    """
+
+    track: Ints
+    t: Floats
+    seen: Mask
+    merged: Mask
+    xy: Floats
+    sigma: Floats
+    margin: Floats
+    v: Floats
+    speed_sigma: Floats
+    speed_shared: Floats
+    length: Floats
+    length_sigma: Floats
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def only(self, chosen: Mask | Ints) -> Rows:
+        """The rows of a mask or of indices."""
+        return Rows(*(getattr(self, column.name)[chosen] for column in fields(self)))
+
+
+_MARGIN = 0.15
+"""Share of a vehicle's length, or of its extent in the picture, by which it must pass a gate."""
+_USUAL_M = 4.5
+"""m; of a vehicle whose length is not known, for this margin"""
+_ROUGH_M = 1.0
+"""m; standard deviation of positions without a heading, or where the border cuts the box"""
+
+
+class Reader:
+    """Reads the recordings of a day, one block after the other; numbers the tracks of all of them from 0.
+
+    grounds  by the size of the picture; None: positions stay in pixels, and there are no speeds
+    """
+
+    def __init__(self, day: Day, grounds: dict[tuple[int, int], Ground | None]) -> None:
+        self._day = day
+        self._grounds = grounds
+        self._numbers: dict[tuple[int, int], int] = {}
+
+    @property
+    def names(self) -> tuple[Ints, Ints]:
+        """(T,) session and (T,) track_id of each number."""
+        pairs = np.array(list(self._numbers), np.int64).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+    def __iter__(self) -> Iterator[Rows]:
+        roads: dict[int, Footprints] = {}
+        for recording in self._day.recordings:
+            ground = self._grounds[recording.size]
+            wanted, road = _needed(recording.folder, ground), None
+            if ground is not None and "x_m" not in wanted:
+                road = roads.setdefault(recording.session, Footprints(ground, recording.size))
+            for table in blocks(recording.folder, wanted):
+                yield self._rows(table, recording, ground, road)
+
+    def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
+        column = {name: _numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
+        track = self._numbered(table, recording.session)
+        status = table["status"].combine_chunks().dictionary_encode()
+        words = status.dictionary.to_pylist()
+        code = status.indices.to_numpy(zero_copy_only=False)
+        seen = np.array([word != _NOT_SEEN for word in words], bool)[code]
+        merged = np.array([word == "merged" for word in words], bool)[code]
+        t = column["time_s"] + recording.offset_s
+        nothing = np.full(len(t), np.nan)
+        if ground is None:
+            xy = np.column_stack([column["x_px"], column["y_px"]])
+            sigma = np.hypot(column["sigma_x_px"], column["sigma_y_px"]) / np.sqrt(2)
+            margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
+            v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
+            return Rows(track, t, seen, merged, xy, sigma, margin, v, *(nothing for _ in range(4)))
+        if road is not None:
+            column |= _stand(road, track, column)
+        xy, sigma = _positions(ground, column)
+        speed, heading = column["speed_kmh"] / 3.6, np.radians(column["heading_deg"])
+        v = speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading)])
+        length = column["length_m"]
+        margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
+        sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
+        return Rows(track, t, seen, merged, xy, sigma, margin, v, *sigmas, length, column["length_sigma_m"])
+
+    def _numbered(self, table: pa.Table, session: int) -> Ints:
+        """(N,) numbers over the whole day."""
+        ids = table["track_id"].combine_chunks().dictionary_encode()
+        known = [self._numbers.setdefault((session, one), len(self._numbers)) for one in ids.dictionary.to_pylist()]
+        return np.array(known, np.int64)[ids.indices.to_numpy(zero_copy_only=False)]
+
+
+def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
+    """The columns to read. Raises ConfigError for a table without them."""
+    names = _columns(folder)
+    _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
+    if ground is None:
+        return *_ALWAYS, *_PICTURE
+    if set(_ROAD) <= names and _of_this_site(folder, ground):
+        return ROAD_COLUMNS
+    _demand(folder, names, _STATE, "has no metres of this site, and they cannot be computed")
+    return *_ALWAYS, *_STATE
+
+
+def _demand(folder: Path, names: set[str], needed: tuple[str, ...], what: str) -> None:
+    missing = [name for name in needed if name not in names]
+    if missing:
+        raise ConfigError(f"{folder} {what}: its table has no column {missing[0]}; track the video again")
+
+
+def _of_this_site(folder: Path, ground: Ground) -> bool:
+    """Whether the metres of a run are where the site has them: at the lower half of the boxes."""
+    for table in blocks(folder, ("x_m", "y_m", *_BOX)):
+        left, top, width, height = (_numbers(table, name) for name in _BOX)
+        x, y = ground.pixels(np.column_stack([_numbers(table, "x_m"), _numbers(table, "y_m")])).T
+        known = np.isfinite(x)
+        if known.any():
+            held = (x > left) & (x < left + width) & (y > top + height / 4) & (y < top + height)
+            return bool(np.mean(held[known]) > 1 / 2)
+    return True
+
+
+def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Floats]:
+    """(N, 2) positions on the road [m] and (N,) their standard deviations.
+
+    Where the run has none, since the calibration is not sure there or the border cuts the box, the middle of a
+    footprint that points anywhere stands in: good enough to tell the side of a gate.
+    """
+    xy = np.column_stack([column["x_m"], column["y_m"]])
+    sigma = np.hypot(column["sigma_x_m"], column["sigma_y_m"]) / np.sqrt(2)
+    rough = np.flatnonzero(np.isnan(xy[:, 0]))
+    if len(rough):
+        box = np.column_stack([column[name][rough] for name in _BOX])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            middle, _ = footprint(ground, box, np.full((len(rough), 2), np.nan), 0.0)
+            xy[rough] = ground.metres(middle)
+        sigma[rough] = _ROUGH_M
+    return xy, sigma
+
+
+def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str, Floats]:
+    """The columns of the road, computed from those of the picture."""
+    sigma = np.column_stack([column[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
+    corr = np.ones((len(track), 4, 4))
+    pairs = {"xy": (0, 1), "vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
+    for name, (i, j) in pairs.items():
+        corr[:, i, j] = corr[:, j, i] = column[f"corr_{name}"]
+    P = corr * sigma[:, :, None] * sigma[:, None, :]
+    xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
+    stand = road.place(track, xy, u, P, np.column_stack([column[name] for name in _BOX]))
+    own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
+    return {
+        "x_m": stand.xy[:, 0],
+        "y_m": stand.xy[:, 1],
+        "sigma_x_m": own[:, 0],
+        "sigma_y_m": own[:, 1],
+        "speed_kmh": 3.6 * stand.speed,
+        "speed_sigma_kmh": 3.6 * stand.speed_own_sigma,
+        "speed_shared_sigma_kmh": 3.6 * np.linalg.norm(stand.speed_by_shared, axis=1),
+        "heading_deg": np.degrees(stand.heading),
+        "length_m": stand.length,
+        "length_sigma_m": stand.length_sigma,
+    }
+
+
+def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
+    """Some columns of a run's table of tracks, a block of rows at a time. Raises FormatError."""
+    path = folder / "tracks.parquet"
+    if not path.is_file():
+        yield from _csv_blocks(folder / "tracks.csv", columns)
+        return
+    waiting: list[pa.RecordBatch] = []
+    try:
+        with pq.ParquetFile(path, read_dictionary=["status"], pre_buffer=False) as file:  # else all of it is buffered
+            for batch in file.iter_batches(BLOCK, columns=list(columns)):
+                waiting.append(batch)
+                if sum(map(len, waiting)) >= BLOCK:
+                    yield pa.Table.from_batches(waiting)
+                    waiting.clear()
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
+    if waiting:
+        yield pa.Table.from_batches(waiting)
+
+
+def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
+    kinds = {name: pa.float64() for name in columns} | {"track_id": pa.int64(), "status": pa.string()}
+    convert = pyarrow.csv.ConvertOptions(
+        column_types={name: kinds[name] for name in columns}, include_columns=list(columns)
+    )
+    try:
+        with pyarrow.csv.open_csv(path, convert_options=convert) as reader:
+            for batch in reader:
+                yield pa.Table.from_batches([batch])
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
+
+
+def _columns(folder: Path) -> set[str]:
+    path = folder / "tracks.parquet"
+    try:
+        if path.is_file():
+            return set(pq.read_schema(path).names)
+        with (folder / "tracks.csv").open(encoding="utf-8") as file:
+            return set(file.readline().strip().split(","))
+    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
+        raise FormatError(f"{path} is damaged: {error}") from None
+
+
+def _numbers(table: pa.Table, name: str) -> Floats:
+    """(N,) a column; NaN where it is empty."""
+    return np.concatenate(
+        [np.asarray(pc.cast(chunk, pa.float64()).to_numpy(zero_copy_only=False)) for chunk in table[name].chunks]
+        or [np.empty(0)]
+    )

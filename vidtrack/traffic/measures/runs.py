@@ -1,0 +1,176 @@
+"""When the site was watched: finished runs, one after the other, on one clock."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats
+from vidtrack.errors import ConfigError, SourceError
+
+_JOINED_S = 1.0
+"""Parts of one live run with less between them are watched without a break."""
+_CLOCK_S, _CLOCK_SHARE = 5.0, 1e-4
+"""s, and share of the time since: by so much the clock that a live run tells its beginning by may have been set"""
+_ROUNDING_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A finished run.
+
+    folder      with tracks.parquet, or tracks.csv
+    size        (width, height) px of its pictures
+    offset_s    what its `time_s` is behind the site's time
+    begin_s, end_s   of what was watched, in the site's time
+    session     recordings with the same number are parts of one live run: their tracks have the same numbers
+    """
+
+    folder: Path
+    size: tuple[int, int]
+    offset_s: float
+    begin_s: float
+    end_s: float
+    session: int
+
+
+@dataclass(frozen=True, slots=True)
+class Day:
+    """All recordings of a site in order of time. `utc`: of the site's time 0; None: not known."""
+
+    recordings: tuple[Recording, ...]
+    utc: datetime | None
+
+    @property
+    def spans(self) -> Floats:
+        """(S, 2) s; begin and end of what was watched without a break."""
+        spans: list[list[float]] = []
+        last = -1
+        for one in self.recordings:
+            if spans and one.session == last and one.begin_s - spans[-1][1] < _JOINED_S:
+                spans[-1][1] = max(one.end_s, spans[-1][1])
+            else:
+                spans.append([one.begin_s, one.end_s])
+            last = one.session
+        return np.array(spans).reshape(-1, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A run as its folder and the user describe it, in its own time_s; `zero`: the time of time_s 0."""
+
+    folder: Path
+    size: tuple[int, int]
+    zero: datetime | None
+    live: bool
+    begin_s: float
+    end_s: float
+
+
+def open_day(runs: Sequence[str], start: datetime | None) -> Day:
+    """The recordings in folders, each written as FOLDER or FOLDER@TIME.
+
+    start  time of the first picture of the first run that does not tell it
+
+    A live run tells its time (`began` in summary.json), TIME that of a run's `time_s` 0. A run without either begins
+    where the one before it in the list ends. Raises ConfigError for runs of radar, two at the same time and times that
+    cannot be read, SourceError where there is no run.
+    """
+    found = [_found(run) for run in runs]
+    zeros = [one.zero for one in found]
+    if zeros[0] is None:
+        if start is None and any(zeros):
+            raise ConfigError(
+                f"{found[0].folder} does not tell its time, and others do; write {found[0].folder}@TIME, "
+                "for example 2026-06-01T07:00:00+02:00"
+            )
+        zeros[0] = start
+    sessions = _sessions(found)
+    zeros = [zeros[session] for session in sessions]  # the clock of a live run goes on: one zero for all its parts
+    utc = min((zero for zero in zeros if zero is not None), default=None)
+    recordings: list[Recording] = []
+    for one, zero, session in zip(found, zeros, sessions, strict=True):
+        if zero is not None and utc is not None:
+            offset = (zero - utc).total_seconds()
+        else:
+            offset = recordings[-1].end_s - one.begin_s if recordings else 0.0
+        recordings.append(Recording(one.folder, one.size, offset, offset + one.begin_s, offset + one.end_s, session))
+    recordings.sort(key=lambda one: one.end_s)
+    return Day(tuple(_apart(recordings)), utc)
+
+
+def _sessions(found: list[_Found]) -> list[int]:
+    """Of each run the number of the first one in the list that it is a part of, or its own.
+
+    Parts of a live run tell the same beginning, but for what the clock was set by meanwhile.
+    """
+    sessions: list[int] = []
+    for one in found:
+        same = (
+            number
+            for number, other in enumerate(found[: len(sessions)])
+            if one.live and other.live and one.zero is not None and other.zero is not None
+            if abs((one.zero - other.zero).total_seconds()) < _CLOCK_S + _CLOCK_SHARE * max(one.end_s, other.end_s)
+        )
+        sessions.append(next(same, len(sessions)))
+    return sessions
+
+
+def _found(run: str) -> _Found:
+    folder, time = _split(run)
+    if not any((folder / name).is_file() for name in ("tracks.parquet", "tracks.csv")):
+        raise SourceError(f"{folder} is not a finished run: it has no tracks.parquet and no tracks.csv")
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        frames, end, fps = float(summary["frames"]), float(summary["media_s"]), float(summary["fps"])
+        size = int(summary["width"]), int(summary["height"])
+        source = summary["settings"]["source"]
+    except OSError:
+        raise SourceError(f"{folder} has no summary.json, so nobody knows when it watched") from None
+    except (KeyError, TypeError, ValueError):
+        raise ConfigError(f"{folder} is not a run over video: its summary.json has no frames, size and times") from None
+    if frames < 1 or fps <= 0 or min(size) < 1:
+        raise SourceError(f"{folder} has no frames; there is nothing to measure")
+    began = summary.get("began")
+    zero = time or (datetime.fromisoformat(began) if began else None)
+    # a part of a live run begins somewhere in it
+    begin = end - (frames - 1) / fps if began else float(source.get("start_s") or 0.0)
+    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps)
+
+
+def _split(run: str) -> tuple[Path, datetime | None]:
+    """FOLDER@TIME; an @ that no time follows belongs to the folder."""
+    folder, at, text = run.rpartition("@")
+    if not at or Path(run).is_dir():
+        return Path(run), None
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        raise ConfigError(f"{run}: {text!r} is no time; write FOLDER@2026-06-01T07:00:00+02:00") from None
+    if time.tzinfo is None:
+        raise ConfigError(f"{run}: the time has no zone; write for example {text}+02:00, or {text}Z for UTC")
+    return Path(folder), time
+
+
+def _apart(recordings: list[Recording]) -> list[Recording]:
+    """The recordings, in order of their ends, when no two are of the same time.
+
+    Where a part of a live run begins is known by its frames and its nominal rate, and not before the last one ended.
+    """
+    apart = recordings[:1]
+    for second in recordings[1:]:
+        first = apart[-1]
+        early = first.end_s - second.begin_s
+        if early > 0 and first.session == second.session:
+            second = replace(second, begin_s=first.end_s)
+        elif early > _ROUNDING_S:
+            raise ConfigError(
+                f"{second.folder} begins {early:.1f} s before {first.folder} ends; one site is watched once at a time"
+            )
+        apart.append(second)
+    return apart

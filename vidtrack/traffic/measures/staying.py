@@ -1,0 +1,183 @@
+"""How long vehicles are in zones, and when they stand: one look at each row, in order of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
+from vidtrack.errors import ConfigError
+from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.measures.rows import Rows
+from vidtrack.traffic.site import Site
+
+STANDS_M_S = 5 / 3.6
+"""m/s; slower vehicles stand"""
+ZONE_PAUSE_S, STANDING_PAUSE_S = 1.0, 2.0
+"""s; two stays of a vehicle with less between them are one"""
+_LENS_STEPS = 8
+BEGIN, END, STOOD, X, Y = range(5)
+TRACK, ZONE, CAME, LEFT = range(4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stays:
+    """E stays in a zone, or of standing, in order of time.
+
+    zone, vehicle   (E,)
+    begin, end      (E,) s
+    stood           (E,) s of it that the vehicle stood; NaN without a calibration
+    came, left      (E,) whether it was seen before and afterwards; else it was there before, or still is
+    xy              (E, 2) where it was at the beginning, in the unit of positions
+    """
+
+    zone: Ints
+    vehicle: Ints
+    begin: Floats
+    end: Floats
+    stood: Floats
+    came: Mask
+    left: Mask
+    xy: Floats
+
+
+class Staying:
+    """Takes blocks of rows in order of time.
+
+    outlines  (V, 2) of each of Z zones, where vehicles are
+    metres    speeds are in m/s; else nothing is known about standing
+    """
+
+    def __init__(self, outlines: list[Floats], metres: bool) -> None:
+        self._zones, self._metres = len(outlines), metres
+        closed = [np.column_stack([outline, np.roll(outline, -1, axis=0)]) for outline in outlines]
+        self._side = np.concatenate([*closed, np.empty((0, 4))])
+        self._first = np.cumsum([0, *map(len, closed)])
+        self._last_t = np.full(0, np.nan)
+        self._open = np.full((0, self._zones + 1), -1)
+        self._real, self._whole, self._count = np.zeros((0, 5)), np.zeros((0, 4), np.int64), 0
+
+    def add(self, rows: Rows) -> None:
+        """Look at some rows."""
+        if len(rows) == 0:
+            return
+        tracks = int(rows.track.max()) + 1
+        if tracks > len(self._last_t):
+            more = max(tracks, 2 * len(self._last_t)) - len(self._last_t)
+            self._last_t = np.append(self._last_t, np.full(more, np.nan))
+            self._open = np.vstack([self._open, np.full((more, self._zones + 1), -1)])
+        unknown = np.full(len(rows), np.nan)
+        speed = np.hypot(rows.v[:, 0], rows.v[:, 1]) if self._metres else unknown
+        row = 0
+        while row < len(rows):
+            if self._count + self._zones + 1 > len(self._whole):
+                more = len(self._whole) + 64 * (self._zones + 1)
+                self._real = np.vstack([self._real, np.zeros((more, 5))])
+                self._whole = np.vstack([self._whole, np.zeros((more, 4), np.int64)])
+            row, self._count = _look(
+                row, self._count, rows.t, rows.xy, speed, rows.track, self._side, self._first,
+                self._last_t, self._open, self._real, self._whole,
+            )  # fmt: skip
+
+    def in_zones(self, vehicle: Ints) -> Stays:
+        """Stays in zones; `vehicle` (T,) of each track."""
+        stays = self._stays(vehicle, self._whole[: self._count, ZONE] < self._zones, ZONE_PAUSE_S)
+        if not self._metres:
+            stays.stood[:] = np.nan
+        return stays
+
+    def standing(self, vehicle: Ints) -> Stays:
+        """When vehicles stood, anywhere."""
+        return self._stays(vehicle, self._whole[: self._count, ZONE] == self._zones, STANDING_PAUSE_S)
+
+    def _stays(self, vehicle: Ints, chosen: Mask, pause_s: float) -> Stays:
+        real, whole = self._real[: self._count][chosen], self._whole[: self._count][chosen]
+        who = vehicle[whole[:, TRACK]]
+        order = np.lexsort((real[:, BEGIN], who, whole[:, ZONE]))
+        real, whole, who = real[order], whole[order], who[order]
+        same = (np.diff(who) == 0) & (np.diff(whole[:, ZONE]) == 0) & (real[1:, BEGIN] - real[:-1, END] < pause_s)
+        first = np.flatnonzero(np.append(True, ~same)[: len(who)])
+        last = np.append(first[1:], len(who))[: len(first)] - 1
+        end = np.maximum.reduceat(real[:, END], first) if len(first) else np.empty(0)
+        stood = np.add.reduceat(real[:, STOOD], first) if len(first) else np.empty(0)
+        sorted_ = np.argsort(real[first, BEGIN], kind="stable")
+        first, last = first[sorted_], last[sorted_]
+        return Stays(
+            zone=whole[first, ZONE],
+            vehicle=who[first],
+            begin=real[first, BEGIN],
+            end=end[sorted_],
+            stood=stood[sorted_],
+            came=whole[first, CAME] > 0,
+            left=whole[last, LEFT] > 0,
+            xy=real[first][:, [X, Y]],
+        )
+
+
+def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
+    """(V, 2) outlines of the zones where vehicles are. Raises ConfigError for one that is not on the road."""
+    outlines = []
+    for name, zone in site.zones.items():
+        outline = np.array(zone.polygon)
+        if ground is not None:
+            if ground.lens is not None:
+                steps = np.arange(_LENS_STEPS)[:, None] / _LENS_STEPS
+                outline = (outline[:, None] + steps * (np.roll(outline, -1, axis=0) - outline)[:, None]).reshape(-1, 2)
+            with np.errstate(invalid="ignore"):
+                outline = ground.metres(outline)
+            if not np.isfinite(outline).all():
+                raise ConfigError(f"the zone {name} reaches above the horizon of the calibration; draw it on the road")
+        outlines.append(outline)
+    return outlines
+
+
+@kernel
+def _look(
+    row: int, count: int, t: Floats, xy: Floats, speed: Floats, track: Ints, side: Floats, first: Ints,
+    last_t: Floats, open_: Ints, real: Floats, whole: Ints,
+) -> tuple[int, int]:  # fmt: skip
+    """Look at rows from `row` on until all are done or the stays need more room; the next row and stay.
+
+    last_t  (T,) s; of each track; open_ (T, Z + 1) its stay in each zone, the last one for standing; -1: none
+    real, whole   the stays: columns BEGIN... and TRACK...
+    """
+    zones = len(first) - 1
+    for i in range(row, len(t)):
+        if count + zones + 1 > len(whole):
+            return i, count
+        k, x, y = track[i], xy[i, 0], xy[i, 1]
+        if np.isnan(x):
+            continue
+        new = np.isnan(last_t[k])
+        dt = 0.0 if new else t[i] - last_t[k]
+        stands = speed[i] < STANDS_M_S
+        for z in range(zones + 1):
+            here = stands if z == zones else _inside(x, y, side, first[z], first[z + 1])
+            stay = open_[k, z]
+            if here and stay < 0:
+                real[count, BEGIN], real[count, END], real[count, STOOD] = t[i] - dt / 2, t[i], 0.0
+                real[count, X], real[count, Y] = x, y
+                whole[count, TRACK], whole[count, ZONE], whole[count, CAME], whole[count, LEFT] = k, z, not new, 0
+                open_[k, z] = count
+                count += 1
+            elif here:
+                real[stay, END] = t[i]
+                real[stay, STOOD] += dt if stands else 0.0
+            elif stay >= 0:
+                real[stay, END], whole[stay, LEFT] = t[i] - dt / 2, 1
+                open_[k, z] = -1
+        last_t[k] = t[i]
+    return len(t), count
+
+
+@kernel
+def _inside(x: float, y: float, side: Floats, first: int, end: int) -> bool:
+    """Whether a point is in a polygon: a ray to the right meets its sides an odd number of times."""
+    inside = False
+    for s in range(first, end):
+        y1, y2 = side[s, 1], side[s, 3]
+        if (y1 > y) != (y2 > y) and x < side[s, 0] + (y - y1) / (y2 - y1) * (side[s, 2] - side[s, 0]):
+            inside = not inside
+    return inside

@@ -1,0 +1,81 @@
+"""The table `trips`: where each vehicle entered the site and where it left, or why that is not known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.traffic.measures.gates import Gates
+from vidtrack.traffic.measures.passing import Passed
+
+_EDGE_S = 1.0
+"""s; a track that began so soon after the watching did was there before"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trips:
+    """V vehicles that passed an entry or an exit, in order of time.
+
+    vehicle       (V,) number of its first track
+    entry, exit   (V,) passings, -1: none
+    from_s, to_s  (V,) s; when it was in the site: from the entry, else from its first row, to the exit or its last row
+    appeared      (V,) it began between the gates, though somebody watched before
+    vanished      (V,) it ended between the gates, though somebody watched afterwards
+    """
+
+    vehicle: Ints
+    entry: Ints
+    exit: Ints
+    from_s: Floats
+    to_s: Floats
+    appeared: Mask
+    vanished: Mask
+
+    @property
+    def complete(self) -> Mask:
+        """(V,) whether entry and exit are known."""
+        return (self.entry >= 0) & (self.exit >= 0)
+
+    def reasons(self) -> list[str]:
+        """(V,) why entry or exit are missing; "" for a complete trip."""
+        began = np.where(self.appeared, "began between the gates", "was there when watching began")
+        ended = np.where(self.vanished, "ended between the gates", "was there when watching ended")
+        began[self.entry >= 0] = ended[self.exit >= 0] = ""
+        return ["; ".join(filter(None, pair)) for pair in zip(began.tolist(), ended.tolist(), strict=True)]
+
+
+def trips_of(passed: Passed, gates: Gates, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
+    """The trip of each vehicle: from its first entry to the last exit after it.
+
+    vehicle      (P,) of each passing
+    begin, end   (T,) s; first and last row of vehicles by number
+    spans        (S, 2) s; what was watched
+    """
+    enters = gates.role("entry", "both")[passed.gate]
+    entry = _first(vehicle, np.flatnonzero(enters), len(begin))
+    t = np.append(passed.t, np.nan)
+    entered = t[entry]  # NaN without an entry
+    leaves = gates.role("exit", "both")[passed.gate] & ~(passed.t <= entered[vehicle])
+    exit_ = _first(vehicle, np.flatnonzero(leaves)[::-1], len(begin))
+    who = np.flatnonzero((entry >= 0) | (exit_ >= 0))
+    from_s = np.where(entry[who] >= 0, entered[who], begin[who])
+    to_s = np.where(exit_[who] >= 0, t[exit_[who]], end[who])
+    order = np.argsort(from_s, kind="stable")
+    who, from_s, to_s = who[order], from_s[order], to_s[order]
+    appeared = (entry[who] < 0) & ~at_edge(begin[who], spans[:, 0])
+    vanished = (exit_[who] < 0) & ~at_edge(end[who], spans[:, 1])
+    return Trips(who, entry[who], exit_[who], from_s, to_s, appeared, vanished)
+
+
+def at_edge(t: Floats, edges: Floats) -> Mask:
+    """(N,) whether a time is within a second of one of the times when watching began or ended."""
+    return np.asarray((np.abs(t[:, None] - edges) < _EDGE_S).any(axis=1))
+
+
+def _first(vehicle: Ints, passings: Ints, vehicles: int) -> Ints:
+    """(V,) the first of these passings of each vehicle, -1: none."""
+    found = np.full(vehicles, -1)
+    found[vehicle[passings[::-1]]] = passings[::-1]
+    return found

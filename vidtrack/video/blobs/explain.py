@@ -1,0 +1,164 @@
+"""Segmentation of the foreground into vehicles: each region is a vehicle, a part of one, or several."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from vidtrack.arrays import affine
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.config.video import BlobSettings
+from vidtrack.tracking.picture.road import Road
+from vidtrack.tracking.picture.sizes import SizeField
+from vidtrack.tracks import TENTATIVE, Tracks
+from vidtrack.video.blobs.blobs import Blobs, measured
+from vidtrack.video.blobs.fragments import together
+from vidtrack.video.blobs.nearest import nearest_box
+from vidtrack.video.blobs.necks import parts
+from vidtrack.video.blobs.regions import Regions, find_regions, of_labels, patch
+from vidtrack.video.foreground import Foreground, enlargement
+from vidtrack.video.frame import Image
+
+_LARGE = 1.3  # typical widths or heights from which on a region may be several vehicles
+_NECK = 0.5  # half width of a neck as a share of the smaller part's
+_SHALLOW = 0.85  # the same where the sizes of the parts must speak for them
+_SURE = 0.15  # no size field is more certain [ln size]
+_ODD = 8.0  # ln; no vehicle is less likely than this for its size: there are lorries
+_ANOTHER = 3.0  # ln; that another vehicle stands so close is less likely by this
+_PART, _CUT_PART = 0.26, 0.11  # share of the typical box area that is a vehicle; where the border cuts it
+_OPEN = 0.72  # before a typical size is known: a region that fills less of its box may be several vehicles
+_EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
+_LEAST_PX, _LEAST_HOLLOW_PX = 60, 300  # pixels of the mask; the shape of smaller regions is the grid's
+_AT_EDGE = 1.0  # px of the mask; a region this close to the picture's edge is cut by it
+_FILLED = 0.25  # least share of a region of weak foreground that is foreground
+_YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
+
+
+class _Measure:
+    """Maps between mask and scene, and the typical vehicle sizes at each place."""
+
+    def __init__(self, foreground: Foreground, sizes: SizeField) -> None:
+        place = affine.IDENTITY if foreground.place is None else foreground.place
+        self._to_scene = affine.after(place, enlargement(foreground.step))
+        self._to_mask = affine.inverse(self._to_scene)
+        self.sizes = sizes
+        h, w = foreground.mask.shape
+        self.edges = np.array([0.0, 0.0, w, h])
+        if foreground.surveyed is not None and foreground.place is not None:
+            low, high = foreground.surveyed.reshape(2, 2)
+            left, top, width, height = self.predicted(np.concatenate([low, high - low])[None])[0]
+            self.edges = np.array([left, top, left + width, top + height])
+
+    def typical(self, box: Ints | Floats) -> Floats:
+        """(N, 2) typical width and height [px of the mask] of vehicles at boxes (N, 4) of the mask; NaN if unknown."""
+        return self.sizes.typical(affine.boxes(self._to_scene, box.astype(float))) * affine.scale(self._to_mask)
+
+    def predicted(self, box: Floats) -> Floats:
+        """Boxes (K, 4) of the scene, in pixels of the mask."""
+        return affine.boxes(self._to_mask, box)
+
+    def border(self, box: Ints) -> tuple[int, int, int, int]:
+        """1 for each side (left, top, right, bottom) of a box (4,) [px of the mask] at the picture's border."""
+        left, top, width, height = box
+        low, high = self.edges[:2] + _AT_EDGE, self.edges[2:] - _AT_EDGE
+        return (left < low[0], top < low[1], left + width > high[0], top + height > high[1])
+
+
+def explain(foreground: Foreground, expected: Tracks, road: Road | None, settings: BlobSettings) -> Blobs:
+    """Blobs of one vehicle each, by the shapes and sizes of regions and the predicted tracks.
+
+    expected  tracks predicted to the time of the foreground, in the scene
+    """
+    measure = _Measure(foreground, road.sizes if road else SizeField(1, 1))
+    regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
+    known = expected.status != TENTATIVE
+    if settings.cut:
+        regions = cut_at_necks(regions, measure)
+    if settings.divide and measure.sizes.known:
+        dividing = expected.box[known | (expected.age_s > _YOUNG_S)]
+        regions = divided(regions, measure.predicted(dividing), measure)
+    box = regions.boxes().astype(float)
+    group, count = together(
+        box, regions.areas().astype(float), _links(regions, foreground.weak),
+        measure.predicted(expected.box[known]), measure.typical(box),
+        settings.pieces, settings.join_overlap, settings.join_gap,
+    )  # fmt: skip
+    return measured(regions.joined(group, count), foreground, settings)
+
+
+def _links(regions: Regions, weak: Image | None) -> Ints:
+    """(R,) group of each region: regions inside one region of the weak mask (h, w) have the same number.
+
+    Weak foreground much larger than the regions in it, as in flickering light, links nothing.
+    """
+    link = -1 - np.arange(regions.total)
+    if weak is None or regions.total < 2:  # nothing to link
+        return link
+    count, inside, stats, _ = cv2.connectedComponentsWithStats(weak)
+    of_run = inside[regions.row, regions.start]
+    filled = np.bincount(of_run, regions.stop - regions.start, count) > _FILLED * stats[:, cv2.CC_STAT_AREA]
+    filled[0] = False  # the background
+    linked = filled[of_run]
+    link[regions.label[linked]] = of_run[linked]
+    return link
+
+
+def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
+    """The regions; those large enough for several vehicles are cut at their necks."""
+    box, area = regions.boxes(), regions.areas()
+    typical = measure.typical(box)
+    large = np.any(box[:, 2:] > _LARGE * typical, axis=1)
+    hollow = np.isnan(typical[:, 0]) & (area < _OPEN * box[:, 2] * box[:, 3])
+    for i in np.flatnonzero(large & (area >= _LEAST_PX) | hollow & (area >= _LEAST_HOLLOW_PX)).tolist():
+        border = measure.border(box[i])
+        inside = patch(regions, i, box[i])
+        if large[i]:
+            least = typical[i] * np.sqrt(_CUT_PART if any(border) else _PART)
+            cut = _cut(inside, border, _NECK, least, box[i])
+            if cut.total < 2:
+                cut = _cut(inside, border, _SHALLOW, least, box[i])
+                if not _likelier(cut, box[i], typical[i], measure.sizes):
+                    continue
+        else:
+            cut = _cut(inside, border, _NECK, np.ones(2), box[i])
+            if not _alike(cut):
+                continue
+        regions = regions.parted(i, cut)
+    return regions
+
+
+def _cut(inside: Image, border: tuple[int, int, int, int], neck: float, least: Floats, box: Ints) -> Regions:
+    label, count = parts(inside, border, neck, least)
+    return of_labels(label, count, box)
+
+
+def _likelier(cut: Regions, box: Ints, typical: Floats, sizes: SizeField) -> bool:
+    """Whether vehicles of the parts' sizes are likelier than one vehicle of the size of the region's box (4,)."""
+    sigma = np.maximum(sizes.spread, _SURE)
+
+    def surprise(size: Ints) -> Floats:
+        return np.minimum(((np.log(size / typical) / sigma) ** 2).sum(axis=-1) / 2, _ODD)
+
+    return bool(surprise(cut.boxes()[:, 2:]).sum() + _ANOTHER * (cut.total - 1) < surprise(box[2:]))
+
+
+def _alike(cut: Regions) -> bool:
+    """Whether the parts have similar sizes and each fills its box, as vehicles do."""
+    if cut.total < 2:
+        return False
+    box = cut.boxes()
+    whole = box[:, 2] * box[:, 3]
+    return bool((whole >= _EQUAL * whole.max()).all() and (cut.areas() > _FULL * whole).all())
+
+
+def divided(regions: Regions, predicted: Floats, measure: _Measure) -> Regions:
+    """The regions; those too large for one vehicle are divided among the predicted boxes (K, 4) [px of the mask].
+
+    Vehicles nose to tail have no neck between them. Each pixel is assigned to the nearest box.
+    """
+    box = regions.boxes()
+    for i in np.flatnonzero((box[:, 2:] > _LARGE * measure.typical(box)).any(axis=1)).tolist():
+        label, count = nearest_box(patch(regions, i, box[i]), box[i], predicted)
+        if count > 1:
+            regions = regions.parted(i, of_labels(label, count, box[i]))
+    return regions

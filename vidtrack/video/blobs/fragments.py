@@ -1,0 +1,121 @@
+"""Grouping of regions that are pieces of one vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.compiled import kernel
+from vidtrack.video.runs import components, join
+
+_SPREAD = 1.2  # predicted boxes are taken this much larger about their centres before fragments are sought in them
+_LIKE = 0.3  # share of the typical area that makes a piece a vehicle
+_LIKE_BOX, _LIKE_FILL, _APART = 0.2, 0.6, 0.75  # before a typical size is known: share of the union's box, share of its
+# own box that is filled, and the share of the union's box that two vehicles' boxes leave unfilled together
+_SMALL = 0.35  # share of the typical area of a piece that nobody predicted
+_WHOLE = 1.2  # typical areas of what pieces make together at most
+_LESSER = 0.6  # of two linked pieces the smaller is less than this share of the larger, before sizes are known
+_NEAR = 0.35  # typical sizes between such pieces at most
+
+
+@kernel
+def together(
+    box: Floats, area: Floats, link: Ints, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
+) -> tuple[Ints, int]:
+    """Group of each region (R,) and the number of groups; pieces of one vehicle have the same group.
+
+    box (R, 4) and area (R,) of the regions, link (R,) the same number for regions that weak foreground links,
+    predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, NaN where unknown;
+    pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
+
+    Two regions are pieces of one vehicle if they are close together inside one predicted box; or if no box predicts
+    them, one is small and near the other, and both together are no larger than a vehicle; or if they are linked and
+    together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that are
+    each like a vehicle are never pieces.
+    """
+    parent = np.arange(len(box))
+    vehicle = np.empty(len(box), np.int64)
+    for i in range(len(box)):
+        vehicle[i] = _only_vehicle(box[i], predicted, overlap)
+    for i in range(len(box)):
+        for j in range(i):
+            if _both_vehicles(i, j, box, area, typical):
+                continue
+            if vehicle[i] >= 0 and vehicle[i] == vehicle[j]:
+                longer = max(predicted[vehicle[i], 2], predicted[vehicle[i], 3])
+                if _gap(box[i], box[j]) <= gap * longer:
+                    join(parent, i, j)
+            if pieces and _whole(box[i], box[j], typical[i]):
+                join(parent, i, j)
+            two = vehicle[i] >= 0 and vehicle[j] >= 0 and vehicle[i] != vehicle[j]
+            if pieces and link[i] == link[j] and not two and _fit(box[i], box[j], typical[i]):
+                join(parent, i, j)
+    return components(parent)
+
+
+@kernel
+def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
+    """Whether a small box and a near one together are no larger than a vehicle of typical (2,) width and height."""
+    if np.isnan(typical[0]):
+        return False
+    usual = typical[0] * typical[1]
+    small = min(a[2] * a[3], b[2] * b[3]) < _SMALL * usual
+    return small and _union(a, b) <= _WHOLE * usual and _gap(a, b) <= _NEAR * max(typical[0], typical[1])
+
+
+@kernel
+def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
+    """Whether two linked boxes together are no larger than a vehicle of typical (2,) width and height."""
+    if np.isnan(typical[0]):
+        one, other = a[2] * a[3], b[2] * b[3]
+        return min(one, other) < _LESSER * max(one, other)
+    return _union(a, b) <= _WHOLE * typical[0] * typical[1]
+
+
+@kernel
+def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -> bool:
+    """Whether two regions are each like a vehicle."""
+    a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
+    if not np.isnan(typical[i, 0]):
+        usual = typical[i, 0] * typical[i, 1]
+        return min(a, b) >= _LIKE * usual
+    union = _union(box[i], box[j])
+    filled = area[i] > _LIKE_FILL * a and area[j] > _LIKE_FILL * b
+    return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
+
+
+@kernel
+def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
+    """Index of the predicted box that contains most of this box (4,); -1 for none, or if others overlap it too."""
+    vehicle, sharers = -1, 0
+    for k in range(len(predicted)):
+        share = _share_inside(box, predicted[k])
+        sharers += share > 1 - most
+        if share >= most and vehicle < 0:
+            vehicle = k
+    return vehicle if sharers == 1 else -1
+
+
+@kernel(inline="always")
+def _share_inside(box: Floats, other: Floats) -> float:
+    """Share of a box's area inside the other box, enlarged by _SPREAD."""
+    common = 1.0
+    for axis in range(2):
+        size = _SPREAD * other[axis + 2]
+        low = other[axis] - (size - other[axis + 2]) / 2
+        common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
+    return common / (box[2] * box[3])
+
+
+@kernel(inline="always")
+def _union(a: Floats, b: Floats) -> float:
+    """Area of the bounding box of both."""
+    wide = max(a[0] + a[2], b[0] + b[2]) - min(a[0], b[0])
+    return wide * (max(a[1] + a[3], b[1] + b[3]) - min(a[1], b[1]))
+
+
+@kernel(inline="always")
+def _gap(a: Floats, b: Floats) -> float:
+    """Distance between two boxes along the axis that separates them more; negative where they overlap."""
+    across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
+    return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))

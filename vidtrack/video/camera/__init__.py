@@ -1,0 +1,1 @@
+"""Camera motion: registration of each picture with the learnt scene."""
