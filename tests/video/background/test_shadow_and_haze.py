@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vidtrack.config import DetectorSettings
+from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
 from vidtrack.video.background.distance import contrast, haziness, veil
 from vidtrack.video.background.shadow import SHADOW, reclaim
