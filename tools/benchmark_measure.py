@@ -1,6 +1,6 @@
 """Time and memory of `vidtrack measure` on a day of synthetic tracks, beside reading the same columns alone.
 
-    python tools/benchmark_measure.py --vehicles 100000 -o /tmp/day
+    python tools/benchmark_measure.py --vehicles 100000 -o DIR
 
 Vehicles drive straight on for 8 s at 25 frames/s through a picture of 10 px/m, over four gates and two zones. The run
 is written once (-o keeps it); reading and measuring are each done in a process of its own.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import timedelta
@@ -34,9 +35,31 @@ SCENARIOS: dict[str, Callable[[Generator], Scene]] = {
 }
 
 
+class Frames(ABC):
+    """What a camera sees. Iterating gives the frames, (H, W, 3) uint8 BGR, each drawn when asked for."""
+
+    camera: Camera
+    times: Floats
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
+        return (self.frame(k) for k in range(len(self)))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) px."""
+        return self.camera.size
+
+    @abstractmethod
+    def frame(self, k: int) -> NDArray[np.uint8]:
+        """Frame k, (H, W, 3) BGR."""
+
+
 @dataclass(frozen=True, eq=False)
-class Clip:
-    """A scene seen by a camera. Iterating gives the frames, (H, W, 3) uint8 BGR, each drawn when asked for.
+class Clip(Frames):
+    """A scene seen by a camera.
 
     fps         frames/s
     times       (K,) time of each frame [s]
@@ -50,17 +73,6 @@ class Clip:
     times: Floats
     seed: int
     conditions: Conditions = field(default_factory=Conditions)
-
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
-        return (self.frame(k) for k in range(len(self)))
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height) px."""
-        return self.camera.size
 
     @cached_property
     def truth(self) -> Truth:

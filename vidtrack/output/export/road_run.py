@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
+from vidtrack.traffic.lengths import class_of, length_sums, mean_length
 from vidtrack.traffic.site import Site, read_site
 
 _BATCH = 1 << 16
@@ -192,10 +193,8 @@ class _FirstLook:
         seen = table["status"].to_numpy(zero_copy_only=False) != "coasting"
         until = np.full(len(track), -1)
         np.maximum.at(until, index[seen], table["frame"].to_numpy()[seen])
-        length, sigma = table["length_m"].to_numpy(), table["length_sigma_m"].to_numpy()
-        weight = np.where(np.isfinite(length), 1 / sigma**2, 0.0)
-        sums = [np.bincount(index, values, len(track)) for values in (weight * np.nan_to_num(length), weight)]
-        self._parts.append(np.column_stack([track, until, *sums]))
+        sums = length_sums(index, table["length_m"].to_numpy(), table["length_sigma_m"].to_numpy(), len(track))
+        self._parts.append(np.column_stack([track, until, sums]))
 
     def vehicles(self, site: Site) -> Vehicles:
         """Those of all batches."""
@@ -203,15 +202,9 @@ class _FirstLook:
         track, index = np.unique(parts[:, 0].astype(np.int64), return_inverse=True)
         until = np.full(len(track), -1)
         np.maximum.at(until, index, parts[:, 1].astype(np.int64))
-        lengths, weights = (np.bincount(index, parts[:, k]) for k in (2, 3))
-        length = np.divide(lengths, weights, out=np.full(len(track), np.nan), where=weights > 0)
-        return Vehicles(track, until, length, _kinds(site, length))
-
-
-def _kinds(site: Site, length: Floats) -> np.ndarray:
-    """(T,) the class of each length."""
-    fits = [(low <= length) & (length < high) for low, high in site.classes.values()]
-    return np.select(fits, list(site.classes), UNKNOWN) if fits else np.full(len(length), UNKNOWN)
+        length = mean_length(np.column_stack([np.bincount(index, parts[:, k]) for k in (2, 3)]))
+        kind = np.array([name or UNKNOWN for name in class_of(length, site.classes)])
+        return Vehicles(track, until, length, kind)
 
 
 def _known(table: pa.Table) -> Mask:

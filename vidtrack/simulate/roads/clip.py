@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property
@@ -15,7 +14,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
 from vidtrack.simulate import draw as flat
 from vidtrack.simulate.camera import Camera, camera
-from vidtrack.simulate.clip import check_camera
+from vidtrack.simulate.clip import Frames, check_camera
 from vidtrack.simulate.clock import burn_in
 from vidtrack.simulate.conditions import Conditions, Effect
 from vidtrack.simulate.draw import SHADOW, Image
@@ -44,8 +43,8 @@ MIRRORED, MIRROR_LIGHT = 0.3, 0.7  # share of a wet road's light that is mirrore
 
 
 @dataclass(frozen=True, eq=False)
-class RoadClip:
-    """A road seen by a camera. Iterating gives the frames, (H, W, 3) uint8 BGR, each drawn when asked for.
+class RoadClip(Frames):
+    """A road seen by a camera.
 
     eye     the camera's place and lens; `camera` is its picture's shake, exposure and noise
     sun     (3,) unit vector towards the sun; None: overcast, or dark
@@ -64,17 +63,6 @@ class RoadClip:
     fleet: Fleet
     sun: Floats | None
     click_sigma: float
-
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
-        return (self.frame(k) for k in range(len(self)))
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """(width, height) px."""
-        return self.camera.size
 
     @cached_property
     def truth(self) -> RoadTruth:

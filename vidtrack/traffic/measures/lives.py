@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.traffic.lengths import length_sums, mean_length
 from vidtrack.traffic.measures.rows import Rows
-
-_LEAST_SIGMA_M = 0.01
-"""m; to which lengths are known at best"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,11 +41,7 @@ class Lives:
             more = max(tracks, 2 * len(self._head)) - len(self._head)
             self._head, self._tail = (np.vstack([old, np.full((more, 6), np.nan)]) for old in (self._head, self._tail))
             self._length = np.vstack([self._length, np.zeros((more, 2))])
-        weight = 1 / np.maximum(rows.length_sigma, _LEAST_SIGMA_M) ** 2
-        known = np.isfinite(weight * rows.length)
-        for k, term in enumerate((weight * rows.length, weight)):
-            sums = np.bincount(rows.track[known], term[known], len(self._length))
-            self._length[:, k] += sums
+        self._length += length_sums(rows.track, rows.length, rows.length_sigma, len(self._length))
         seen = np.flatnonzero(rows.seen & np.isfinite(rows.xy[:, 0]))
         states = np.column_stack([rows.t, rows.xy, rows.sigma, rows.v])
         self._tail[rows.track[seen]] = states[seen]  # of several the last one stays
@@ -64,18 +58,8 @@ class Lives:
 
     def length(self, tracks: int) -> Floats:
         """(T,) m; the mean weighted by the variances, NaN where it is not known."""
-        total, weight = self._length[:tracks].T
-        return np.asarray(np.divide(total, weight, out=np.full(len(total), np.nan), where=weight > 0))
+        return mean_length(self._length[:tracks])
 
 
 def _end(states: Floats) -> End:
     return End(states[:, 0], states[:, 1:3], states[:, 3], states[:, 4:])
-
-
-def class_of(length: Floats, classes: dict[str, tuple[float, float]]) -> list[str | None]:
-    """(T,) the first class of the site whose bounds hold the length [m]; None where there is none."""
-    number = np.full(len(length), len(classes))
-    for k, (low, high) in reversed(list(enumerate(classes.values()))):
-        number[(length >= low) & (length <= high)] = k
-    names = [*classes, None]
-    return [names[k] for k in number.tolist()]

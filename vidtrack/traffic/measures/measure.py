@@ -11,12 +11,13 @@ import pyarrow as pa
 
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
-from vidtrack.traffic.measures.lives import Lives, class_of
+from vidtrack.traffic.measures.lives import Lives
 from vidtrack.traffic.measures.passing import Passed, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
