@@ -92,25 +92,27 @@ def with_identities(data: Path) -> dict[str, Clip]:
 
 def simulated(folder: Path, label: str, seeds: Iterable[int], **knobs: Any) -> list[Clip]:
     """The simulated junction, drawn into `folder` where it is not there yet; `label` tells the knobs apart."""
-    clips = []
-    for seed in seeds:
-        name = f"junction-{label}-{seed}"
-        place = folder / name
-        if not (place / "gt.txt").is_file():  # written last
-            place.mkdir(parents=True, exist_ok=True)
-            write(simulate("junction", seed=seed, **knobs), place)
-        clips.append(Clip(name, place / "video.avi", truth=place / "gt.txt"))
-    return clips
+
+    def draw(place: Path, seed: int) -> None:
+        write(simulate("junction", seed=seed, **knobs), place)
+
+    return [_drawn(folder, f"junction-{label}", seed, draw, last="gt.txt") for seed in seeds]
 
 
 def simulated_road(folder: Path, road: str, seeds: Iterable[int]) -> list[Clip]:
     """A simulated road in perspective, drawn into `folder` where it is not there yet."""
-    clips = []
-    for seed in seeds:
-        name = f"{road}-{seed}"
-        place = folder / name
-        if not (place / "site.toml").is_file():  # written last
-            place.mkdir(parents=True, exist_ok=True)
-            write_road(simulate_road(road, seed=seed), place)
-        clips.append(Clip(name, place / "video.avi", truth=place / "gt.txt"))
-    return clips
+
+    def draw(place: Path, seed: int) -> None:
+        write_road(simulate_road(road, seed=seed), place)
+
+    return [_drawn(folder, road, seed, draw, last="site.toml") for seed in seeds]
+
+
+def _drawn(folder: Path, label: str, seed: int, draw: Callable[[Path, int], None], last: str) -> Clip:
+    """A clip that `draw` writes, unless `last`, the file it writes last, is there."""
+    name = f"{label}-{seed}"
+    place = folder / name
+    if not (place / last).is_file():
+        place.mkdir(parents=True, exist_ok=True)
+        draw(place, seed)
+    return Clip(name, place / "video.avi", truth=place / "gt.txt")
