@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from vidtrack.formats import read_mot
-from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.footprint import Footprints
 from vidtrack.traffic.site import Site
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vidtrack.traffic.account import examined
+from vidtrack.traffic.calibration.account import examined
 from vidtrack.traffic.site import read_site
 
 TEXT = (Path(__file__).parents[2] / "docs" / "traffic.md").read_text(encoding="utf-8")

@@ -8,7 +8,7 @@ import pytest
 from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 
 from vidtrack.formats import read_mot
-from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.footprint import Footprints, footprint, velocity
 from vidtrack.traffic.site import Site
 

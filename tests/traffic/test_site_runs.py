@@ -19,7 +19,7 @@ from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
 from vidtrack.run.live.parts import Part
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.metres import road_at
+from vidtrack.traffic.metres import footprints_of
 
 CAMERA = Pinhole()
 FPS = 25.0
@@ -116,14 +116,14 @@ def test_a_picture_of_another_shape_is_refused_and_half_the_size_is_not(road):
     assert "not the same shape" in err
     assert "Traceback" not in err
     assert not (road / "out" / "tracks.csv").exists()
-    half = road_at(road / "site.toml", WIDTH // 2, HEIGHT // 2)
+    half = footprints_of(road / "site.toml", WIDTH // 2, HEIGHT // 2)
     assert half is not None
 
 
 def test_a_site_without_a_calibration_gives_no_metres(road):
     (road / "gates.toml").write_text('[site]\nname = "a"\nwidth = 1280\nheight = 720\n')
-    assert road_at(road / "gates.toml", WIDTH, HEIGHT) is None
-    assert road_at(None, WIDTH, HEIGHT) is None
+    assert footprints_of(road / "gates.toml", WIDTH, HEIGHT) is None
+    assert footprints_of(None, WIDTH, HEIGHT) is None
 
 
 def test_radar_has_no_site(tmp_path):
@@ -134,7 +134,7 @@ def test_radar_has_no_site(tmp_path):
 
 
 def test_a_part_of_a_live_run_has_the_same_columns(road):
-    prints = road_at(road / "site.toml", WIDTH, HEIGHT)
+    prints = footprints_of(road / "site.toml", WIDTH, HEIGHT)
     folder = road / "part"
     folder.mkdir()
     blank = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
@@ -207,7 +207,8 @@ def test_a_camera_that_sways_does_not_move_the_road(road):
     step = make_step(0, [(1, "c", 640.0, 400.0)])
     steps = [step, replace(step, motion=shift(5.0, -3.0))]
     still, swayed = (
-        track_rows([step], (*VIDEO, *ROAD), road_at(road / "site.toml", WIDTH, HEIGHT)).to_pylist()[0] for step in steps
+        track_rows([step], (*VIDEO, *ROAD), footprints_of(road / "site.toml", WIDTH, HEIGHT)).to_pylist()[0]
+        for step in steps
     )
     assert swayed["x_px"] == still["x_px"] + 5
     assert swayed["y_px"] == still["y_px"] - 3

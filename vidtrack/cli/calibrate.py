@@ -12,7 +12,7 @@ from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import Options, common, receives, start_log
 
 if TYPE_CHECKING:
-    from vidtrack.traffic.account import Account
+    from vidtrack.traffic.calibration.account import Account
     from vidtrack.traffic.site import Site
     from vidtrack.video.frame import Image
 
@@ -49,7 +49,7 @@ def command(options: CalibrateOptions) -> int:
     """
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_folder
-    from vidtrack.traffic.account import examined
+    from vidtrack.traffic.calibration.account import examined
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)

@@ -107,7 +107,7 @@ def command(options: LiveOptions) -> int:
 
     try:
         from vidtrack.cli.hide import hide_arguments
-        from vidtrack.cli.live_many import are_many, track_many
+        from vidtrack.cli.live_cameras import are_many, track_many
         from vidtrack.config.inputs import Input
         from vidtrack.video.live.address import secrets
 

@@ -73,18 +73,18 @@ def command(options: PredictOptions) -> None:
     start_log(options.verbose, options.quiet)
     folder = options.folder("predict")
     kind, pfa, clutter = options.kind, options.pfa, options.weibull or RAYLEIGH
-    outlook = forecast(kind, options.snr(), pfa, clutter, options.q, options.gate, options.cell, options.scans)
-    tried = None if options.runs is None else trial(outlook, options.runs, options.seed)
+    expected = forecast(kind, options.snr(), pfa, clutter, options.q, options.gate, options.cell, options.scans)
+    tried = None if options.runs is None else trial(expected, options.runs, options.seed)
     if folder is not None:
-        _plot(outlook, tried, folder / "prediction.png")
-    if deliver(_content(outlook, tried), options.json_to, None, options.quiet):
-        title = f"{kind} filter at {options.snr_db:g} dB, P_FA {pfa:g}, P_D {outlook.law.p_d:.4f}"
-        _print_table(outlook, tried, title)
+        _plot(expected, tried, folder / "prediction.png")
+    if deliver(_content(expected, tried), options.json_to, None, options.quiet):
+        title = f"{kind} filter at {options.snr_db:g} dB, P_FA {pfa:g}, P_D {expected.law.p_d:.4f}"
+        _print_table(expected, tried, title)
 
 
-def _content(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
-    content: dict[str, Any] = {"k": outlook.scan.tolist()}
-    content |= {name: None if error is None else error.tolist() for name, error in outlook.error.items()}
+def _content(expected: Forecast, tried: Trial | None) -> dict[str, Any]:
+    content: dict[str, Any] = {"k": expected.scan.tolist()}
+    content |= {name: None if error is None else error.tolist() for name, error in expected.error.items()}
     if tried is not None:
         content |= {
             "runs": tried.runs,
@@ -97,9 +97,9 @@ def _content(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
     return content
 
 
-def _columns(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
+def _columns(expected: Forecast, tried: Trial | None) -> dict[str, Any]:
     """Name and values of each curve."""
-    columns = {name: error for name, error in outlook.error.items() if error is not None}
+    columns = {name: error for name, error in expected.error.items() if error is not None}
     if tried is not None:
         columns["actual_all"] = tried.actual_all
         if tried.actual_kept is not None:
@@ -107,23 +107,23 @@ def _columns(outlook: Forecast, tried: Trial | None) -> dict[str, Any]:
     return columns
 
 
-def _print_table(outlook: Forecast, tried: Trial | None, title: str) -> None:
+def _print_table(expected: Forecast, tried: Trial | None, title: str) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    columns = _columns(outlook, tried)
-    table = Table("k", *columns, title=title, caption=_caption(outlook, tried), caption_justify="left", min_width=72)
+    columns = _columns(expected, tried)
+    table = Table("k", *columns, title=title, caption=_caption(expected, tried), caption_justify="left", min_width=72)
     for column in table.columns:
         column.justify = "right"
-    for i, k in enumerate(outlook.scan):
+    for i, k in enumerate(expected.scan):
         table.add_row(str(k), *(f"{error[i]:.4f}" for error in columns.values()))
     Console().print(table)
 
 
-def _caption(outlook: Forecast, tried: Trial | None) -> str:
+def _caption(expected: Forecast, tried: Trial | None) -> str:
     lines = []
-    for name, error in outlook.error.items():
-        settled = outlook.steady[name]
+    for name, error in expected.error.items():
+        settled = expected.steady[name]
         if error is None:
             lines.append(f"{name}: the fit holds for a gate of 4 only")
         elif settled is None:
@@ -138,14 +138,14 @@ def _caption(outlook: Forecast, tried: Trial | None) -> str:
     return "\n".join(lines)
 
 
-def _plot(outlook: Forecast, tried: Trial | None, path: Path) -> None:
+def _plot(expected: Forecast, tried: Trial | None, path: Path) -> None:
     from vidtrack.output.folder import writing
     from vidtrack.papers import style
 
     drawing, (ax,) = style.figure(panel=(6.4, 4.0))
-    columns = _columns(outlook, tried)
+    columns = _columns(expected, tried)
     for (name, error), colour in zip(columns.items(), style.CYCLE, strict=False):
-        ax.plot(outlook.scan, error, "." if name.startswith("actual") else "-", color=colour, label=NAMES[name])
+        ax.plot(expected.scan, error, "." if name.startswith("actual") else "-", color=colour, label=NAMES[name])
     ax.set_xlabel("scan k")
     ax.set_ylabel("position error, units of sqrt(r)")
     ax.set_ylim(0, 1.5 * max(error.max() for name, error in columns.items() if name != "actual_all"))

@@ -12,7 +12,7 @@ from vidtrack.cli.json_file import deliver, json_option
 from vidtrack.cli.options import Options, common, receives, start_log
 
 if TYPE_CHECKING:
-    from vidtrack.traffic.validate import Estimate, Validation
+    from vidtrack.traffic.validation.validate import Estimate, Validation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +57,8 @@ def command(options: ValidateOptions) -> None:
     MANUAL has the columns time_s (seconds of the video) or utc (with a zone), gate (or line), direction, and perhaps
     certain (0: may be counted or not). Crossings are matched one to one, within gate, direction and tolerance.
     """
-    from vidtrack.traffic.event_tables import clocks_of, read_counted, read_manual, seconds, table_of
-    from vidtrack.traffic.validate import validate
+    from vidtrack.traffic.validation.event_tables import clocks_of, read_counted, read_manual, seconds, table_of
+    from vidtrack.traffic.validation.validate import validate
 
     start_log(options.verbose, options.quiet)
     path = table_of(options.measures)
@@ -79,7 +79,7 @@ def _print(result: Validation) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from vidtrack.traffic.event_tables import written
+    from vidtrack.traffic.validation.event_tables import written
 
     console = Console()
     table = Table("gate", "figure", "value", "95 % from", "to")

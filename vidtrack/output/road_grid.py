@@ -10,7 +10,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 from vidtrack.output.draw import Pen
 from vidtrack.output.folder import replacing
-from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.video.frame import Image
 
 _INK, _POINT, _FITTED = (255, 255, 0), (0, 0, 255), (0, 255, 0)

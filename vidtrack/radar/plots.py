@@ -69,11 +69,11 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     check_numbers(table, measured)
     check_order(table, measured)
     if table.faults and not settings.skip_bad_rows:
-        raise PlotFormatError(f"{table.complaint()}; correct them, or leave them out with --skip-bad-rows")
+        raise PlotFormatError(f"{table.problem()}; correct them, or leave them out with --skip-bad-rows")
     if not table.good.any():
-        raise PlotFormatError(f"{table.complaint()}; no good row is left")
+        raise PlotFormatError(f"{table.problem()}; no good row is left")
     if table.faults:
-        _log.warning("%s; left out", table.complaint())
+        _log.warning("%s; left out", table.problem())
     return _sorted(table, measured, sigma)
 
 

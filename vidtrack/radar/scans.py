@@ -10,9 +10,9 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
-from vidtrack.radar.performance.sweep import Sweep
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
+from vidtrack.radar.sweep import Sweep
 from vidtrack.scan import Scan
 
 NONLINEAR = ("ekf", "ukf", "particle")

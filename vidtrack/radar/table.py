@@ -55,7 +55,7 @@ class Table:
         """(N,) rows without a fault."""
         return ~np.isin(self.line, list(self.faults))
 
-    def complaint(self) -> str:
+    def problem(self) -> str:
         """The message about all faults; it lists the first few."""
         return _complaint(self.path, self.unit, self.faults)
 

@@ -26,7 +26,7 @@ from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
-from vidtrack.traffic.metres import road_at
+from vidtrack.traffic.metres import footprints_of
 from vidtrack.video.frame import Image
 from vidtrack.video.source import Source
 
@@ -98,7 +98,7 @@ def file_subject(
         }
 
     counter = line_counter(settings, source.width, source.height)
-    road = road_at(settings.output.site, source.width, source.height)
+    road = footprints_of(settings.output.site, source.width, source.height)
     return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road)
 
 

@@ -60,7 +60,9 @@ def build_blob_tracker(
             idle_s=settings.idle_s,
             idle_travel=settings.idle_travel,
         ),
-        picture=Picture(bounds, road=Road(*bounds, wary=settings.restless) if bounds else None, box_s=settings.box_s),
+        picture=Picture(
+            bounds, road=Road(*bounds, careful=settings.restless) if bounds else None, box_s=settings.box_s
+        ),
         sharing=Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap) if merging else Exclusive(),
         detection_probability=settings.detection_probability,
         clutter_density=settings.clutter_density,

@@ -24,7 +24,7 @@ from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.video import background
 from vidtrack.video.blobs.explain import explain
-from vidtrack.video.blobs.outlook import Outlook
+from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
@@ -96,7 +96,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
     The detector receives the tracker's prediction before it processes the frame: fragments are joined inside a
     predicted box, and vehicles that have driven are not absorbed into the scene.
     """
-    outlook = Outlook()
+    checks = LimitChecks()
     ended = perf_counter()
     for frame in frames:
         clock = [ended, perf_counter()]
@@ -113,7 +113,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
         spans = (end - begin for begin, end in pairwise(clock))
         seconds = dict(zip(("read", "detect", "blobs", "track"), spans, strict=True))
         motion = foreground.motion
-        warnings = foreground.warnings + outlook.look(frame, foreground, tracker.road)
+        warnings = foreground.warnings + checks.look(frame, foreground, tracker.road)
         for warning in warnings:
             log.warning("at %.1f s: %s", frame.time_s, warning)
         yield Step(frame.index, frame.time_s, scan, tracks, frame, foreground, seconds, motion, warnings)

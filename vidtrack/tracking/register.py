@@ -83,14 +83,14 @@ class Register:
         moved = _distance(xy, self.rest) > REST * np.fmax(self.box[:, 2], self.box[:, 3])
         self.rest[moved], self.rest_s[moved] = xy[moved], t
 
-    def see(self, hit: Mask, sure: Mask, t: float, dt: float) -> None:
+    def record_hits(self, hit: Mask, sure: Mask, t: float, dt: float) -> None:
         """Note which rows (T,) the scan at t shows, dt seconds after the last, and which of them for sure.
 
         Only sure ones keep a row alive, and confirm a tentative one.
         """
         _see(self.history, self.alone_s, self.updated_s, self.status, hit, sure, t, dt)
 
-    def believe(self, log_ratio: Floats) -> None:
+    def add_evidence(self, log_ratio: Floats) -> None:
         """Add evidence (T,) to the log-odds of existence: Bayes' rule."""
         _believe(self.score, self.best, self.status, log_ratio)
 

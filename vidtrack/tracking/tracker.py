@@ -247,7 +247,7 @@ class Tracker:
         rows = hit.nonzero()[0]
         sure = hit.copy()
         sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
-        register.see(hit, sure, scan.t, dt)
+        register.record_hits(hit, sure, scan.t, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
@@ -263,7 +263,7 @@ class Tracker:
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
         log_ratio[~alone] = 0.0
-        self.register.believe(log_ratio)
+        self.register.add_evidence(log_ratio)
         if self.rates.estimated:
             alone &= self.timing.shown(problem.rows)
             self.rates.learn(found.decision, self.register, alone, problem.inside, problem.measurements, dt)

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.calibration.ground import Ground
 
 _SLENDER, _SLENDER_SIGMA = 0.4, 0.1
 """Width over length of vehicles, from motorcycles and cars (0.4) to lorries (0.25), and its standard deviation."""

@@ -9,14 +9,14 @@ if TYPE_CHECKING:
     from vidtrack.traffic.footprint import Footprints
 
 
-def road_at(site: Path | None, width: int, height: int) -> Footprints | None:
+def footprints_of(site: Path | None, width: int, height: int) -> Footprints | None:
     """Where vehicles stand on the road of the site in a file; None without a site, or without a calibration in it.
 
     width, height  px of the pictures. Raises ConfigError for a bad file, or pictures of another shape than the site's.
     """
     if site is None:
         return None
-    from vidtrack.traffic.calibrate import calibrated  # loads SciPy's optimisers
+    from vidtrack.traffic.calibration.calibrate import calibrated  # loads SciPy's optimisers
     from vidtrack.traffic.footprint import Footprints
     from vidtrack.traffic.site import read_site
 

@@ -108,10 +108,10 @@ def flutter(learn, times, box=LEAF, travel=1.0, known=()):
 
 def test_false_starts_make_a_place_restless_until_they_are_forgotten():
     road = Road(WIDTH, HEIGHT)
-    assert road.caution(PLACE).tolist() == [1.0]
+    assert road.travel_factor(PLACE).tolist() == [1.0]
     flutter(road.learn, 4)
-    assert road.caution(PLACE).tolist() == [3.0]
-    assert road.caution(np.array([[300.0, 200.0], [-50.0, 900.0]])).tolist() == [1.0, 1.0]
+    assert road.travel_factor(PLACE).tolist() == [3.0]
+    assert road.travel_factor(np.array([[300.0, 200.0], [-50.0, 900.0]])).tolist() == [1.0, 1.0]
     before = road.restless.starts.sum()
     road.learn(tracks_of(0.7 + 30.0))
     assert road.restless.starts.sum() == pytest.approx(before / np.e, rel=1e-9)

@@ -83,16 +83,16 @@ def forecast(
     return Forecast(kind, scenario, law, np.arange(1, scans + 1), error, steady)
 
 
-def trial(outlook: Forecast, runs: int, seed: int) -> Trial:
+def trial(expected: Forecast, runs: int, seed: int) -> Trial:
     """Simulate the filter and radar of a forecast in `runs` tracks."""
     from vidtrack.associate.pda import PDA
     from vidtrack.associate.strongest import PSN
     from vidtrack.radar.performance.in_gate import AllPlots, StrongestPlot
     from vidtrack.radar.performance.monte_carlo import root_mean_square, simulate
 
-    scenario, law, limit = outlook.scenario, outlook.law, LIMIT[outlook.kind]
-    rng, scans = np.random.default_rng(seed), len(outlook.scan)
-    if outlook.kind == "psn":
+    scenario, law, limit = expected.scenario, expected.law, LIMIT[expected.kind]
+    rng, scans = np.random.default_rng(seed), len(expected.scan)
+    if expected.kind == "psn":
         strongest = StrongestPlot(law, scenario.cell_volume)
         outcome = simulate(scenario, strongest, PSN(law.snr, law.clutter), scans=scans, runs=runs, rng=rng)
     else:

@@ -185,7 +185,7 @@ class Picture:
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) longer sides, of specks that of the least object; more where the picture is restless."""
         size = np.fmax(longer(box), self.border.speck)  # NaN where there is no box
-        return size * self.road.caution(xy) if self.road else size
+        return size * self.road.travel_factor(xy) if self.road else size
 
     def learn(self, tracks: Tracks) -> None:
         """Update the road with the tracks of a scan."""

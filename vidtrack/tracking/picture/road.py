@@ -19,9 +19,9 @@ class Road:
 
     STATE = ("sizes", "restless")
 
-    def __init__(self, width: float, height: float, *, wary: bool = True) -> None:
-        """width, height of the picture [px]; wary: tracks must travel farther where others began in vain."""
-        self._wary = wary
+    def __init__(self, width: float, height: float, *, careful: bool = True) -> None:
+        """width, height of the picture [px]; careful: tracks must travel farther where others began in vain."""
+        self._wary = careful
         self._width, self._height = width, height
         self.forget()
 
@@ -45,6 +45,6 @@ class Road:
         grown = self.sizes.typical(after) / self.sizes.typical(before)
         return np.tile(np.clip(np.nan_to_num(grown, nan=1.0), 1 / _FASTEST, _FASTEST), 2)
 
-    def caution(self, xy: Floats) -> Floats:
+    def travel_factor(self, xy: Floats) -> Floats:
         """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""
         return np.where(self._wary & self.restless.restless(xy), _CAUTION, 1.0)

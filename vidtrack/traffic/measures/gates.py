@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.lines import Line
 from vidtrack.traffic.polyline import turn
 from vidtrack.traffic.site import Gate, Site

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names

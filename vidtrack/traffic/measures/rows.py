@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint
-from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.measures.runs import Day, Recording
 
 BLOCK = 1 << 18

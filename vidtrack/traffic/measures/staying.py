@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.ground import Ground
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.rows import Rows
 from vidtrack.traffic.site import Site
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import SourceError
-from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import Day, open_day

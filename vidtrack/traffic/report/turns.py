@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.site import Site
 

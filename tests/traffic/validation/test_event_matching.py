@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidtrack.traffic.event_matching import match
+from vidtrack.traffic.validation.event_matching import match
 
 TIMES = st.lists(st.integers(0, 40).map(lambda tenths: tenths / 10), max_size=5)
 

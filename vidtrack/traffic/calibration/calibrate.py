@@ -11,12 +11,12 @@ from scipy.special import chdtri
 
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.ground import Ground
-from vidtrack.traffic.homography import Fit, Normal, by_k, by_point, depth, fitted, picture_of, plane_of
-from vidtrack.traffic.hull import hull
-from vidtrack.traffic.lens import lens_of
+from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.calibration.homography import Fit, Normal, by_k, by_point, depth, fitted, picture_of, plane_of
+from vidtrack.traffic.calibration.hull import hull
+from vidtrack.traffic.calibration.lens import lens_of
+from vidtrack.traffic.calibration.straight_road import straight_road
 from vidtrack.traffic.site import Calibration, Site
-from vidtrack.traffic.straight_road import straight_road
 
 _log = logging.getLogger(__name__)
 
@@ -132,13 +132,13 @@ def calibrated(site: Site) -> Ground:
     assert site.calibration is not None
     if not site.calibration.picture:
         found = straight_road(site)
-        for line in found.complaints():
+        for line in found.doubts():
             _log.warning("%s", line)
         return found.ground
     pairs = pairs_of(site)
     fit = solved(pairs)
     check = checked(pairs, fit)
-    for line in complaints(site, check):
+    for line in doubts(site, check):
         _log.warning("%s", line)
     return road_plane(site, pairs, fit, check)
 
@@ -198,7 +198,7 @@ def checked(pairs: Pairs, fit: Fit) -> Check:
     )
 
 
-def complaints(site: Site, check: Check) -> list[str]:
+def doubts(site: Site, check: Check) -> list[str]:
     """What the user should know about the calibration, in words."""
     calibration = site.calibration
     assert calibration is not None

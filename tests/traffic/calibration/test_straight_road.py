@@ -5,10 +5,10 @@ import pytest
 from pinhole import HEIGHT, WIDTH
 
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.account import examined
-from vidtrack.traffic.calibrate import calibrated
+from vidtrack.traffic.calibration.account import examined
+from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.calibration.straight_road import homography, straight_road
 from vidtrack.traffic.site import Site
-from vidtrack.traffic.straight_road import homography, straight_road
 
 TRUE = np.array([np.radians(18), np.radians(-14), np.radians(1.5), np.log(1100.0), np.log(7.5)])
 """pitch, yaw, roll, log focal length, log height"""
@@ -64,7 +64,7 @@ def test_a_level_camera_of_known_focal_length_needs_nothing_across():
     site = site_of(level, across=[], along=ALONG[:2], lengths=LENGTHS[:1], focal_px=1100)
     fit = straight_road(site)
     assert fit.spare == 0
-    assert "leave nothing to check" in fit.complaints()[0]
+    assert "leave nothing to check" in fit.doubts()[0]
     assert np.allclose(fit.ground.metres(picture(LOOKED_AT, level)), LOOKED_AT, atol=1e-3)
 
 
@@ -89,7 +89,7 @@ def test_a_wrong_length_is_noticed():
     changed = site.model_copy(update={"calibration": site.calibration.model_copy(update={"lengths": tuple(wrong)})})
     fit = straight_road(changed)
     assert fit.contradiction
-    assert "do not agree" in fit.complaints()[0]
+    assert "do not agree" in fit.doubts()[0]
     assert examined(changed).report["contradiction"]
 
 

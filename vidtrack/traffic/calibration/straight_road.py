@@ -17,10 +17,10 @@ from scipy.special import chdtri
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.ground import Ground
-from vidtrack.traffic.homography import Normal
-from vidtrack.traffic.hull import hull
-from vidtrack.traffic.lens import lens_of
+from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.calibration.homography import Normal
+from vidtrack.traffic.calibration.hull import hull
+from vidtrack.traffic.calibration.lens import lens_of
 from vidtrack.traffic.site import Site
 
 _FALSE_ALARM = 0.01
@@ -61,7 +61,7 @@ class RoadFit:
     spare: int
     contradiction: bool
 
-    def complaints(self) -> list[str]:
+    def doubts(self) -> list[str]:
         """What the user should know about the calibration, in words."""
         if self.spare == 0:
             return ["these segments leave nothing to check the calibration with; give more of them"]

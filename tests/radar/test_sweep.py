@@ -6,8 +6,8 @@ from scipy.spatial import KDTree
 
 from vidtrack.config.load import load
 from vidtrack.estimate.sensor import POSITION
-from vidtrack.radar.performance.sweep import Sweep
 from vidtrack.radar.sensors import RangeAzimuthElevation
+from vidtrack.radar.sweep import Sweep
 from vidtrack.run.radar import track_plots
 
 PERIOD_S = 4.0

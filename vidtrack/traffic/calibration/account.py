@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.traffic.calibrate import checked, complaints, pairs_of, road_plane, solved
+from vidtrack.traffic.calibration.calibrate import checked, doubts, pairs_of, road_plane, solved
+from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.calibration.straight_road import straight_road
 from vidtrack.traffic.footprint import velocity
-from vidtrack.traffic.ground import Ground
 from vidtrack.traffic.site import Site
-from vidtrack.traffic.straight_road import straight_road
 
 _HEIGHT_SIGMAS, _HEIGHT_SHARE = 3.0, 0.1
 """A stated height of the camera contradicts the points when it is off by both of these."""
@@ -61,7 +61,7 @@ def examined(site: Site) -> Account:
         "contradiction": check.contradiction,
         "camera": found,
         "places": places(ground, picture),
-        "warnings": complaints(site, check) + height_complaint(found, calibration.camera_height_m),
+        "warnings": doubts(site, check) + height_doubt(found, calibration.camera_height_m),
     }
     return Account(ground, report, picture, fitted)
 
@@ -82,7 +82,7 @@ def _without_map(site: Site) -> Account:
         "contradiction": fit.contradiction,
         "camera": found,
         "places": places(fit.ground, picture),
-        "warnings": fit.complaints() + height_complaint(found, calibration.camera_height_m),
+        "warnings": fit.doubts() + height_doubt(found, calibration.camera_height_m),
     }
     return Account(fit.ground, report, picture, picture)
 
@@ -127,7 +127,7 @@ def camera(ground: Ground) -> dict[str, float] | None:
     }
 
 
-def height_complaint(found: dict[str, float] | None, stated_m: float | None) -> list[str]:
+def height_doubt(found: dict[str, float] | None, stated_m: float | None) -> list[str]:
     """A word about a stated height of the camera that the points contradict."""
     if found is None or stated_m is None:
         return []

@@ -23,9 +23,9 @@ from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.lock import exclusive
 from vidtrack.output.repair import read_tracks
 from vidtrack.run.live.cameras import Entry, extras_of, listed, named, settings_of
-from vidtrack.run.live.many import Many
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.supervisor import _continued
+from vidtrack.run.live.supervisors import Supervisors
 from vidtrack.run.live.worker import Job
 
 SECRET = "u:pass%40word@"
@@ -94,20 +94,20 @@ def test_a_process_that_is_killed_is_started_again(camera, tmp_path, caplog):
     """It goes on with its numbers, what it wrote stays, and nobody else notices."""
     extras = LiveExtras(state=tmp_path / "a.state", video=tmp_path / "a.mp4")
     jobs = [replace(job("a", camera.url(), tmp_path), extras=extras), job("b", camera.url(), tmp_path)]
-    with Many(jobs, tmp_path) as many:
-        a, b = many.supervisors.values()
+    with Supervisors(jobs, tmp_path) as cameras:
+        a, b = cameras.by_camera.values()
         wait_for(lambda: rows(tmp_path / "a") > 5 and rows(tmp_path / "b") > 5)
         assert a.status()["state"] == "running"
         assert a.status()["reading"]["width"] == 320
         assert cv2.imdecode(np.frombuffer(a.picture(), np.uint8), cv2.IMREAD_COLOR).shape == (240, 320, 3)
         a.kill()
-        wait_for(lambda: not many.running(0.05) or a.status()["state"] == "waiting")
+        wait_for(lambda: not cameras.running(0.05) or a.status()["state"] == "waiting")
         assert a.error is None
         frame = b.status()["frame"]
-        wait_for(lambda: many.running(0.05) and rows(tmp_path / "a-2") > 5)
+        wait_for(lambda: cameras.running(0.05) and rows(tmp_path / "a-2") > 5)
         assert b.status()["frame"] > frame
-        assert [status["state"] for status in many.statuses()] == ["running", "running"]
-        assert [status["restarts"] for status in many.statuses()] == [1, 0]
+        assert [status["state"] for status in cameras.statuses()] == ["running", "running"]
+        assert [status["restarts"] for status in cameras.statuses()] == [1, 0]
         assert a.status()["problems"][0][1] == "its process ended with code -9; it is started again"
     first, second = (read_tracks(tmp_path / folder / "tracks.csv") for folder in ("a", "a-2"))
     assert min(second["track_id"].to_pylist()) > max(first["track_id"].to_pylist())
@@ -125,17 +125,17 @@ def test_a_process_that_is_killed_is_started_again(camera, tmp_path, caplog):
 
 
 def test_a_process_that_said_why_it_ended_is_not(tmp_path):
-    with Many([job("a", "/dev/video77", tmp_path)], tmp_path) as many:
-        wait_for(lambda: not many.running(0.05))
-        assert "no such device" in many.supervisors["a"].error
-        assert many.supervisors["a"].restarts == 0
+    with Supervisors([job("a", "/dev/video77", tmp_path)], tmp_path) as cameras:
+        wait_for(lambda: not cameras.running(0.05))
+        assert "no such device" in cameras.by_camera["a"].error
+        assert cameras.by_camera["a"].restarts == 0
 
 
 def test_it_is_tried_for_ever_once_it_crashed(tmp_path):
-    with Many([job("a", NOBODY, tmp_path)], tmp_path) as many:
-        worker = many.supervisors["a"]
+    with Supervisors([job("a", NOBODY, tmp_path)], tmp_path) as cameras:
+        worker = cameras.by_camera["a"]
         worker.kill()
-        wait_for(lambda: many.running(0.05) and worker.restarts > 1)
+        wait_for(lambda: cameras.running(0.05) and worker.restarts > 1)
         assert any("connection refused" in what for _, what in worker.status()["problems"])
 
 
@@ -173,7 +173,7 @@ def is_alive(arguments):
 
 def test_a_second_run_into_the_folder_is_refused(tmp_path):
     with exclusive(tmp_path), pytest.raises(OutputError, match="in use by another run"):
-        Many([], tmp_path)
+        Supervisors([], tmp_path)
 
 
 def job(name, address, root):

@@ -6,8 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.event_tables import Events
-from vidtrack.traffic.validate import WANTED_BIAS, Estimate, figures_of, geh, net_bias, noted_for, proportion, validate
+from vidtrack.traffic.validation.event_tables import Events
+from vidtrack.traffic.validation.validate import (
+    WANTED_BIAS,
+    Estimate,
+    figures_of,
+    geh,
+    net_bias,
+    noted_for,
+    proportion,
+    validate,
+)
 
 
 def events(*rows, certain=True):

@@ -14,7 +14,7 @@ from vidtrack.cli.options import start_log
 
 if TYPE_CHECKING:
     from vidtrack.cli.live import LiveOptions
-    from vidtrack.run.live.many import Many, Supervisor
+    from vidtrack.run.live.supervisors import Supervisor, Supervisors
     from vidtrack.serve.page import Page
 
 _REPORT_S = 60.0
@@ -31,7 +31,7 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     from vidtrack.cli.signals import stopping
     from vidtrack.output.folder import open_run, usable
     from vidtrack.run.live.cameras import extras_of, listed, named, settings_of
-    from vidtrack.run.live.many import Many
+    from vidtrack.run.live.supervisors import Supervisors
     from vidtrack.run.live.worker import Job
 
     for_all: Mapping[str, Any] = {}
@@ -47,29 +47,29 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
         Job(camera.name, camera.address, settings, folder / camera.name, extras, options.force, log)
         for camera, settings, extras in zip(cameras, wanted, own, strict=True)
     ]
-    with Many(jobs, folder) as many, stopping(many.stop):
+    with Supervisors(jobs, folder) as supervisors, stopping(supervisors.stop):
         if page is not None:
-            _show(page, many)
+            _show(page, supervisors)
         reported_s = time.monotonic()
-        while many.running(_LOOK_S):
+        while supervisors.running(_LOOK_S):
             if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
                 reported_s = time.monotonic()
-                for name, supervisor in many.supervisors.items():
+                for name, supervisor in supervisors.by_camera.items():
                     click.echo(f"{name}: {_line(supervisor)}", err=True)
     if not options.quiet:
-        _print_table(many)
+        _print_table(supervisors)
     click.echo(folder)
-    codes = [supervisor.exit_code or 0 for supervisor in many.supervisors.values() if supervisor.error]
+    codes = [supervisor.exit_code or 0 for supervisor in supervisors.by_camera.values() if supervisor.error]
     return max(1, *codes) if len(codes) == len(jobs) else 0
 
 
-def _show(page: Page, many: Many) -> None:
+def _show(page: Page, supervisors: Supervisors) -> None:
     from vidtrack.serve.camera import Camera
 
     page.show(
         {
             name: Camera(supervisor.status, supervisor.picture, stale_s=2 * supervisor.job.settings.live.timeout_s)
-            for name, supervisor in many.supervisors.items()
+            for name, supervisor in supervisors.by_camera.items()
         }
     )
 
@@ -88,12 +88,12 @@ def _line(supervisor: Supervisor) -> str:
     )
 
 
-def _print_table(many: Many) -> None:
+def _print_table(supervisors: Supervisors) -> None:
     from rich.console import Console
     from rich.table import Table
 
     columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls", "restarts")
-    summary = many.summary()
+    summary = supervisors.summary()
     table = Table("camera", *(name.replace("frames_", "") for name in columns), "end")
     for name, camera in summary["cameras"].items():
         end = "by an error" if "error" in camera else "well"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidtrack.tracking.picture.road import Road
-from vidtrack.video.blobs.outlook import Outlook
+from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame
 
@@ -13,9 +13,9 @@ EMPTY = np.zeros((120, 160), np.uint8)
 
 def said(level, road, seconds=20):
     """All that is said in so many seconds of pictures of this luminance."""
-    outlook, foreground = Outlook(), Foreground(EMPTY, EMPTY.astype(np.float32), 1)
+    checks, foreground = LimitChecks(), Foreground(EMPTY, EMPTY.astype(np.float32), 1)
     pictures = (Frame(k, 0.2 * k, np.full((120, 160), level, np.uint8)) for k in range(5 * seconds))
-    return [what for frame in pictures for what in outlook.look(frame, foreground, road)]
+    return [what for frame in pictures for what in checks.look(frame, foreground, road)]
 
 
 def test_a_dark_picture_is_said_once():

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from pinhole import POINTS, Pinhole, site_of
 
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.account import examined
-from vidtrack.traffic.calibrate import calibrated, checked, complaints, pairs_of, solved
-from vidtrack.traffic.lens import Lens
+from vidtrack.traffic.calibration.account import examined
+from vidtrack.traffic.calibration.calibrate import calibrated, checked, doubts, pairs_of, solved
+from vidtrack.traffic.calibration.lens import Lens
 
 CAMERA = Pinhole()
 LOOKED_AT = np.array([[0, 20.0], [-5, 16], [5, 40]])
@@ -76,7 +76,7 @@ def test_errors_have_the_covariance_that_is_given():
 
 def _ground(site):
     """The road plane with the standard deviations as they are given, whatever chance made of the points."""
-    from vidtrack.traffic.calibrate import Check, road_plane
+    from vidtrack.traffic.calibration.calibrate import Check, road_plane
 
     pairs = pairs_of(site)
     nothing = np.empty(0)
@@ -118,7 +118,7 @@ def test_a_wrong_pair_is_named_and_the_others_are_not():
         check = checked(pairs, solved(pairs))
         assert check.wrong == (wrong,)
         assert check.contradiction
-        assert f"pair {wrong + 1} of the calibration" in complaints(site, check)[0]
+        assert f"pair {wrong + 1} of the calibration" in doubts(site, check)[0]
 
 
 def test_good_pairs_are_rarely_blamed():
@@ -138,7 +138,7 @@ def test_five_pairs_can_disagree_but_none_can_be_named():
     check = checked(pairs, solved(pairs))
     assert check.contradiction
     assert not check.wrong
-    assert "too few to say which is wrong" in complaints(site, check)[0]
+    assert "too few to say which is wrong" in doubts(site, check)[0]
     assert np.isfinite(check.without_px).all()
 
 

@@ -16,7 +16,7 @@ _RESTLESS = 0.3  # share of the picture's cells
 _THIN = 8  # every so many pixels are looked at
 
 
-class Outlook:
+class LimitChecks:
     """Checks once a second; a condition that lasts for five checks gives one warning."""
 
     def __init__(self) -> None:

@@ -26,10 +26,10 @@ _END_S = 1.8  # then processes still running are killed; their files stay valid
 _COUNTED = ("frames", "frames_dropped", "decode_errors", "reconnects", "stalls", "tracks")
 
 
-class Many:
+class Supervisors:
     """Context manager that tracks several cameras at once. Leaving it ends all processes within two seconds.
 
-    supervisors  by camera name
+    by_camera  each camera's supervisor, by its name
 
     Raises OutputError if another run uses the folder.
     """
@@ -39,7 +39,7 @@ class Many:
         self._stopping = Event()
         self._lock = ExitStack()
         self._lock.enter_context(exclusive(folder))
-        self.supervisors = {job.name: Supervisor(job) for job in jobs}
+        self.by_camera = {job.name: Supervisor(job) for job in jobs}
 
     def running(self, timeout_s: float) -> bool:
         """Wait up to `timeout_s`, restarting crashed processes; False when all have ended or `stop` was called.
@@ -47,28 +47,28 @@ class Many:
         Returns early when a process ends.
         """
         if not self._stopping.is_set():
-            wait([supervisor.sentinel for supervisor in _alive(self.supervisors.values())], timeout_s)
-            for supervisor in self.supervisors.values():
+            wait([supervisor.sentinel for supervisor in _alive(self.by_camera.values())], timeout_s)
+            for supervisor in self.by_camera.values():
                 supervisor.restart_if_due()
-        return not self._stopping.is_set() and not all(supervisor.ended for supervisor in self.supervisors.values())
+        return not self._stopping.is_set() and not all(supervisor.ended for supervisor in self.by_camera.values())
 
     def stop(self) -> None:
         """Stop all processes; `running` then returns False. Safe in any thread and in signal handlers."""
         self._stopping.set()
-        for supervisor in self.supervisors.values():
+        for supervisor in self.by_camera.values():
             supervisor.stop()
 
     def statuses(self) -> list[dict[str, Any]]:
         """Name and status of each camera."""
-        return [{"name": name, **supervisor.status()} for name, supervisor in self.supervisors.items()]
+        return [{"name": name, **supervisor.status()} for name, supervisor in self.by_camera.items()]
 
     def summary(self) -> dict[str, Any]:
         """The summaries of all cameras, with the sums of their counts; `error` for a camera that failed."""
-        cameras = {name: _summary(supervisor) for name, supervisor in self.supervisors.items()}
+        cameras = {name: _summary(supervisor) for name, supervisor in self.by_camera.items()}
         totals = {key: sum(camera.get(key, 0) for camera in cameras.values()) for key in (*_COUNTED, "restarts")}
         return {**totals, "cameras": cameras}
 
-    def __enter__(self) -> Many:
+    def __enter__(self) -> Supervisors:
         return self
 
     def __exit__(
@@ -76,7 +76,7 @@ class Many:
     ) -> None:
         self.stop()
         until_s = monotonic() + _END_S
-        while (alive := _alive(self.supervisors.values())) and monotonic() < until_s:
+        while (alive := _alive(self.by_camera.values())) and monotonic() < until_s:
             wait([supervisor.sentinel for supervisor in alive], until_s - monotonic())
         for supervisor in alive:
             supervisor.kill()

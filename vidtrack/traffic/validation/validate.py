@@ -14,8 +14,8 @@ from scipy.special import betaincinv, gammaincinv
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.event_matching import match
-from vidtrack.traffic.event_tables import Events, written
+from vidtrack.traffic.validation.event_matching import match
+from vidtrack.traffic.validation.event_tables import Events, written
 
 _TAIL = 0.025
 WANTED_BIAS = 0.05

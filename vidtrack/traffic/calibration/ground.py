@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.traffic.homography import Normal, by_k, by_point, depth, matrix, picture_of, plane_of
-from vidtrack.traffic.hull import within
-from vidtrack.traffic.lens import Lens
-from vidtrack.traffic.pose import Pose, pose_of
+from vidtrack.traffic.calibration.homography import Normal, by_k, by_point, depth, matrix, picture_of, plane_of
+from vidtrack.traffic.calibration.hull import within
+from vidtrack.traffic.calibration.lens import Lens
+from vidtrack.traffic.calibration.pose import Pose, pose_of
 
 _EDGE = 3.0
 """Standard deviations of a calibration point by which the hull is widened: so well are its corners known."""

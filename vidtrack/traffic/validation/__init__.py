@@ -1,0 +1,1 @@
+"""Counts against a count by hand, event by event. Read `validate.py` first."""
