@@ -131,14 +131,22 @@ def command(options: LiveOptions) -> int:
 def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> None:
     from vidtrack.cli.signals import stopping
     from vidtrack.run.live.run import LiveRun
+    from vidtrack.run.live.view import View
     from vidtrack.serve.camera import Camera
+    from vidtrack.video.live.address import parse_address
 
+    stale_s = 2 * settings.live.timeout_s
+    address = parse_address(options.sources[0], settings.live.timeout_s)
+    view = View(address.shown)
+    if page is not None:
+        page.show({address.name: Camera(view.status, view.picture, stale_s)})
     with (
-        LiveRun(options.sources[0], settings, options.output, options.extras(), force=options.force) as run,
+        LiveRun(
+            options.sources[0], settings, options.output, options.extras(), force=options.force, stats=view.stats
+        ) as run,
         stopping(run.stop),
     ):
-        if page is not None:
-            page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
+        view.board = run.board
         reported_s = time.monotonic()
         for _ in run:
             if not options.quiet and time.monotonic() - reported_s > _REPORT_S:

@@ -16,6 +16,9 @@ class LiveSettings(Group):
     """s; pause before the second attempt to connect, doubled at each further attempt"""
     backoff_longest_s: float = Field(30.0, gt=0)
     """s; longest pause between two attempts"""
+    retry_first: bool = False
+    """a camera that cannot be opened at the start is tried again without limit, as a lost one is, unless it refuses the
+    password; false: it is given up after three failures. With several cameras: true"""
     roll_s: float | None = Field(None, gt=0)
     """s; length of a sub-folder of results, aligned to the clock; None: one folder, or hourly if live.keep_* is set"""
     keep_s: float | None = Field(None, gt=0)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from time import monotonic
 from typing import Any, Generic, TypeVar
-
-from vidtrack.output.status import StatusBoard
 
 Status = Mapping[str, Any]
 Value = TypeVar("Value")
@@ -27,16 +25,6 @@ class Camera:
     status: Callable[[], Status]
     picture: Callable[[], bytes | None]
     stale_s: float = 10.0
-
-    @classmethod
-    def of(cls, board: StatusBoard, stale_s: float) -> Camera:
-        """A camera of this process."""
-
-        def status() -> Status:
-            now = board.now()
-            return {field.name: getattr(now, field.name) for field in fields(now)}
-
-        return cls(status, board.picture, stale_s)
 
     def delivers(self, status: Status) -> bool:
         """Whether the camera runs and its frames are tracked."""

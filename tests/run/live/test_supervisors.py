@@ -183,6 +183,7 @@ def job(name, address, root):
 def test_cameras_that_all_fail_end_the_run(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     sets = [part for assignment in QUICK for part in ("--set", assignment)]
+    sets += ["--set", "live.retry_first=false"]
     arguments = ["live", NOBODY, "/dev/video77", "-o", "out", *sets]
     result = CliRunner().invoke(cli, arguments, standalone_mode=False)
     assert (result.exception, result.return_value) == (None, 3)

@@ -28,6 +28,7 @@ from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection
 from vidtrack.video.live.source import LiveSource
+from vidtrack.video.live.stats import LiveStats
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
 
@@ -46,6 +47,8 @@ class LiveRun:
     After the first picture only `stop` ends the iteration: a lost camera is reopened without limit, and results that
     cannot be written are counted.
     Raises SourceError, ConfigError, FormatError, OutputError at the start.
+
+    stats  of the camera, which other threads may read before the first picture; None: of the run alone
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class LiveRun:
         *,
         force: bool = False,
         connect: Callable[[], Connection] | None = None,
+        stats: LiveStats | None = None,
     ) -> None:
         extras, live = extras or LiveExtras(), settings.live
         refuse_link(settings.output, "live runs")
@@ -75,7 +79,7 @@ class LiveRun:
                 NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, retention)
             )
             stack.callback(self._recorder.close)
-            self._source = source = stack.enter_context(self._open_source(connect))
+            self._source = source = stack.enter_context(self._open_source(connect, stats))
             stack.enter_context(frame_by_frame(settings.detector.kind))
             self._checkpoint = self._restored(explain=extras.explain)
             if extras.state or extras.record:
@@ -122,11 +126,11 @@ class LiveRun:
             self._outputs.close(until_s)
             self._checkpoint_file.close(None if self._in_work else self._checkpoint, until_s)
 
-    def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
+    def _open_source(self, connect: Callable[[], Connection] | None, stats: LiveStats | None) -> LiveSource:
         """Open the camera; numbers and times continue from a saved state."""
         live, found = self._settings.live, self._checkpoint_file.found
         if found is None:
-            return LiveSource(self._address, live, self._recorder, connect=connect)
+            return LiveSource(self._address, live, self._recorder, connect=connect, stats=stats)
         since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
         return LiveSource(
             self._address,
@@ -136,6 +140,7 @@ class LiveRun:
             origin_s=monotonic() - since_s,
             like=Frame.blank((found["height"], found["width"]), found["coloured"]),
             connect=connect,
+            stats=stats,
         )
 
     def _restored(self, explain: bool) -> Checkpoint:

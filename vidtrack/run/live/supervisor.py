@@ -17,7 +17,8 @@ from time import monotonic
 from typing import Any
 
 from vidtrack.recording.retention import parts_of
-from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, unknown, work
+from vidtrack.run.live.view import waiting_for
+from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, work
 from vidtrack.video.live.address import redact
 from vidtrack.video.live.backoff import Backoff
 
@@ -123,7 +124,7 @@ class Supervisor:
 
     def _start(self, job: Job) -> None:
         self.job = job
-        self._last = unknown(self._shown)
+        self._last = waiting_for(self._shown, "connecting", [])
         self._begun = self._final_status_came = False
         self._started_s = monotonic()
         self._channel, theirs = _SPAWN.Pipe()
