@@ -16,7 +16,6 @@ from vidtrack.config.settings import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
 from vidtrack.tracks import TENTATIVE
-from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
 
@@ -61,7 +60,7 @@ class Summary:
     source   name of the input, without any password
     reading  returns the source's counters: fps, width, height, frames_read, frames_dropped, decode_errors,
              reconnects, stalls, truncated
-    counter  line counter; None without counting lines
+    counts   returns the counts by line and direction; None without counting lines
     unit     of the steps: "frames" or "scans"
 
     `interrupted` is True until the run clears it before `close`, so the file of a killed or failed run has it True.
@@ -73,7 +72,7 @@ class Summary:
         source: str,
         settings: Settings,
         reading: Callable[[], Mapping[str, object]],
-        counter: LineCounter | None = None,
+        counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None,
         unit: str = "frames",
     ) -> None:
         self.interrupted = True
@@ -82,7 +81,7 @@ class Summary:
         self._settings = settings.model_dump(mode="json")
         self._versions = _versions()
         self._reading = reading
-        self._counter = counter
+        self._counts = counts
         self._unit = unit
         self._start = time.monotonic()
         self._frames = 0
@@ -121,7 +120,7 @@ class Summary:
             self._unit: self._frames,
             "media_s": round(self._media_s, 6),
             "tracks": self._tracks,
-            "counts": {} if self._counter is None else self._counter.totals(),
+            "counts": {} if self._counts is None else self._counts(),
             "camera": self._camera.as_dict(),
             "warnings": self._warnings,
             "seconds": round(time.monotonic() - self._start, 3),

@@ -62,9 +62,10 @@ class Subject:
         """The counted lines."""
         return self.counter.lines if self.counter else ()
 
-    def summary(self, folder: Path) -> Summary:
-        """Opens summary.json in a folder."""
-        return Summary(folder / "summary.json", self.source, self.settings, self.reading, self.counter)
+    def summary(self, folder: Path, counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None) -> Summary:
+        """Opens summary.json in a folder, with these counts instead of those of the whole run."""
+        counts = counts or (self.counter.totals if self.counter else None)
+        return Summary(folder / "summary.json", self.source, self.settings, self.reading, counts)
 
 
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:

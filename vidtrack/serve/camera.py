@@ -26,10 +26,15 @@ class Camera:
     picture: Callable[[], bytes | None]
     stale_s: float = 10.0
 
-    def delivers(self, status: Status) -> bool:
-        """Whether the camera runs and its frames are tracked."""
+    def trouble(self, status: Status) -> str | None:
+        """Why the camera does not deliver; None if it runs, its frames are tracked, and the results are written."""
         age_s = status.get("frame_age_s")
-        return status["state"] == "running" and age_s is not None and age_s <= self.stale_s
+        if status["state"] != "running":
+            return str(status["state"])
+        if age_s is None or age_s > self.stale_s:
+            return "no frames"
+        failing = [f"{output}: {why}" for output, why in status.get("failing", {}).items()]
+        return "; ".join(failing) or None
 
 
 class Shared(Generic[Value]):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from pathlib import Path
 from threading import Thread
 from time import monotonic
@@ -61,6 +62,7 @@ class NoCheckpointFile:
 
     found: State | None = None
     lost = 0
+    failing: str | None = None
 
     def offer(self, checkpoint: Checkpoint) -> None:
         """Do nothing."""
@@ -74,15 +76,19 @@ class CheckpointFile:
 
     found  state saved by an earlier run; None without one
     lost   number of failed saves
+    failing  why the last save failed; None: it did not
+    tell   called with what goes wrong
 
     Raises FormatError if the file is not a saved state, OutputError if its folder is not writable; the first `offer`
     raises OutputError too.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, tell: Callable[[str], None] = log.warning) -> None:
         usable(path.parent)
         self.path = path
         self.lost = 0
+        self.failing: str | None = None
+        self._tell = tell
         self.found = read_state(path) if path.exists() else None
         self._due = Every(_SAVE_S)
         self._reserved = 0
@@ -125,4 +131,7 @@ class CheckpointFile:
             write_state(self.path, state)
         except OSError as error:
             self.lost += 1
-            log.warning("cannot save the state in %s: %s; it is tried again", self.path, error.strerror or error)
+            self.failing = error.strerror or str(error)
+            self._tell(f"cannot save the state in {self.path}: {self.failing}; it is tried again")
+        else:
+            self.failing = None

@@ -17,6 +17,7 @@ from time import monotonic
 from typing import Any
 
 from vidtrack.recording.retention import parts_of
+from vidtrack.run.live.counting import COUNTS
 from vidtrack.run.live.view import waiting_for
 from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, work
 from vidtrack.video.live.address import redact
@@ -189,8 +190,14 @@ def _continued(job: Job, start: int) -> Job:
             video=extras.video and _numbered(extras.video, start),
             rerun=extras.rerun and str(_numbered(Path(extras.rerun), start)),
             masks=extras.masks and _numbered(extras.masks, start),
+            counts=counts_of(job),
         ),
     )
+
+
+def counts_of(job: Job) -> Path:
+    """The folder of the counts by interval, which all processes of a camera share."""
+    return job.extras.counts or job.folder / COUNTS
 
 
 def _free(folder: Path) -> Path:

@@ -15,7 +15,7 @@ from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
-from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
+from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
 from vidtrack.traffic.measures.lives import Lives
 from vidtrack.traffic.measures.passing import Passed, Passing
@@ -232,17 +232,7 @@ class _Figures:
                 "gate": ("", gate),
                 "direction": ("", direction),
                 **self._when(ways),
-                "count": ("n", found.count.ravel()),
-                "count_low": ("n", found.low.ravel()),
-                "count_high": ("n", found.high.ravel()),
-                "flow_per_h": ("1/h", found.flow.ravel()),
-                "time_mean_speed_kmh": ("km/h", 3.6 * found.time_mean.ravel()),
-                "speed_sigma_kmh": ("km/h", 3.6 * found.own.ravel()),
-                "speed_shared_sigma_kmh": ("km/h", 3.6 * found.shared.ravel()),
-                "space_mean_speed_kmh": ("km/h", 3.6 * found.space_mean.ravel()),
-                "v85_kmh": ("km/h", 3.6 * found.v85.ravel()),
-                "occupancy": ("1", found.occupancy.ravel()),
-                "density_per_km": ("1/km", found.density.ravel()),
+                **figure_columns(found),
             }
         )
 
