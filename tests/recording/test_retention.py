@@ -6,6 +6,7 @@ from datetime import datetime
 
 import pytest
 
+from vidtrack.errors import ConfigError
 from vidtrack.recording.retention import Limits, Retention, new_part, parts_of, size_of
 
 
@@ -170,3 +171,18 @@ def test_each_kind_has_a_limit_of_its_own(tmp_path):
     assert left(tmp_path / "out") == [0, 1, 2, 3]
     assert left(tmp_path / "tape") == [2, 3]
     assert (retention.tracks_part, retention.recordings_part) == (None, 2500 / 8)
+
+
+@pytest.mark.parametrize(
+    ("limits", "kind"),
+    [
+        ({"both": Limits(None, 1e6)}, "live.keep_bytes = 1 MB"),
+        ({"both": Limits(), "tracks": Limits(None, 3e6)}, "live.keep_tracks_bytes = 3 MB"),
+        ({"both": Limits(), "recordings": Limits(None, 50e6)}, "live.keep_recordings_bytes = 50 MB"),
+    ],
+)
+def test_limits_that_cannot_be_held_are_refused(limits, kind):
+    """A part of the recording holds a state of 4 MB, one of the results a picture of 230 kB."""
+    with pytest.raises(ConfigError, match=f"{kind} cannot be held.*give at least"):
+        Retention(**limits).refuse_small(230e3, 4e6)
+    Retention(Limits(None, 64e6), Limits(None, 4e6), Limits(None, 64e6)).refuse_small(230e3, 4e6)

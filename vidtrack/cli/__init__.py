@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import sys
 from importlib import import_module
 from importlib.metadata import version
 
@@ -11,6 +10,7 @@ import click
 
 from vidtrack.cli.signals import Terminated, terminate
 from vidtrack.errors import Error
+from vidtrack.run.live.leave import leave
 
 COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
@@ -85,7 +85,7 @@ def main() -> None:
     except OSError as error:  # for example a full disk or a read-only folder, without a more specific error
         place = f" {error.filename}" if error.filename else ""
         code = _report_error(f"cannot read or write{place}: {error.strerror or error}", 1)
-    sys.exit(code)
+    leave(code or 0)
 
 
 def _report_error(message: str, code: int) -> int:

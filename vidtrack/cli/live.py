@@ -156,14 +156,14 @@ def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> N
     address = parse_address(options.sources[0], settings.live.timeout_s)
     view = View(address.shown)
     if page is not None:
-        page.show({address.name: Camera(view.status, view.picture, stale_s)})
+        page.show({address.name: Camera(view.status, view.picture, lambda: view.counts, stale_s)})
     with (
         LiveRun(
             options.sources[0], settings, options.output, options.extras(), force=options.force, stats=view.stats
         ) as run,
         stopping(run.stop),
     ):
-        view.board = run.board
+        view.board, view.counts = run.board, run.counts
         reported_s = time.monotonic()
         for _ in run:
             if not options.quiet and time.monotonic() - reported_s > _REPORT_S:

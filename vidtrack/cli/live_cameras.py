@@ -68,7 +68,9 @@ def _show(page: Page, supervisors: Supervisors) -> None:
 
     page.show(
         {
-            name: Camera(supervisor.status, supervisor.picture, stale_s=2 * supervisor.job.settings.live.timeout_s)
+            name: Camera(
+                supervisor.status, supervisor.picture, supervisor.counts, 2 * supervisor.job.settings.live.timeout_s
+            )
             for name, supervisor in supervisors.by_camera.items()
         }
     )

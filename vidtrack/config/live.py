@@ -40,6 +40,8 @@ class LiveSettings(Group):
     reserve_bytes: float | None = Field(None, ge=0)
     """bytes of a disk that recordings leave free, and a fifth of which tracks leave free; None: 5 % of the disk, up to
     1 GB"""
+    replace_state: bool = False
+    """a state that cannot be used is set aside, and numbers go on far ahead; false: it ends the run with an error"""
     zone: str | None = None
     """time zone of days and of the clock on pictures, such as Europe/Berlin; None: that of this machine"""
     every_frame: bool = False

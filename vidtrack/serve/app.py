@@ -16,6 +16,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from vidtrack.serve.camera import Camera, Shared, Status
+from vidtrack.serve.counts import Counts
 from vidtrack.serve.metrics import CONTENT_TYPE, metrics
 
 log = logging.getLogger(__name__)
@@ -34,6 +35,7 @@ class Answers:
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
         self._cameras = dict(cameras)
         self._statuses = {name: Shared(camera.status, _STATUS_S) for name, camera in cameras.items()}
+        self._counts = Counts(cameras)
         self._pictures = [Shared(camera.picture, _PICTURE_S) for camera in cameras.values()]
 
     def app(self) -> Starlette:
@@ -46,6 +48,7 @@ class Answers:
                 Route("/tracks", self.tracks),
                 Route("/metrics", self.metrics),
                 Route("/healthz", self.healthz),
+                *self._counts.routes(),
                 Mount("/static", StaticFiles(directory=_STATIC)),
             ],
             exception_handlers={Exception: _failed},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from time import monotonic
 from typing import Any, Generic, TypeVar
 
@@ -19,11 +20,13 @@ class Camera:
     status   returns the fields of `vidtrack.output.status.LiveStatus` as plain data; only `source`, `state` and
              `problems` are required
     picture  returns the newest annotated picture as JPEG; None before the first one
+    counts   returns the folder of its counts by interval; None without counting lines
     stale_s  a camera whose last frame is older than this does not deliver [s]
     """
 
     status: Callable[[], Status]
     picture: Callable[[], bytes | None]
+    counts: Callable[[], Path | None] = lambda: None
     stale_s: float = 10.0
 
     def trouble(self, status: Status) -> str | None:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
 from threading import Thread
 from types import TracebackType
 
 import uvicorn
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from vidtrack.serve.access import protected
 from vidtrack.serve.app import Answers
 from vidtrack.serve.camera import Camera
+from vidtrack.serve.connection import Connection
 from vidtrack.serve.listener import listen, url_of
 
-_MOST = 100  # connections at a time; leaves file handles for reopening cameras
-_ASK_S = 5.0  # time in which a client must send a request
 _END_S = 0.5
 
 
@@ -44,7 +41,7 @@ class Page:
             uvicorn.Config(
                 protected(Answers(cameras).app(), self._token),
                 loop="asyncio",
-                http=_Connection,
+                http=Connection,
                 ws="none",
                 lifespan="off",
                 log_config=None,
@@ -72,14 +69,3 @@ class Page:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-class _Connection(H11Protocol):
-    """A connection, refused beyond _MOST and closed without a request within _ASK_S."""
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        super().connection_made(transport)
-        if len(self.connections) > _MOST:
-            transport.abort()
-            return
-        self.timeout_keep_alive_task = self.loop.call_later(_ASK_S, self.timeout_keep_alive_handler)

@@ -76,4 +76,4 @@ def test_the_token_may_come_from_the_environment(camera, tmp_path, monkeypatch):
     monkeypatch.setenv("VIDTRACK_TOKEN", "sesame")
     result = CliRunner().invoke(cli, ["live", camera.url(), "--http", "0.0.0.0:0", "--end", "0.5"])
     assert result.exit_code == 0, result.output
-    assert "the page is at http://0.0.0.0:" in result.output
+    assert f"the page is at http://{socket.gethostname()}:" in result.output

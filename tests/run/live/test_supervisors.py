@@ -148,7 +148,14 @@ def test_a_crash_goes_on_in_the_same_parts(tmp_path):
     assert _continued(job("b", "0", tmp_path), 2).folder == tmp_path / "b-2"
     extras = LiveExtras("x.rrd", Path("x.mp4"), Path("masks"), state=Path("s"), record=Path("tape"))
     again = _continued(replace(before, extras=extras, force=True), 3)
-    assert again.extras == LiveExtras("x-3.rrd", Path("x-3.mp4"), Path("masks-3"), state=Path("s"), record=Path("tape"))
+    assert again.extras == LiveExtras(
+        "x-3.rrd",
+        Path("x-3.mp4"),
+        Path("masks-3"),
+        state=Path("s"),
+        record=Path("tape"),
+        counts=before.folder / "intervals",
+    )
     assert not again.force
 
 

@@ -168,14 +168,13 @@ class Counting:
         self._spans = [span for span in left[:-1] if span[0] < span[1]] + left[-1:]
 
 
-def counting_of(subject: Subject, folder: Path, began_s: Callable[[], float]) -> Counting | None:
-    """The counting of a run, which goes on from the counts in `folder`; None without counting lines.
+def counting_of(subject: Subject, folder: Path, began_s: Callable[[], float]) -> Counting:
+    """The counting of a run with counting lines, which goes on from the counts in `folder`.
 
     Raises FormatError, StoppedEarly.
     """
     counter, settings = subject.counter, subject.settings
-    if counter is None:
-        return None
+    assert counter is not None
     classes: Mapping[str, tuple[float, float]] = {}
     if subject.road is not None and settings.output.site is not None:
         classes = read_site(settings.output.site).classes

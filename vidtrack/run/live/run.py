@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError, FormatError
 from vidtrack.output.intervals.days import zone_of
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
@@ -46,6 +47,7 @@ class LiveRun:
     name    of the source, without credentials
     folder  of the results
     board   current status, for other threads
+    counts  folder of the counts by interval; None without counting lines
 
     After the first picture only `stop` ends the iteration: a lost camera is reopened without limit, and results that
     cannot be written are counted.
@@ -67,6 +69,8 @@ class LiveRun:
     ) -> None:
         extras, live = extras or LiveExtras(), settings.live
         refuse_link(settings.output, "live runs")
+        if live.replace_state and extras.state is None:
+            raise ConfigError("setting live.replace_state has no effect without --state")
         self._settings = settings
         self._address = parse_address(address, live.timeout_s)
         self.name = self._address.name
@@ -79,7 +83,9 @@ class LiveRun:
         with ExitStack() as locks, ExitStack() as stack:  # on an error below, everything already open is closed
             lock_extras(extras, output, locks)
             self._checkpoint_file = (
-                NoCheckpointFile() if extras.state is None else CheckpointFile(extras.state, stats.warn)
+                NoCheckpointFile()
+                if extras.state is None
+                else CheckpointFile(extras.state, stats.warn, live.replace_state)
             )
             self._recorder = (
                 NoRecorder()
@@ -102,7 +108,8 @@ class LiveRun:
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
             road = footprints_of(settings.output.site, source.width, source.height)
             subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, road)
-            counting = counting_of(subject, extras.counts or self.folder / COUNTS, self._began_s)
+            self.counts = None if counter is None else extras.counts or self.folder / COUNTS
+            counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s)
             self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn)
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 
@@ -142,7 +149,8 @@ class LiveRun:
         """Open the camera; numbers and times continue from a saved state."""
         live, found = self._settings.live, self._checkpoint_file.found
         if found is None:
-            return LiveSource(self._address, live, self._recorder, connect=connect, stats=stats)
+            first = self._checkpoint_file.first
+            return LiveSource(self._address, live, self._recorder, first=first, connect=connect, stats=stats)
         since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
         return LiveSource(
             self._address,
@@ -157,12 +165,22 @@ class LiveRun:
 
     def _restored(self, explain: bool) -> Checkpoint:
         """Detector and tracker, restored from the saved state of an earlier run if there is one."""
+        file = self._checkpoint_file
+        checkpoint = self._new_checkpoint(explain)
+        if file.found is not None:
+            try:
+                checkpoint.restore(file.found)
+            except FormatError as error:
+                file.set_aside(error)
+                checkpoint = self._new_checkpoint(explain)
+        if file.first:
+            checkpoint.tracker.register.next_id = file.first
+        return checkpoint
+
+    def _new_checkpoint(self, explain: bool) -> Checkpoint:
         source, settings = self._source, self._settings
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height), explain=explain)
-        checkpoint = Checkpoint(build_detector(settings), tracker, source.like)
-        if self._checkpoint_file.found is not None:
-            checkpoint.restore(self._checkpoint_file.found)
-        return checkpoint
+        return Checkpoint(build_detector(settings), tracker, source.like)
 
     def _frames(self) -> Iterator[Frame]:
         """The frames to track; before each one the checkpoint goes to the recording and the state file."""

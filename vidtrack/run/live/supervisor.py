@@ -95,6 +95,10 @@ class Supervisor:
         """The newest annotated picture as JPEG; None without one."""
         return self._request(PICTURE) or None
 
+    def counts(self) -> Path | None:
+        """The folder of its counts by interval; None without counting lines."""
+        return counts_of(self.job) if self.job.settings.output.lines else None
+
     @property
     def error(self) -> str | None:
         """Why the process failed; None if it runs, was stopped or succeeded."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 from vidtrack.output.status import StatusBoard
@@ -17,12 +18,14 @@ class View:
     source  address without credentials
     stats   of the camera; give it to the run
     board   of the run, once its camera delivers
+    counts  folder of its counts by interval; None before, and without counting lines
     """
 
     def __init__(self, source: str) -> None:
         self.source = source
         self.stats = LiveStats()
         self.board: StatusBoard | None = None
+        self.counts: Path | None = None
 
     def status(self) -> dict[str, Any]:
         """The fields of `LiveStatus`; before the first picture only those of `waiting_for`."""

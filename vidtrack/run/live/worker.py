@@ -6,7 +6,6 @@ import json
 import logging
 import os
 import signal
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -16,6 +15,7 @@ from types import FrameType
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import Error
+from vidtrack.run.live.leave import leave
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.run import LiveRun
 from vidtrack.run.live.view import View
@@ -63,9 +63,10 @@ def work(job: Job, channel: Connection) -> None:
     except Error as error:
         log.error("%s", error)
         answers.end(str(error))
-        sys.exit(error.exit_code)
+        leave(error.exit_code)
     else:
         answers.end()
+    leave(0)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -91,7 +91,9 @@ function addCard() {
   const card = document.getElementById("camera").content.firstElementChild.cloneNode(true);
   document.querySelector("main").append(card);
   seen.observe(card);
-  watch(card.querySelector(".picture img"), card, cards.push(card) - 1);
+  const place = cards.push(card) - 1;
+  watch(card.querySelector(".picture img"), card, place);
+  followCounts(card, place);
   return card;
 }
 
