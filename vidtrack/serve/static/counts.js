@@ -19,7 +19,7 @@ function shape(name, attributes, title) {
 /* One gate: what its two directions counted stands on each other; grey is what was not watched. */
 function chart(gate, rows, since, until) {
   const ways = [...new Set(rows.map((row) => row.direction))];
-  const intervals = Map.groupBy ? Map.groupBy(rows, (row) => row.begin_s) : grouped(rows);
+  const intervals = grouped(rows);
   const sums = [...intervals.values()].map((group) => group.reduce((sum, row) => sum + (row.count ?? 0), 0));
   const most = Math.max(1, ...sums);
   const across = (unix) => (WIDE * (Math.max(unix, since) - since)) / (until - since);
@@ -34,8 +34,7 @@ function chart(gate, rows, since, until) {
       return `${row.direction} ${row.count ?? "–"}${speed}`;
     });
     const title = `${clock(begin)} to ${clock(group[0].end_s)}: ${told.join("; ")}; watched ${Math.round(100 * covered)} %`;
-    const free = shape("rect", { x, y: 0, width, height: HIGH, style: "fill: var(--ground)", opacity: covered }, title);
-    drawing.append(free);
+    drawing.append(shape("rect", { class: "watched", x, y: 0, width: width + 1, height: HIGH, opacity: covered }, title));
     let y = HIGH;
     for (const row of group) {
       const height = (HIGH * (row.count ?? 0)) / most;
