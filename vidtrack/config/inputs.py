@@ -43,7 +43,15 @@ _UNREAD = {
         *_OF_PICTURES,
         *("tracker.accel", "tracker.cross", "tracker.hold_s", "tracker.speed"),
         *("tracker.life", "tracker.coast_s", "tracker.clutter_density", "tracker.euclidean_radius_px"),
-        *("output.lines", "output.site", "output.link", "output.link_s", "output.trail_s", "output.rerun_picture_s"),
+        *(
+            "output.level",
+            "output.lines",
+            "output.site",
+            "output.link",
+            "output.link_s",
+            "output.trail_s",
+            "output.rerun_picture_s",
+        ),
     ),
 }
 """Groups and settings without effect on an input."""

@@ -19,8 +19,7 @@ class LiveSettings(Group):
     backoff_longest_s: float = Field(30.0, gt=0)
     """s; longest pause between two attempts"""
     retry_first: bool = False
-    """a camera that cannot be opened at the start is tried again without limit, as a lost one is, unless it refuses the
-    password; false: it is given up after three failures. With several cameras: true"""
+    """a camera that cannot be opened at the start is tried without limit; false: three times. Several cameras: true"""
     roll_s: float | None = Field(None, gt=0)
     """s; length of a sub-folder of results, aligned to the clock; None: one folder, or hourly if live.keep_* is set"""
     keep_s: float | None = Field(None, gt=0)
@@ -38,8 +37,7 @@ class LiveSettings(Group):
     keep_counts_s: float | None = Field(None, gt=0)
     """s; older counts are deleted; None: they stay for ever"""
     reserve_bytes: float | None = Field(None, ge=0)
-    """bytes of a disk that recordings leave free, and a fifth of which tracks leave free; None: 5 % of the disk, up to
-    1 GB"""
+    """bytes of a disk that recordings leave free, tracks a fifth of them; None: 5 % of the disk, at most 1 GB"""
     replace_state: bool = False
     """a state that cannot be used is set aside, and numbers go on far ahead; false: it ends the run with an error"""
     zone: str | None = None

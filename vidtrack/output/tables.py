@@ -198,12 +198,17 @@ def _array(column: Column, values: np.ndarray) -> pa.Array:
 
 
 class TrackTable:
-    """Sink that writes tracks.csv every second and tracks.parquet in parts."""
+    """Sink that writes tracks.csv every second, and tracks.parquet in parts.
 
-    def __init__(self, folder: Path, columns: Sequence[Column] = VIDEO, road: Footprints | None = None) -> None:
+    text  whether there is a tracks.csv
+    """
+
+    def __init__(
+        self, folder: Path, columns: Sequence[Column] = VIDEO, road: Footprints | None = None, *, text: bool = True
+    ) -> None:
         columns = columns if road is None else (*columns, *ROAD)
         self._columns, self._road = columns, road
-        self._csv = LineFile(folder / "tracks.csv", ",".join(c.name for c in columns) + "\n")
+        self._csv = LineFile(folder / "tracks.csv", ",".join(c.name for c in columns) + "\n") if text else None
         self._parquet = ParquetParts(folder / "tracks.parquet", schema(columns))
         self._waiting: list[Step] = []
         self._due = Every(1.0)
@@ -220,7 +225,8 @@ class TrackTable:
         try:
             self._write()
         finally:
-            self._csv.close()
+            if self._csv is not None:
+                self._csv.close()
         self._parquet.close()
 
     def _write(self) -> None:
@@ -228,8 +234,9 @@ class TrackTable:
             return
         table = track_rows(self._waiting, self._columns, self._road)
         self._waiting.clear()
-        self._csv.add(csv_text(table))
-        self._csv.flush()
+        if self._csv is not None:
+            self._csv.add(csv_text(table))
+            self._csv.flush()
         self._parquet.add(table)
 
 

@@ -115,16 +115,28 @@ def file_sinks(
     counter, output = subject.counter, subject.settings.output
     if counter is not None:
         yield CountsFile(folder / "counts.csv", counter)
-    totals = counter.totals if counter else None
-    plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines, totals)
-    tables: tuple[Sink, ...] = (TrackTable(folder, road=subject.road), MotFile(folder / "mot.txt"), plot)
-    if link_s is not None:
+    tables = _tables(subject, folder)
+    if tables and link_s is not None:
         tables = (Linked(*tables, motion=motion, longest_s=link_s),)
-    yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)
+    if tables:
+        yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv")
     for _, sink in picture_sinks(subject, extras):
         yield Threaded(sink)
+
+
+def _tables(subject: Subject, folder: Path) -> tuple[Sink, ...]:
+    """The files of tracks that output.level asks for."""
+    level, counter = subject.settings.output.level, subject.counter
+    if level == "counts":
+        return ()
+    table = TrackTable(folder, road=subject.road, text=level == "all")
+    if level == "tracks":
+        return (table,)
+    totals = counter.totals if counter else None
+    plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines, totals)
+    return (table, MotFile(folder / "mot.txt"), plot)
 
 
 def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]]:

@@ -5,28 +5,24 @@ from __future__ import annotations
 import logging
 import shutil
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack, suppress
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Thread
 
 import pyarrow as pa
 
 from vidtrack.errors import Error, StoppedEarly
-from vidtrack.output.counts import HEADER, crossing_lines
-from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.folder import writing
-from vidtrack.output.linefile import Every, LineFile, sort_rows
-from vidtrack.output.mot import MotFile
-from vidtrack.output.plot import TrajectoryPlot
-from vidtrack.output.repair import add_parquet, repair
+from vidtrack.output.linefile import Every
+from vidtrack.output.repair import is_unfinished, repair
 from vidtrack.output.sink import Step
-from vidtrack.output.summary import Summary
-from vidtrack.output.tables import ROAD, VIDEO, Column, csv_text, track_rows
+from vidtrack.output.tables import ROAD, VIDEO, track_rows
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.live.counting import Counting
+from vidtrack.run.live.part import Part, count
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lines import Crossing
 
@@ -72,8 +68,7 @@ class Parts:
         self._ended: list[Part] = []
         self._look = Every(_LOOK_S)
         self._finishing: list[Thread] = []
-        begun = [part for part in parts_of(root) if (part / "tracks.csv").exists()]
-        unfinished = [part for part in begun if not (part / "tracks.parquet").exists()]
+        unfinished = [part for part in parts_of(root) if is_unfinished(part)]
         self._whole = None if roll_s is None else subject.summary(root)
         self._number = 0
         self._part: Part | None = None
@@ -84,7 +79,8 @@ class Parts:
     def write(self, steps: Sequence[Step]) -> None:
         """Write a batch. Raises StoppedEarly on a write error; a later batch may succeed."""
         filled = [step for step in steps if len(step.tracks)]
-        rows = track_rows(filled, self._columns, self._subject.road) if filled else None
+        needed = self._subject.road is not None or self._subject.settings.output.level != "counts"
+        rows = track_rows(filled, self._columns, self._subject.road) if filled and needed else None
         if self._whole is not None:
             count(self._whole, steps)
         with ExitStack() as stack:  # called from the last to the first
@@ -166,90 +162,3 @@ class Parts:
         thread = Thread(target=run, name="finish-part", daemon=True)
         thread.start()
         self._finishing.append(thread)
-
-
-class Part:
-    """One part: the same files as those of a run over a video.
-
-    columns  of its tracks
-
-    Raises StoppedEarly on a write error.
-    """
-
-    def __init__(self, folder: Path, subject: Subject, decisions: bool, columns: Sequence[Column]) -> None:
-        self.folder = folder
-        self._lines = subject.lines
-        self._counted: Counter[tuple[str, str]] = Counter()
-        with ExitStack() as stack:  # on a full disk, files already open are closed
-            self._summary = subject.summary(folder, self._totals)
-            self._tracks = LineFile(folder / "tracks.csv", ",".join(column.name for column in columns) + "\n")
-            stack.callback(self._tracks.close)
-            self._mot = MotFile(folder / "mot.txt")
-            stack.callback(self._mot.close)
-            self._counts = self._decisions = None
-            if subject.counter is not None:
-                self._counts = LineFile(folder / "counts.csv", HEADER)
-                stack.callback(self._counts.close)
-            if decisions:
-                self._decisions = DecisionLog(folder / "decisions.csv")
-                stack.callback(self._decisions.close)
-            self._plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines)
-            self._files = stack.pop_all()
-
-    def write_crossings(self, crossings: Iterable[Crossing]) -> None:
-        """Write and synchronise rows of counts.csv."""
-        assert self._counts is not None
-        _write(self._counts, crossing_lines(crossings))
-        self._counted.update((crossing.line, crossing.direction) for crossing in crossings)
-
-    def write(self, steps: Sequence[Step], rows: pa.Table | None) -> None:
-        """Write and synchronise steps and the rows of their confirmed tracks."""
-        if rows is not None:
-            _write(self._tracks, csv_text(rows))
-        for step in steps:
-            self._mot.step(step)
-            self._plot.step(step)
-            if self._decisions is not None:
-                self._decisions.step(step)
-        self._mot.flush()
-        count(self._summary, steps)
-
-    def end(self) -> None:
-        """No more steps will be written; tracks in a gap may still be found again."""
-        self._mot.end()
-
-    def is_settled(self, later: Sequence[Step]) -> bool:
-        """Whether no gap is open, given the steps after the part."""
-        for step in later:
-            self._mot.step(step)
-        self._mot.flush()
-        return not self._mot.waits
-
-    def _totals(self) -> dict[str, dict[str, int]]:
-        """The part's counts by line and direction."""
-        return {line.name: {way: self._counted[line.name, way] for way in line.directions} for line in self._lines}
-
-    def finish(self) -> None:
-        """Close and sort the tables; write tracks.parquet and tracks.png."""
-        with ExitStack() as stack:
-            self._summary.interrupted = False
-            stack.callback(self._summary.close)
-            stack.callback(self._plot.close)
-            stack.callback(add_parquet, self.folder)
-            if self._counts is not None:
-                stack.callback(sort_rows, self._counts.path, columns=1, header=True)
-            stack.push(self._files)
-
-
-def count(summary: Summary, steps: Sequence[Step]) -> None:
-    """Update a summary; a write error is ignored, because the next write contains everything."""
-    for step in steps:
-        with suppress(StoppedEarly):
-            summary.step(step)
-
-
-def _write(file: LineFile, lines: str) -> None:
-    """Write lines and synchronise the file with the disk."""
-    file.add(lines)
-    file.flush()
-    file.sync()
