@@ -7,19 +7,18 @@ import time
 from collections.abc import Mapping
 from datetime import date
 from functools import partial
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.csv
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from vidtrack.errors import FormatError
+from vidtrack.output.figures import csv_of
 from vidtrack.output.intervals.day import Plan, day_folders, read_day
 from vidtrack.output.intervals.days import DAY_S, EVERY
 from vidtrack.serve.camera import Camera, Shared
@@ -104,6 +103,4 @@ def _csv(folder: Path, every_s: float) -> bytes:
         table = read_day(folder).intervals(every_s, Plan.read(folder.parent))
     except FormatError as error:
         raise HTTPException(500, f"{error}\n") from None
-    content = BytesIO()
-    pyarrow.csv.write_csv(table, content, pyarrow.csv.WriteOptions(quoting_style="none"))
-    return content.getvalue()
+    return csv_of(table)

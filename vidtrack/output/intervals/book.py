@@ -24,9 +24,9 @@ from math import isnan
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.csv
 
 from vidtrack.errors import Error, FormatError
+from vidtrack.output.figures import csv_of
 from vidtrack.output.folder import append, replacing, writing
 from vidtrack.output.intervals.day import (
     CROSSING_COLUMNS,
@@ -45,7 +45,7 @@ from vidtrack.output.linefile import Every, drop_partial_line, replace_text
 
 log = logging.getLogger(__name__)
 
-_SPAN_S = 10.0  # between two entries of what was watched
+_SPAN_S = 2.0  # between two entries of what was watched
 _TABLES_S = 900  # the tables of the day are made anew at these times of the clock
 _MOST = 100_000  # crossings that wait for room on the disk
 _SAME_S = 0.002  # spans closer than this are one: times are written in milliseconds
@@ -175,9 +175,7 @@ class CountBook:
             replace_text(folder / WATCHED, ",".join(WATCHED_COLUMNS) + "\n" + rows)
         for name, every_s in EVERY.items():
             with replacing(folder / f"{name}.csv") as new:
-                pyarrow.csv.write_csv(
-                    day.intervals(every_s, self._plan), new, pyarrow.csv.WriteOptions(quoting_style="none")
-                )
+                new.write_bytes(csv_of(day.intervals(every_s, self._plan)))
 
     def _recover(self, folder: Path) -> None:
         """Make the tables of a day that a killed run has left; set what cannot be read aside."""
