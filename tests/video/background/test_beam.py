@@ -10,13 +10,15 @@ from vidtrack.video.background.scene import BEAM
 from vidtrack.video.frame import Frame
 
 H, W, BLACK = 120, 240, np.float32(16)
+RATE = 25  # frames/s
 CAR = np.s_[20:40, 10:40]
 
 
 def road(level=20.0):
-    """A road with lane marks, above black."""
+    """A road with lane marks and a kerb of stones."""
     scene = np.full((H, W), level, np.float32)
     scene[29:31, ::2] = 2 * level
+    scene[90:110] += level * np.repeat(np.random.default_rng(0).random((5, W // 4)), 4, axis=0).repeat(4, axis=1)
     return scene + BLACK
 
 
@@ -58,20 +60,22 @@ def test_only_a_dark_scene_is_lit_by_lamps():
     assert not is_dark(road(90), BLACK)
 
 
-def played(beams, stands_s, rate=25):
+def played(beams, stands_s):
     """Share of foreground on a noisy road while a beam stands there for stands_s, and for two seconds after."""
     rng = np.random.default_rng(1)
     detector = create(DetectorSettings.model_validate({"disturbance": {"beams": beams}}))
     found = []
-    for k in range(int((3 + stands_s + 2) * rate)):
-        on = 3 <= k / rate < 3 + stands_s
+    for k in range(int((3 + stands_s + 2) * RATE)):
+        on = 3 <= k / RATE < 3 + stands_s
         clean = lit(road()) if on else road()
         y = np.clip(np.round(clean + rng.normal(0, 1.5, clean.shape)), 0, 255).astype(np.uint8)
-        frame = Frame(k, k / rate, y)
+        frame = Frame(k, k / RATE, y)
         found.append((detector.apply(frame, np.empty((0, 4))).mask > 0).mean())
-    return np.array(found[3 * rate :])
+    return np.array(found[3 * RATE :])
 
 
-def test_a_beam_that_waits_is_neither_foreground_nor_learnt():
-    assert played(True, 8).max() < 0.001
-    assert played(False, 8).max() > 0.02
+def test_a_beam_that_waits_is_no_foreground_and_leaves_no_mark():
+    share, off = played(True, 8), 8 * RATE
+    assert share[:off].max() < 0.001
+    assert share[off + RATE // 2 :].max() < 0.001
+    assert played(False, 8)[:RATE].min() > 0.015
