@@ -45,6 +45,7 @@ _UNREAD = {
         *("tracker.life", "tracker.coast_s", "tracker.clutter_density", "tracker.euclidean_radius_px"),
         *(
             "output.level",
+            "output.every_s",
             "output.lines",
             "output.site",
             "output.link",
@@ -83,6 +84,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.quiet_accel": ("radar.estimator", ("imm",)),
     "radar.quiet_s": ("radar.estimator", ("imm",)),
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
+    "output.every_s": ("output.level", ("tracks", "all")),
     "output.smooth_lag_s": ("output.smooth", (True,)),
 }
 """Groups and settings that have an effect only if another setting has one of these values."""

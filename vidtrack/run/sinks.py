@@ -21,6 +21,7 @@ from vidtrack.output.sink import Sink
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
+from vidtrack.output.thinned import Thinned
 from vidtrack.output.threaded import Threaded
 from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
@@ -116,6 +117,8 @@ def file_sinks(
     if counter is not None:
         yield CountsFile(folder / "counts.csv", counter)
     tables = _tables(subject, folder)
+    if tables and output.every_s:
+        tables = (Thinned(*tables, every_s=output.every_s),)
     if tables and link_s is not None:
         tables = (Linked(*tables, motion=motion, longest_s=link_s),)
     if tables:

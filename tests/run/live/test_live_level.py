@@ -1,9 +1,12 @@
 """How much is written: counts, also tracks, or all."""
 
+import json
+
 import pytest
 from command_line import SAMPLES
 from test_live_parts import Clock, Station
 
+from vidtrack.config.inputs import Input
 from vidtrack.config.load import load
 from vidtrack.errors import ConfigError
 from vidtrack.output.parquet import parts_folder, read_parquet
@@ -72,3 +75,37 @@ def test_a_run_over_a_file(tmp_path, level):
 def test_another_level_is_refused():
     with pytest.raises(ConfigError, match="level"):
         load(assignments=["output.level=much"])
+
+
+def test_thinned_tracks_are_some_of_all(tmp_path, monkeypatch):
+    """Every tenth of a second: of 25 frames/s every third. Counts and the number of tracks stay."""
+    tables = {}
+    for every_s in (0, 0.1):
+        station = Station(tmp_path / str(every_s), Clock(monkeypatch), f"output.every_s={every_s}")
+        station.drive(0, 9)
+        station.parts.finish()
+        (part,) = parts_of(tmp_path / str(every_s))
+        summary = json.loads((part / "summary.json").read_text())
+        assert (summary["frames"], summary["tracks"], summary["counts"]["gate"]["right"]) == (225, 9, 8)
+        tables[every_s] = read_parquet(part / "tracks.parquet")
+        lines = (part / "mot.txt").read_text().splitlines()
+        assert len(lines) == len(tables[every_s])
+    every_third = tables[0]["frame"].to_numpy() % 3 == 0
+    assert tables[0.1].equals(tables[0].filter(every_third))
+
+
+def test_a_thinned_run_over_a_file(tmp_path):
+    frames = {}
+    for every_s in (0, 0.5):
+        chosen = load(assignments=[f"output.every_s={every_s}"])
+        with run_file(str(SAMPLES / "crossing.avi"), chosen, tmp_path / str(every_s)) as run:
+            for _ in run:
+                pass
+        frames[every_s] = set(read_parquet(run.folder / "tracks.parquet")["frame"].to_pylist())
+    assert frames[0.5] < frames[0]
+    assert 0 < len(frames[0.5]) < len(frames[0]) / 8
+
+
+def test_thinning_needs_tracks():
+    with pytest.raises(ConfigError, match=r"no effect with output\.level=counts"):
+        load(assignments=["output.level=counts", "output.every_s=1"], kind=Input.CAMERA)

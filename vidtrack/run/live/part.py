@@ -50,9 +50,9 @@ class Part:
         write_lines(self._counts, crossing_lines(crossings))
         self._counted.update((crossing.line, crossing.direction) for crossing in crossings)
 
-    def write(self, steps: Sequence[Step], rows: pa.Table | None) -> None:
-        """Write and synchronise steps and the rows of their confirmed tracks."""
-        self._tracks.write(steps, rows)
+    def write(self, steps: Sequence[Step], chosen: Sequence[Step], rows: pa.Table | None) -> None:
+        """Write and synchronise the chosen ones of these steps, and the rows of their confirmed tracks."""
+        self._tracks.write(chosen, rows)
         if self._decisions is not None:
             for step in steps:
                 self._decisions.step(step)

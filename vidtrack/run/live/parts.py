@@ -12,6 +12,7 @@ from pathlib import Path
 from threading import Thread
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from vidtrack.errors import Error, StoppedEarly
 from vidtrack.output.folder import writing
@@ -19,6 +20,7 @@ from vidtrack.output.linefile import Every
 from vidtrack.output.repair import is_unfinished, repair
 from vidtrack.output.sink import Step
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
+from vidtrack.output.thinned import Pace
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.live.counting import Counting
@@ -64,6 +66,7 @@ class Parts:
         self._retention = retention
         self._counting = counting
         self._reserve = reserve
+        self._pace = Pace(subject.settings.output.every_s)
         self._crossings: deque[Crossing] = deque(maxlen=_MOST)
         self._ended: list[Part] = []
         self._look = Every(_LOOK_S)
@@ -106,11 +109,14 @@ class Parts:
             thread.join()
 
     def _write_part(self, steps: Sequence[Step], rows: pa.Table | None) -> None:
+        chosen = [step for step in steps if self._pace(step.time_s)]
+        if rows is not None and len(chosen) < len(steps):
+            rows = rows.filter(pc.is_in(rows["frame"], pa.array([step.index for step in chosen], pa.int64())))
         self._roll()
         part = self._part or self._begin()
         self._write_crossings()
         self._reserve.check_tracks(self._root)
-        part.write(steps, rows)
+        part.write(steps, chosen, rows)
         for ended in [ended for ended in self._ended if ended.is_settled(steps)]:
             self._ended.remove(ended)
             self._later(Part.finish, ended)
