@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.console import Console
+from rich.table import Table
 
 from vidtrack.cli.options import start_log
 
@@ -91,9 +93,6 @@ def _line(supervisor: Supervisor) -> str:
 
 
 def _print_table(supervisors: Supervisors) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls", "restarts")
     summary = supervisors.summary()
     table = Table("camera", *(name.replace("frames_", "") for name in columns), "end")

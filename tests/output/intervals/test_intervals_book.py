@@ -190,6 +190,15 @@ def test_a_damaged_file_is_set_aside_and_ends_no_run(tmp_path, caplog):
     assert list(path.parent.glob("crossings.csv.damaged-*"))
 
 
+def test_a_damaged_table_is_made_up_for_by_the_crossings(tmp_path):
+    book = CountBook(tmp_path, PLAN)
+    book.add([passage(NOON), passage(NOON + 1)])
+    book.watch(NOON - 1, NOON + 2)
+    book.close()
+    (tmp_path / "2026-10-24" / "1d.csv").write_bytes(b"gate,direction\n1,2,3\n")
+    assert totals(tmp_path) == {"gate": {"left": 2}}
+
+
 def test_days_older_than_the_limit_are_deleted(tmp_path, monkeypatch):
     now_s = NOON + 10 * 86400
     monkeypatch.setattr(book_module.time, "time", lambda: now_s)

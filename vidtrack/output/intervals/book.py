@@ -205,11 +205,12 @@ def totals(folder: Path) -> Totals:
 
 
 def _totals_of(folder: Path) -> Counter[tuple[str, str]]:
-    """The crossings of a day: from its shortest table, or from all of them if that is older."""
-    if not _is_behind(folder):
-        columns = {"gate": pa.string(), "direction": pa.string(), "count": pa.int64()}
-        rows = read_lines(folder / "1d.csv", columns).to_pylist()
-        return Counter({(row["gate"], row["direction"]): row["count"] or 0 for row in rows})
+    """The crossings of a day: from its shortest table, or from all of them if that is older or damaged."""
+    columns = {"gate": pa.string(), "direction": pa.string(), "count": pa.int64()}
+    with suppress(FormatError):
+        if not _is_behind(folder):
+            rows = read_lines(folder / "1d.csv", columns).to_pylist()
+            return Counter({(row["gate"], row["direction"]): row["count"] or 0 for row in rows})
     crossings = read_day(folder).crossings
     return Counter(zip(crossings["gate"].to_pylist(), crossings["direction"].to_pylist(), strict=True))
 

@@ -80,13 +80,13 @@ class NoCheckpointFile:
 class CheckpointFile:
     """Saves checkpoints to a file at intervals. Ids and frame numbers are reserved in the file before they are used.
 
+    tell     called with what goes wrong
     replace  a state that cannot be used is set aside, and numbers go on far ahead
 
-    found  state saved by an earlier run; None without one
-    first  number of the first frame and of the first track, if no state was found
-    lost   number of failed saves
+    found    state saved by an earlier run; None without one
+    first    number of the first frame and of the first track, if no state was found
+    lost     number of failed saves
     failing  why the last save failed; None: it did not
-    tell   called with what goes wrong
 
     Raises FormatError if the file is not a saved state, OutputError if its folder is not writable; the first `offer`
     raises OutputError too.
