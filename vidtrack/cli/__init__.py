@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 from importlib import import_module
 from importlib.metadata import version
 
@@ -10,7 +11,6 @@ import click
 
 from vidtrack.cli.signals import Terminated, terminate
 from vidtrack.errors import Error
-from vidtrack.run.live.leave import leave
 
 COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
@@ -86,7 +86,7 @@ def main() -> None:
     except OSError as error:  # for example a full disk or a read-only folder, without a more specific error
         place = f" {error.filename}" if error.filename else ""
         code = _report_error(f"cannot read or write{place}: {error.strerror or error}", 1)
-    leave(code or 0)
+    sys.exit(code)
 
 
 def _report_error(message: str, code: int) -> int:

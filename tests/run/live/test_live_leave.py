@@ -9,7 +9,8 @@ from cameras import HANG_S
 ABANDONED = """
 import threading, time
 import pyarrow as pa, pyarrow.csv
-from vidtrack.cli import cli, main
+from vidtrack.__main__ import main
+from vidtrack.cli import cli
 
 class Slow:
     closed = False
