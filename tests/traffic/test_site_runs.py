@@ -138,7 +138,8 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     folder = road / "part"
     folder.mkdir()
     blank = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints)
+    text = (road / "site.toml").read_text()
+    subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints, text)
     part = Part(folder, subject, decisions=False)
     part.write([make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])], "")
     part.finish()
@@ -146,6 +147,34 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     assert list(rows[0]) == [column.name for column in (*VIDEO, *ROAD)]
     assert all(float(row["y_m"]) > 10 for row in rows)
     assert pq.read_table(folder / "tracks.parquet").column_names == list(rows[0])
+    assert (folder / "site.toml").read_text() == text
+
+
+GATE = '[gates.near]\nline = [[1, 360], [1279, 360]]\n'
+
+
+def test_a_run_is_measured_at_the_site_as_it_was(road):
+    """The site's file moved its gate away since, and another one is given by --site only."""
+    drawn = (road / "site.toml").read_text()
+    (road / "site.toml").write_text(drawn + GATE)
+    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)[0] == 0
+    assert (road / "out" / "site.toml").read_text() == drawn + GATE
+    (road / "site.toml").write_text(drawn + GATE.replace("360", "3"))
+    code, out, err = vidtrack("measure", "out", cwd=road)
+    assert (code, out) == (0, "runs/out-measures\n")
+    assert "1 crossings" in err
+    code, _, err = vidtrack("measure", "out", "--site", "site.toml", "-o", "moved", cwd=road)
+    assert code == 0
+    assert "0 crossings" in err
+    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "again", "-q", cwd=road)[0] == 0
+    for runs, words in ((("out", "again"), "are not the same site"), (("bare",), "was tracked without a site")):
+        if runs == ("bare",):
+            assert vidtrack("track", "det.txt", "-o", "bare", "-q", cwd=road)[0] == 0
+        code, _, err = vidtrack("measure", *runs, "-o", "refused", cwd=road)
+        assert code == 2
+        assert words in err
+        assert err.count("\n") == 1
+        assert not (road / "refused").exists()
 
 
 def test_calibrate_draws_and_reports(road):

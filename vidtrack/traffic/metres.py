@@ -22,3 +22,8 @@ def footprints_of(site: Path | None, width: int, height: int) -> Footprints | No
 
     drawn = read_site(site).scaled(width, height)
     return None if drawn.calibration is None else Footprints(calibrated(drawn), (width, height))
+
+
+def site_text(site: Path | None) -> str | None:
+    """The text of a site's file; None without one. It was read by `footprints_of`."""
+    return None if site is None else site.read_text(encoding="utf-8")

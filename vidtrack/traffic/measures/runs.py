@@ -117,6 +117,29 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
     return Day(tuple(_apart(recordings)), utc)
 
 
+def site_of(runs: Sequence[str]) -> Path:
+    """The site that runs were tracked with: the copy in their folders, each written as for `open_day`.
+
+    Raises ConfigError where a run has none, or another one than the first.
+    """
+    copies = [_site_copy(_split(run)[0]) for run in runs]
+    for other in copies[1:]:
+        if other.read_bytes() != copies[0].read_bytes():
+            raise ConfigError(f"{copies[0]} and {other} are not the same site; give --site SITE.toml")
+    return copies[0]
+
+
+def _site_copy(folder: Path) -> Path:
+    copy = folder / "site.toml"
+    try:
+        named = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["settings"]["output"]["site"]
+    except (OSError, KeyError, TypeError, ValueError):
+        named = None
+    if named is None or not copy.is_file():
+        raise ConfigError(f"{folder} was tracked without a site; give --site SITE.toml")
+    return copy
+
+
 def _sessions(found: list[_Found]) -> list[int]:
     """Of each run the number of the first one in the list that it is a part of, or its own.
 
