@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -117,27 +118,29 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
     return Day(tuple(_apart(recordings)), utc)
 
 
+def measured_run(run: Mapping[str, Any]) -> Recording:
+    """A recording as measures.json has it. Raises SourceError where the run is no longer in its folder."""
+    folder = Path(run["folder"])
+    if not (folder / "summary.json").is_file():
+        raise SourceError(f"the tracks of the run {folder.name} are no longer where they were measured")
+    alone = open_day([str(folder)], None).recordings[0]
+    offset = run["end_s"] - alone.end_s + alone.offset_s
+    return replace(alone, session=run["run"], offset_s=offset, begin_s=run["begin_s"], end_s=run["end_s"])
+
+
 def site_of(runs: Sequence[str]) -> Path:
     """The site that runs were tracked with: the copy in their folders, each written as for `open_day`.
 
     Raises ConfigError where a run has none, or another one than the first.
     """
-    copies = [_site_copy(_split(run)[0]) for run in runs]
+    copies = [_split(run)[0] / "site.toml" for run in runs]
+    for copy in copies:
+        if not copy.is_file():
+            raise ConfigError(f"{copy.parent} has no site.toml: it was tracked without a site; give --site SITE.toml")
     for other in copies[1:]:
         if other.read_bytes() != copies[0].read_bytes():
             raise ConfigError(f"{copies[0]} and {other} are not the same site; give --site SITE.toml")
     return copies[0]
-
-
-def _site_copy(folder: Path) -> Path:
-    copy = folder / "site.toml"
-    try:
-        named = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["settings"]["output"]["site"]
-    except (OSError, KeyError, TypeError, ValueError):
-        named = None
-    if named is None or not copy.is_file():
-        raise ConfigError(f"{folder} was tracked without a site; give --site SITE.toml")
-    return copy
 
 
 def _sessions(found: list[_Found]) -> list[int]:
@@ -175,9 +178,8 @@ def _found(run: str) -> _Found:
         raise SourceError(f"{folder} has no frames; there is nothing to measure")
     began = summary.get("began")
     zero = time or (datetime.fromisoformat(began) if began else None)
-    if not began:
-        begin = float(source.get("start_s") or 0.0)
-    else:  # a part of a live run begins somewhere in it
+    begin = float(source.get("start_s") or 0.0)
+    if began:  # a part of a live run begins somewhere in it
         begin = spans[0][0] if spans else end - (frames - 1) / fps
     breaks = tuple((before[1] + 1 / fps, after[0]) for before, after in pairwise(spans))
     return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks)
