@@ -276,9 +276,8 @@ function show() {
     return item;
   }));
   document.querySelector("#totals tbody").replaceChildren(...state.ways.map((way) => {
-    const row = document.createElement("tr"), { verdicts } = way;
-    const wrongly = verdicts.double + verdicts["no vehicle"] + verdicts.wrong + verdicts["wrong direction"];
-    row.append(...[way.gate, way.direction, way.counted, wrongly, way.missed, way.corrected].map((cell) => element("td", cell)));
+    const row = document.createElement("tr");
+    row.append(...[way.gate, way.direction, way.counted, way.false, way.missed, way.corrected].map((cell) => element("td", cell)));
     return row;
   }));
 }

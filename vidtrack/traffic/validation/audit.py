@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from itertools import takewhile
 from typing import Any
 
-from vidtrack.traffic.validation.audit_events import Event
+from vidtrack.traffic.validation.audit_events import CountedEvents, Event, random_order
 from vidtrack.traffic.validation.validate import Estimate, proportion
 
 RIGHT, WRONG_CLASS, WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG, UNSURE = VERDICTS = (
@@ -17,6 +17,7 @@ RIGHT, WRONG_CLASS, WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG, UNSURE = VERDICTS = (
 MISSED = "missed"
 COUNTED_WELL = (RIGHT, WRONG_CLASS)
 """A vehicle passed there, in that direction, once."""
+FALSE = (WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG)
 _SAME_S = 1.0
 """s; a crossing that was measured again may have moved by so much"""
 
@@ -74,6 +75,7 @@ class AuditFigures:
     counted     by vidtrack
     looked_at   of them, by somebody
     verdicts    how many of each
+    false       of these, crossings that there were not, or not in this direction
     missed      vehicles that were noted as missed
     corrected   counted - false + missed; what nobody looked at is taken for right
     sample      of those looked at, how many are a random sample and decided; `right`: of these counted well
@@ -83,6 +85,7 @@ class AuditFigures:
     counted: int
     looked_at: int
     verdicts: dict[str, int]
+    false: int
     missed: int
     corrected: int
     sample: int
@@ -120,16 +123,38 @@ def figures_of(
     missed = sum(map(ours, audit.missed))
     turned = [events[k] for k, verdict in audit.verdicts.items() if verdict == WRONG_WAY and events[k].gate == gate]
     came = sum(one.direction != direction for one in turned) if direction is not None else verdicts[WRONG_WAY]
-    false = sum(verdicts[verdict] for verdict in (WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG))
+    false = sum(verdicts[verdict] for verdict in FALSE)
     decided = [audit.verdicts[k] for k in sample if ours(events[k]) and audit.verdicts[k] != UNSURE]
     right = sum(verdict in COUNTED_WELL for verdict in decided)
     return AuditFigures(
         counted,
         verdicts.total(),
         {verdict: verdicts[verdict] for verdict in VERDICTS},
+        false,
         missed,
         counted - false + came + missed,
         len(decided),
         right,
         proportion(right, len(decided)) if decided else None,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Reviewed:
+    """The figures of each gate, and of all; `homeless`: corrections of events that are no longer there."""
+
+    gates: dict[str, AuditFigures]
+    pooled: AuditFigures
+    homeless: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+def review_of(counted: CountedEvents, audit: Audit) -> Reviewed:
+    """What the verdicts say about the counts."""
+    events = counted.events
+    sample = sample_of(random_order(events).tolist(), audit)
+    gates = {gate: figures_of(events, audit, sample, gate) for gate in counted.gates}
+    return Reviewed(gates, figures_of(events, audit, sample), len(audit.homeless))
