@@ -150,7 +150,7 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     assert (folder / "site.toml").read_text() == text
 
 
-GATE = '[gates.near]\nline = [[1, 360], [1279, 360]]\n'
+GATE = "[gates.near]\nline = [[1, 360], [1279, 360]]\n"
 
 
 def test_a_run_is_measured_at_the_site_as_it_was(road):

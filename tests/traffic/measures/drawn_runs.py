@@ -45,7 +45,17 @@ def along(track, t, x, y=240.0):
 
 
 def write_run(
-    folder, tracks, *, seconds=60.0, metres=False, csv=False, length_m=4.0, began=None, status=None, first=0.0, watched=None
+    folder,
+    tracks,
+    *,
+    seconds=60.0,
+    metres=False,
+    csv=False,
+    length_m=4.0,
+    began=None,
+    status=None,
+    first=0.0,
+    watched=None,
 ):
     """A finished run of these tracks (id, times (N,), positions (N, 2) px), in order of frames.
 

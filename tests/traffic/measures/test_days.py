@@ -214,7 +214,9 @@ def test_an_outage_within_a_run_was_not_watched(tmp_path, began):
     tracks = [straight(1, 9.0, 50, 240, 60, 3 - 1 / FPS), straight(2, 40.0, 50, 240, 100, 5)]
     run = write_run(tmp_path / "run", tracks, began=began, watched=[[0.0, 12 - 1 / FPS], [31.0, last]])
     found = measured([run], site())
-    rows = [row for row in found.tables["intervals"].to_pylist() if (row["gate"], row["direction"]) == ("west", "right")]
+    rows = [
+        row for row in found.tables["intervals"].to_pylist() if (row["gate"], row["direction"]) == ("west", "right")
+    ]
     assert [row["coverage"] for row in rows] == pytest.approx([1, 0.2, 0, 0.9, 1, 1])
     assert [row["count"] for row in rows] == [1, 0, None, 0, 1, 0]
     assert found.report["watched_s"] == pytest.approx(41)
