@@ -229,7 +229,7 @@ def test_one_looks_and_judges_by_keys(tmp_path, video):
         tab.press("Enter")
         tab.until("state.missed.length === 1")
         assert tab.js("document.querySelector('#missed li').firstChild.textContent").startswith("1.5 s")
-        assert tab.js("document.querySelector('#progress').textContent") == "2 of 4 looked at · 2 wrong · 1 missed"
+        assert tab.js("document.querySelector('#progress').textContent") == "2 of 4 looked at · 2 false · 1 missed"
         tab.js("document.activeElement.blur()")
         tab.press("z")
         tab.until("state.missed.length === 0")
@@ -239,7 +239,7 @@ def test_one_looks_and_judges_by_keys(tmp_path, video):
         for width, height in ((1440, 900), (390, 844)):
             tab.size(width, height)
             assert tab.js("document.documentElement.scrollWidth") <= width
-        assert tab.js("document.querySelector('#clip').getContext('2d').getImageData(240, 135, 1, 1).data[3]") == 255
+        assert tab.js("document.querySelector('#clip').getContext('2d').getImageData(320, 180, 1, 1).data[3]") == 255
     with (folder / NAME).open(encoding="utf-8-sig", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["verdict"] for row in rows} == {"double", "no vehicle"}
@@ -294,7 +294,7 @@ def test_validate_tells_the_precision_of_the_sample(measures):
     assert (pooled["counted"], pooled["looked_at"], pooled["corrected"], pooled["sample"]) == (4, 3, 3, 3)
     assert pooled["precision"]["value"] == pytest.approx(2 / 3)
     for arguments, words in (
-        (("run",), "holds no crossings.parquet"),
+        (("run",), "holds no crossings.csv or counts.csv"),
         (("measures", "--start", "0"), "for a count by hand"),
     ):
         process = start("validate", *arguments, cwd=measures.parent)

@@ -90,21 +90,19 @@ def _by_hand(options: ValidateOptions, manual: Path) -> None:
 
 def _by_review(options: ValidateOptions) -> None:
     from vidtrack.errors import ConfigError
-    from vidtrack.output.corrections import NAME, read_corrections
-    from vidtrack.traffic.validation.audit import audited, review_of
-    from vidtrack.traffic.validation.audit_events import read_counted
+    from vidtrack.output.corrections import NAME, reviewed
+    from vidtrack.traffic.validation.event_tables import table_of
 
     for name, value in (("--tolerance", options.tolerance), ("--start", options.start), ("--end", options.end)):
         if value is not None:
             raise ConfigError(f"{name} is for a count by hand; give MANUAL.csv, or leave it out")
-    counted = read_counted(options.measures)
-    corrections = read_corrections(options.measures)
-    if not corrections:
+    table_of(options.measures)  # refuses a folder without counts
+    result = reviewed(options.measures)
+    if result is None:
         raise ConfigError(
             f"{options.measures} has no {NAME}; give a count by hand, MANUAL.csv, or look at the crossings with "
             f"vidtrack review {options.measures} --sample 100"
         )
-    result = review_of(counted, audited(counted.events, corrections))
     folder = options.folder("validate")
     if deliver(result.as_dict(), options.json_to, folder and folder / "validation.json", options.quiet):
         _print_review(result)
@@ -118,7 +116,7 @@ def _print_review(result: Reviewed) -> None:
     table = Table("gate", "figure", "value", "95 % from", "to")
     for column in table.columns[2:]:
         column.justify = "right"
-    for name, row in [*result.gates.items(), ("all", result.pooled)]:
+    for name, row in result.rows:
         table.add_row(name, "counted", str(row.counted))
         for what, number in (("looked at", row.looked_at), ("false", row.false), ("missed", row.missed)):
             table.add_row("", what, str(number))

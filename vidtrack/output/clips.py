@@ -27,7 +27,7 @@ from vidtrack.traffic.validation.audit_events import CountedEvents, Event
 from vidtrack.video.frame import Frame, Image
 from vidtrack.video.source import Excerpts
 
-WIDTH, HEIGHT = 480, 270
+WIDTH, HEIGHT = 640, 360
 """px; of each picture of a clip"""
 _HALF_S = 0.5
 _FRAMES = 13

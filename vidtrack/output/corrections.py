@@ -8,7 +8,8 @@ from pathlib import Path
 
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.output.report.spreadsheet import without_apostrophe, write_sheet
-from vidtrack.traffic.validation.audit import MISSED, VERDICTS, Correction
+from vidtrack.traffic.validation.audit import MISSED, VERDICTS, Correction, Reviewed, audited, review_of
+from vidtrack.traffic.validation.audit_events import read_counted
 
 NAME = "corrections.csv"
 HEADER = ("verdict", "time_s", "gate", "direction", "run", "track_id")
@@ -27,6 +28,15 @@ def read_corrections(folder: Path) -> tuple[Correction, ...]:
         return ()
     except (UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"{path} is no CSV table: {error}") from None
+
+
+def reviewed(folder: Path) -> Reviewed | None:
+    """What the corrections in a folder say about its counts; None without any. Raises FormatError, SourceError."""
+    corrections = read_corrections(folder)
+    if not corrections:
+        return None
+    counted = read_counted(folder)
+    return review_of(counted, audited(counted.events, corrections))
 
 
 def _correction(row: dict[str, str], where: str) -> Correction:

@@ -259,8 +259,7 @@ async function undo() {
 function show() {
   const { all } = state, seen = data.events.filter(verdict).length;
   const of = data.sampled ? `${data.events.length} in a random sample of ${data.total}` : `${data.total}`;
-  const wrong = all.looked_at - all.verdicts.right - all.verdicts["cannot tell"];
-  $("progress").textContent = [`${seen} of ${of} looked at`, `${wrong} wrong`, `${all.missed} missed`,
+  $("progress").textContent = [`${seen} of ${of} looked at`, `${all.false} false`, `${all.missed} missed`,
     ...(state.homeless ? [`${state.homeless} corrections of events that are no longer there`] : [])].join(" · ");
   const p = all.precision;
   $("precision").replaceChildren(...(p
@@ -328,7 +327,9 @@ async function begin() {
   ({ state } = data);
   document.title = `Review ${data.name}`;
   $("name").textContent = data.name;
-  $("verdicts").append(...Object.entries(KEYS).map(([found, key]) => {
+  const classes = data.events.some((one) => one.kind !== null);
+  const keys = Object.entries(KEYS).filter(([found]) => classes || found !== "wrong class");
+  $("verdicts").append(...keys.map(([found, key]) => {
     const button = element("button", found[0].toUpperCase() + found.slice(1));
     button.type = "button";
     button.value = found;

@@ -147,6 +147,11 @@ class Reviewed:
     pooled: AuditFigures
     homeless: int
 
+    @property
+    def rows(self) -> list[tuple[str, AuditFigures]]:
+        """Name and figures of each gate, and of all."""
+        return [*self.gates.items(), ("all", self.pooled)]
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
