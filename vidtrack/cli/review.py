@@ -75,7 +75,8 @@ def command(options: ReviewOptions) -> None:
             click.echo(f"vidtrack: no pictures: {why}", err=True)
         _serve(page.app(), options.port, options.quiet)
     if not options.quiet:
-        click.echo(f"vidtrack: {len(file.rows)} corrections in {options.run / NAME}", err=True)
+        count = len(file.rows)
+        click.echo(f"vidtrack: {count} correction{'s' * (count != 1)} in {options.run / NAME}", err=True)
 
 
 def _serve(app: Callable[..., Any], port: int, quiet: bool) -> None:
@@ -89,7 +90,7 @@ def _serve(app: Callable[..., Any], port: int, quiet: bool) -> None:
     from vidtrack.serve.server import Server
 
     token = token_urlsafe(24)
-    listener = listen(str(port), None)
+    listener = listen(str(port), None, option="--port")
     server, ended = Server(listener), Event()
     try:
         server.start(private(app, token))

@@ -80,7 +80,7 @@ class Clips:
         try:
             self._run(self._counted.recordings[0]).pictures.between(0, 0)
         except Error as error:
-            return str(error)
+            return f"{error}; --video SOURCE tells where the video is now"
         return ""
 
     def clip(self, event: Event) -> Clip:

@@ -14,8 +14,8 @@ _GONE_S = 20.0  # the system disconnects a client that receives nothing for this
 _PLACE = re.compile(r"(?:(?P<host>[^\[\]:]+|\[[^\[\]]+\]):)?(?P<port>\d{1,5})")
 
 
-def listen(place: str, token: str | None) -> socket.socket:
-    """A listening socket at "[HOST:]PORT", on loopback without a host; port 0 is any free port.
+def listen(place: str, token: str | None, option: str = "--http") -> socket.socket:
+    """A listening socket at "[HOST:]PORT", on loopback without a host; port 0 is any free port. `option` named the place.
 
     Raises ConfigError if the place is malformed, is open to other machines without a token, or is not free.
     """
@@ -26,11 +26,11 @@ def listen(place: str, token: str | None) -> socket.socket:
         )[0]
         if not token and not ip_address(str(address[0]).partition("%")[0]).is_loopback:
             raise ConfigError(
-                f"--http {place}: other machines could see this page; protect it by --http-token or VIDTRACK_TOKEN"
+                f"{option} {place}: other machines could see this page; protect it by --http-token or VIDTRACK_TOKEN"
             )
         listener = socket.create_server(address, family=family)
     except OSError as error:
-        raise ConfigError(f"--http {place}: {_why(error)}; give another host or port") from None
+        raise ConfigError(f"{option} {place}: {_why(error)}; give another host or port") from None
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if hasattr(socket, "TCP_USER_TIMEOUT"):  # Linux; accepted sockets inherit both options
         listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1000 * _GONE_S))
