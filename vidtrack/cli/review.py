@@ -26,7 +26,6 @@ class ReviewOptions:
 
 @click.command(
     name="review",
-    short_help="Look at counted crossings, and correct them.",
     epilog="""\b
 Examples:
   vidtrack review monday

@@ -15,7 +15,9 @@ _PLACE = re.compile(r"(?:(?P<host>[^\[\]:]+|\[[^\[\]]+\]):)?(?P<port>\d{1,5})")
 
 
 def listen(place: str, token: str | None, option: str = "--http") -> socket.socket:
-    """A listening socket at "[HOST:]PORT", on loopback without a host; port 0 is any free port. `option` named the place.
+    """A listening socket at "[HOST:]PORT", on loopback without a host; port 0 is any free port.
+
+    option  that the place was given by, for messages
 
     Raises ConfigError if the place is malformed, is open to other machines without a token, or is not free.
     """
