@@ -6,15 +6,14 @@ from pathlib import Path
 
 from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
-
-NAME = "site.toml"
+from vidtrack.traffic.metres import SITE_COPY
 
 
 class SiteCopy:
     """Sink that writes the text of the site with the first step: a run that never begins leaves its folder empty."""
 
     def __init__(self, folder: Path, text: str) -> None:
-        self._path = folder / NAME
+        self._path = folder / SITE_COPY
         self._text: str | None = text
 
     def step(self, step: Step) -> None:

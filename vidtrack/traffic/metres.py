@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from vidtrack.traffic.footprint import Footprints
 
+SITE_COPY = "site.toml"
+"""Name of the copy of a site in the folder of a run."""
+
 
 def footprints_of(site: Path | None, width: int, height: int) -> Footprints | None:
     """Where vehicles stand on the road of the site in a file; None without a site, or without a calibration in it.

@@ -14,6 +14,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError, SourceError
+from vidtrack.traffic.metres import SITE_COPY
 
 _JOINED_S = 1.0
 """Parts of one live run with less between them are watched without a break."""
@@ -133,10 +134,10 @@ def site_of(runs: Sequence[str]) -> Path:
 
     Raises ConfigError where a run has none, or another one than the first.
     """
-    copies = [_split(run)[0] / "site.toml" for run in runs]
+    copies = [_split(run)[0] / SITE_COPY for run in runs]
     for copy in copies:
         if not copy.is_file():
-            raise ConfigError(f"{copy.parent} has no site.toml: it was tracked without a site; give --site SITE.toml")
+            raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
     for other in copies[1:]:
         if other.read_bytes() != copies[0].read_bytes():
             raise ConfigError(f"{copies[0]} and {other} are not the same site; give --site SITE.toml")
