@@ -6,8 +6,8 @@ import pytest
 from vidtrack.output.watched import Watched
 
 
-def spans(times):
-    watched = Watched()
+def spans(times, usual_s=0.04):
+    watched = Watched(usual_s)
     for t in times:
         watched.add(float(t))
     return watched.spans
@@ -32,6 +32,10 @@ def test_a_slow_camera_is_watched_after_a_few_pictures():
     found = spans(np.arange(1000) * 5.0)
     assert len(found) < 6
     assert found[-1][1] == 4995.0
+
+
+def test_a_nominal_rate_tells_that_from_the_first_picture_on():
+    assert spans(np.arange(9) * 5.0, usual_s=5.0) == [[0.0, 40.0]]
 
 
 def test_nothing_came():

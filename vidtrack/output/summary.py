@@ -64,6 +64,7 @@ class Summary:
              reconnects, stalls, truncated
     counter  line counter; None without counting lines
     unit     of the steps: "frames" or "scans"
+    usual_s  nominal time between two frames
 
     `interrupted` is True until the run clears it before `close`, so the file of a killed or failed run has it True.
     """
@@ -76,6 +77,7 @@ class Summary:
         reading: Callable[[], Mapping[str, object]],
         counter: LineCounter | None = None,
         unit: str = "frames",
+        usual_s: float = 0.0,
     ) -> None:
         self.interrupted = True
         self._path = path
@@ -92,7 +94,7 @@ class Summary:
         self._alive: set[int] = set()
         self._stage_s: dict[str, float] = {}
         self._camera = CameraAccount()
-        self._watched = Watched()
+        self._watched = Watched(usual_s)
         self._warnings: list[dict[str, object]] = []
         self._due = Every(1.0)
         self._write(interrupted=True)

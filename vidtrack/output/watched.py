@@ -14,12 +14,14 @@ _LONGEST_S = 10.0
 class Watched:
     """Takes the time of each picture.
 
-    spans  [first, last] picture of each span [s]
+    usual_s  nominal time between two pictures
+
+    spans    [first, last] picture of each span [s]
     """
 
-    def __init__(self) -> None:
+    def __init__(self, usual_s: float) -> None:
         self.spans: list[list[float]] = []
-        self._usual_s = 0.0
+        self._usual_s = usual_s
 
     def add(self, time_s: float) -> None:
         """Continue the last span, or begin one after a pause."""

@@ -67,7 +67,8 @@ class Subject:
 
     def summary(self, folder: Path) -> Summary:
         """Opens summary.json in a folder."""
-        return Summary(folder / "summary.json", self.source, self.settings, self.reading, self.counter)
+        path = folder / "summary.json"
+        return Summary(path, self.source, self.settings, self.reading, self.counter, usual_s=1 / self.fps)
 
 
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:

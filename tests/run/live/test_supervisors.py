@@ -258,7 +258,7 @@ def test_a_site_is_of_one_camera(tmp_path):
     alone = settings_of(cameras[0], {}, None, [site])
     linked = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "link.toml")])
     for other in (alone, linked):
-        with pytest.raises(ConfigError, match=r"both one and two: a site is of one camera.*\[camera\.one\]"):
+        with pytest.raises(ConfigError, match=r'both one and two: a site is of one camera.*\[camera\."one"\]'):
             refuse_shared_site(cameras, [alone, other])
     own = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "other.toml")])
     refuse_shared_site(cameras, [alone, own])

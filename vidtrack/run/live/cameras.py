@@ -83,7 +83,7 @@ def refuse_shared_site(cameras: Iterable[Entry], settings: Iterable[Settings]) -
         if other != camera.name:
             raise ConfigError(
                 f"{site} cannot be the site of both {other} and {camera.name}: a site is of one camera; list the "
-                f'cameras in a file, each with its own, [{_CAMERAS}.{other}] and output.site = "{other}.toml"'
+                f'cameras in a file, each with its own: [{_CAMERAS}."{other}"] with output.site = "{other}.toml"'
             )
 
 
