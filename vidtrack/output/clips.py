@@ -30,7 +30,9 @@ from vidtrack.video.source import Excerpts
 WIDTH, HEIGHT = 640, 360
 """px; of each picture of a clip"""
 _HALF_S = 0.5
+"""s before and after a crossing, of a clip"""
 _FRAMES = 13
+"""Most pictures of a clip"""
 _PATH_S = 2.0
 """s before and after, of the drawn path"""
 _ROOM = 2.2
@@ -40,7 +42,9 @@ _LEAST = 0.22
 _THUMB = (160, 90)
 _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 82]
 _KEPT = 64
+"""Clips that are kept for the next who asks"""
 _SAME_S = 1e-3
+"""s; rows whose times differ by less are of one frame"""
 _BOX = ("left_px", "top_px", "width_px", "height_px")
 _COLUMNS = ("time_s", "track_id", "x_px", "y_px", *_BOX)
 
@@ -78,7 +82,8 @@ class Clips:
         if not self._counted.recordings:
             return self._counted.gone
         try:
-            self._run(self._counted.recordings[0]).pictures.between(0, 0)
+            with self._lock:
+                self._run(self._counted.recordings[0]).pictures.between(0, 0)
         except Error as error:
             return f"{error}; --video SOURCE tells where the video is now"
         return ""

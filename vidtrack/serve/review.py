@@ -90,7 +90,6 @@ class Review:
                 "sampled": self._sampled,
                 "total": len(events),
                 "ways": self._counted.ways,
-                "verdicts": VERDICTS,
                 "events": [_plain(k, events[k]) for k in self._order],
                 "no_clips": await asyncio.to_thread(self._clips.why_not),
                 "state": self._state(),

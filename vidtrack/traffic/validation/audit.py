@@ -11,13 +11,16 @@ from typing import Any
 from vidtrack.traffic.validation.audit_events import CountedEvents, Event, random_order
 from vidtrack.traffic.validation.validate import Estimate, proportion
 
-RIGHT, WRONG_CLASS, WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG, UNSURE = VERDICTS = (
-    *("right", "wrong class", "wrong direction", "double", "no vehicle", "wrong", "cannot tell"),
+VERDICTS = RIGHT, WRONG_CLASS, WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG, UNSURE = (
+    "right", "wrong class", "wrong direction", "double", "no vehicle", "wrong", "cannot tell",
 )  # fmt: skip
+"""What a counted crossing may be found to be. The page of `vidtrack review` has a key for each."""
 MISSED = "missed"
+"""Of a vehicle that was not counted."""
 COUNTED_WELL = (RIGHT, WRONG_CLASS)
 """A vehicle passed there, in that direction, once."""
 FALSE = (WRONG_WAY, DOUBLE, NO_VEHICLE, WRONG)
+"""None did."""
 _SAME_S = 1.0
 """s; a crossing that was measured again may have moved by so much"""
 
