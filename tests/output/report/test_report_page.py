@@ -12,8 +12,10 @@ from made_up_day import SITE, busy_day, write_day, write_run
 
 from vidtrack.cli import cli
 from vidtrack.errors import ConfigError, OutputError, SourceError
+from vidtrack.output.corrections import CorrectionsFile
 from vidtrack.output.report.report import write_report
 from vidtrack.traffic.report.findings import read_findings
+from vidtrack.traffic.validation.audit import Correction
 
 
 def report(folder, scene=None):
@@ -164,13 +166,22 @@ def test_what_the_command_refuses(tmp_path):
 
 
 def test_from_a_run_to_its_report(tmp_path, monkeypatch):
-    """Two vehicles: one drives from the north to the south, one stands aside."""
+    """Two vehicles: one drives from the north to the south, one stands aside. Somebody looked at one crossing."""
     monkeypatch.chdir(tmp_path)
     write_run(tmp_path / "run", 20.0)
     (tmp_path / "site.toml").write_text(SITE.format(name="cross", calibration=""))
     cli.main(["measure", "run", "--site", "site.toml", "-o", "measures", "-q"], standalone_mode=False)
+    CorrectionsFile(tmp_path / "measures").replace(
+        [Correction("double", 28.0, "south_out", "down", 0, 1), Correction("missed", 5.0, "north_in", "down")]
+    )
     command("measures", "-o", "out")
     (movement,) = [row for row in table(tmp_path / "out" / "origin_destination.csv") if row["trips"] != "0"]
     assert movement == {"from": "north", "to": "south", "turn": "through", "trips": "1"}
     assert (tmp_path / "out" / "time_space.png").is_file()
     assert "Whole trips 1" in words(tmp_path / "out")
+    assert "Somebody looked at 1 of 2 crossings" in words(tmp_path / "out")
+    looked_at = {row["gate"]: row for row in table(tmp_path / "out" / "looked_at.csv")}
+    found = {
+        gate: (looked_at[gate]["counted"], looked_at[gate]["corrected"]) for gate in ("north_in", "south_out", "all")
+    }
+    assert found == {"north_in": ("1", "2"), "south_out": ("1", "0"), "all": ("2", "2")}

@@ -45,12 +45,23 @@ def along(track, t, x, y=240.0):
 
 
 def write_run(
-    folder, tracks, *, seconds=60.0, metres=False, csv=False, length_m=4.0, began=None, status=None, first=0.0
+    folder,
+    tracks,
+    *,
+    seconds=60.0,
+    metres=False,
+    csv=False,
+    length_m=4.0,
+    began=None,
+    status=None,
+    first=0.0,
+    watched=None,
 ):
     """A finished run of these tracks (id, times (N,), positions (N, 2) px), in order of frames.
 
     metres  at 10 px/m, seen from above; first: its first frame [s]
     status  (N,) words for all tracks, None: confirmed
+    watched as in summary.json; None: as earlier versions, without
     """
     folder.mkdir(parents=True)
     t = np.concatenate([one[1] for one in tracks] or [np.empty(0)])
@@ -88,5 +99,6 @@ def write_run(
         **{"width": SIZE[0], "height": SIZE[1]},
         "settings": {"source": {"start_s": None if first == 0 or began else first}},
     }
-    (folder / "summary.json").write_text(json.dumps(summary | ({"began": began} if began else {})))
+    more = {"began": began, "watched": watched}
+    (folder / "summary.json").write_text(json.dumps(summary | {name: value for name, value in more.items() if value}))
     return str(folder)

@@ -207,6 +207,30 @@ def test_an_empty_road_is_counted_as_zero(tmp_path, csv):
     assert all(len(tables[name]) == 0 for name in ("crossings", "trips", "stays", "queues"))
 
 
+@pytest.mark.parametrize("began", [BEGAN, None], ids=["live", "file"])
+def test_an_outage_within_a_run_was_not_watched(tmp_path, began):
+    """The camera is gone from 12 s to 31 s; the track of the one vehicle ends there, and nobody saw it vanish."""
+    last = 60 - 1 / FPS
+    tracks = [straight(1, 9.0, 50, 240, 60, 3 - 1 / FPS), straight(2, 40.0, 50, 240, 100, 5)]
+    run = write_run(tmp_path / "run", tracks, began=began, watched=[[0.0, 12 - 1 / FPS], [31.0, last]])
+    found = measured([run], site())
+    rows = [
+        row for row in found.tables["intervals"].to_pylist() if (row["gate"], row["direction"]) == ("west", "right")
+    ]
+    assert [row["coverage"] for row in rows] == pytest.approx([1, 0.2, 0, 0.9, 1, 1])
+    assert [row["count"] for row in rows] == [1, 0, None, 0, 1, 0]
+    assert found.report["watched_s"] == pytest.approx(41)
+    assert found.report["vanished"] == 0
+
+
+def test_a_part_begins_with_its_first_picture(tmp_path):
+    """Frames were dropped: fewer of them than the nominal rate has."""
+    run = Path(write_run(tmp_path / "run", [], seconds=20, began=BEGAN, watched=[[2.0, 20 - 1 / FPS]]))
+    summary = json.loads((run / "summary.json").read_text())
+    (run / "summary.json").write_text(json.dumps(summary | {"frames": 7}))
+    assert measured([str(run)], site()).report["watched_s"] == pytest.approx(18)
+
+
 def test_a_run_of_radar_is_refused(tmp_path):
     run = Path(write_run(tmp_path / "run", []))
     (run / "summary.json").write_text('{"source": "plots.csv", "scans": 5, "media_s": 1.0}')

@@ -16,6 +16,7 @@ from vidtrack.traffic.report.legs import LegDay
 from vidtrack.traffic.report.paths import Paths
 from vidtrack.traffic.report.sheet import PeakHour, Sheet, peak_hour_factor
 from vidtrack.traffic.report.speeds import Speeds
+from vidtrack.traffic.validation.audit import Reviewed
 
 NOT_KNOWN = "–"
 CHECKS = {
@@ -29,7 +30,10 @@ CHECKS = {
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """All that the page says. `why_no_peak`: in words, where `peak` is None; `scene`: a picture is under the arrows."""
+    """All that the page says. `why_no_peak`: in words, where `peak` is None; `scene`: a picture is under the arrows.
+
+    reviewed  what somebody found who looked at the crossings; None: nobody did
+    """
 
     found: Findings
     sheet: Sheet
@@ -39,6 +43,7 @@ class Page:
     speeds: Sequence[Speeds]
     paths: Paths | None
     scene: bool
+    reviewed: Reviewed | None = None
 
     @property
     def times(self) -> list[str]:
