@@ -103,6 +103,7 @@ def test_every_step_is_seen_and_written(tmp_path):
         "mot.txt",
         "summary.json",
         "tracks.png",
+        "scene.jpg",
     }
 
 

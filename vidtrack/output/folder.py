@@ -22,6 +22,7 @@ RESULTS = (
     "counts.csv",
     "summary.json",
     "tracks.png",
+    "scene.jpg",
     "decisions.csv",
 )
 """All files of a run's folder; `--force` replaces these and keeps other files."""

@@ -23,7 +23,7 @@ from vidtrack.run.live.run import LiveRun
 from vidtrack.state import read_state
 from vidtrack.tracks import Status
 
-TABLES = {"tracks.csv", "tracks.parquet", "mot.txt", "summary.json", "tracks.png"}
+TABLES = {"tracks.csv", "tracks.parquet", "mot.txt", "summary.json", "tracks.png", "scene.jpg"}
 
 
 def summary(folder):

@@ -58,10 +58,10 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     for rows in reader:
         for part in (passing, lives, staying):
             part.add(rows)
-    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
+    return Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
 
 
-class _Figures:
+class Figures:
     """All figures of a day, from what is left of its tracks."""
 
     def __init__(

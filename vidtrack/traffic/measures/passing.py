@@ -61,6 +61,10 @@ class Passed:
         names = [column.name for column in fields(self)]
         return Passed(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
 
+    def at_gate(self, gate: int) -> Passed:
+        """The same passings, of a gate of this number."""
+        return replace(self, gate=np.full(len(self), gate))
+
     def of(self, track: Ints) -> Passed:
         """The same passings of other tracks (P,)."""
         return replace(self, track=track)
