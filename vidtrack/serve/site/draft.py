@@ -129,7 +129,7 @@ def _shown(account: Account) -> dict[str, Any]:
     report, ground = account.report, account.ground
     step, lines = metre_grid(ground, account.picture)
     plain = ground.lens is None
-    return {
+    shown = {
         "pairs": report["pairs"],
         "fitted": account.fitted.round(2).tolist() if report["pairs"] else [],
         "wrong": report["wrong"],
@@ -139,6 +139,16 @@ def _shown(account: Account) -> dict[str, Any]:
         "grid": [line.round(1).tolist() for line in lines],
         "metres": _to_metres(ground).tolist() if plain else None,
     }
+    return {name: _known(value) for name, value in shown.items()}
+
+
+def _known(value: Any) -> Any:
+    """The value with None for numbers that are not known: JSON has no other word for it."""
+    if isinstance(value, dict):
+        return {key: _known(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_known(one) for one in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def _to_metres(ground: Ground) -> Floats:

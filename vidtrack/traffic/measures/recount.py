@@ -110,14 +110,14 @@ class Recount:
             self._load(calibration, ground)
 
     def _load(self, calibration: Calibration | None, ground: Ground | None) -> None:
-        reader, lives, block = Reader(self._day, {self.size: ground}), Lives(), list[Rows]()
+        reader, lives, blocks = Reader(self._day, {self.size: ground}), Lives(), list[Rows]()
         for rows in reader:
-            block.append(rows)
-            lives.add(rows)
-            if sum(map(len, block)) >= self._most:
-                self.until_s = float(rows.t[-1])
+            if sum(map(len, blocks)) >= self._most:
+                self.until_s = float(blocks[-1].t[-1])
                 break
-        self._calibration, self._reader, self._lives, self._rows = calibration, reader, lives, block
+            blocks.append(rows)
+            lives.add(rows)
+        self._calibration, self._reader, self._lives, self._rows = calibration, reader, lives, blocks
         self._passed: dict[tuple[Point, ...], Passed] = {}
         self._stays: dict[tuple[Point, ...], Staying] = {}
 

@@ -12,15 +12,13 @@ export function nearest(point, a, b) {
   return between(a, b, Math.min(Math.max(share, 0), 1));
 }
 
-/* The point halfway along a line, and the unit vector along it there. */
+/* The point halfway along a line. */
 export function middle(line) {
   const lengths = line.slice(1).map((point, k) => distance(line[k], point));
   let rest = lengths.reduce((sum, length) => sum + length, 0) / 2;
   let k = 0;
   while (k < lengths.length - 1 && rest > lengths[k]) rest -= lengths[k++];
-  const [a, b] = [line[k], line[k + 1]];
-  const length = lengths[k] || 1;
-  return { at: between(a, b, rest / length), along: [(b[0] - a[0]) / length, (b[1] - a[1]) / length] };
+  return between(line[k], line[k + 1], rest / (lengths[k] || 1));
 }
 
 /* `to` moved so that the way from `from` is level, upright or at 45 degrees. */

@@ -155,7 +155,9 @@ function showButtons(faults) {
   $("#title").textContent = store.now.tree.site.name;
   for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", String(button.dataset.tool === tools.tool));
   for (const button of document.querySelectorAll("[data-layer]")) button.setAttribute("aria-pressed", String(layers[button.dataset.layer]));
-  $("#scale").hidden = tools.scale.length < 2;
+  const asks = tools.scale.length === 2;
+  if (asks && $("#scale").hidden) setTimeout(() => $("#scale input").focus());
+  $("#scale").hidden = !asks;
 }
 
 function showPlace() {
@@ -304,7 +306,7 @@ document.addEventListener("keydown", (event) => {
     return;
   }
   if (typing) {
-    if (event.key === "Enter" || event.key === "Escape") $("#scene").focus();
+    if (event.key === "Escape" || (event.key === "Enter" && !event.target.form)) $("#scene").focus();
     return;
   }
   const pressing = event.target.matches?.("button") && (event.key === " " || event.key === "Enter");
@@ -336,6 +338,7 @@ $("#scale").addEventListener("submit", (event) => {
   if (!(length > 0)) return tools.say("write the length in metres");
   const scale = length / distance(...tools.scale);
   tools.scale = [];
+  $("#plan").focus();
   store.edit((drawing) => (drawing.world = [scale, 0, 0, -scale, 0, scale * (panes.plan.size[1] - 1)]));
 });
 window.addEventListener("beforeunload", (event) => {

@@ -53,13 +53,16 @@ export class Panel {
 
   /* What keeps the drawing from being saved and only this page knows. */
   localFaults() {
-    return this.store.now.pairs.flatMap((pair, k) => {
-      if (pair.picture && pair.ground) return [];
-      const words = pair.picture
-        ? `point ${k + 1} has no metres: click its place on the plan, or type them`
-        : `point ${k + 1} has no place in the picture: press P and click it`;
-      return [{ key: ["pairs", k], words }];
-    });
+    const lacking = (key, one, several, todo) => {
+      const numbers = this.store.now.pairs.flatMap((pair, k) => (pair[key] ? [] : [k + 1]));
+      if (!numbers.length) return [];
+      const who = numbers.length === 1 ? `point ${numbers[0]} ${one}` : `points ${numbers.join(", ")} ${several}`;
+      return [{ key: ["calibration"], words: `${who} ${todo}` }];
+    };
+    return [
+      ...lacking("ground", "has", "have", "no metres: click the place on the plan, or type them"),
+      ...lacking("picture", "has", "have", "no place in the picture: press P and click it"),
+    ];
   }
 
   #list(id, items) {
@@ -288,11 +291,12 @@ export class Panel {
   #worth(calibration) {
     if (!calibration) return [];
     const { camera, places, grid_m: step } = calibration;
-    const far = places[places.length - 1];
-    const near = places[0];
+    const [near, far] = [places[0], places[places.length - 1]];
     const lines = [`Grid of ${step} m.`];
-    if (camera) lines.push(`The camera is ${camera.height_m.toFixed(1)} m above the road (± ${camera.height_sigma_m.toFixed(1)} m).`);
-    lines.push(`A pixel is ${near.m_per_px_away.toFixed(2)} m near, ${far.m_per_px_away.toFixed(2)} m far; speeds are off by ${near.speed_sigma_percent.toFixed(1)} to ${far.speed_sigma_percent.toFixed(1)} % by the calibration.`);
+    if (camera?.height_sigma_m)
+      lines.push(`The camera is ${camera.height_m.toFixed(1)} m above the road (± ${camera.height_sigma_m.toFixed(1)} m).`);
+    const span = (name, digits) => [near, far].map((place) => place[name]?.toFixed(digits) ?? "?").join(" to ");
+    lines.push(`A pixel is ${span("m_per_px_away", 2)} m, near and far; speeds are off by ${span("speed_sigma_percent", 1)} % by the calibration.`);
     return lines.map((line) => element("p", { class: "note" }, line));
   }
 
@@ -316,7 +320,7 @@ export class Panel {
   #addSection() {
     const { tree } = this.store.now;
     const [from, to] = Object.keys(tree.gates ?? {});
-    const ends = [from, to].map((name) => metresOf(this.found?.calibration?.metres, middle(tree.gates[name].line).at));
+    const ends = [from, to].map((name) => metresOf(this.found?.calibration?.metres, middle(tree.gates[name].line)));
     this.store.edit((drawing) => {
       drawing.tree.sections ??= {};
       let count = 1;

@@ -49,14 +49,14 @@ function gate(pane, svg, name, { line, role = "neutral" }, { chosen, vertex, cou
   const parent = group(svg, [role, chosen && "chosen", faulty && "fault"], "gates", name);
   const places = shape(pane, parent, line, false, chosen, vertex);
   if (places.length < 2) return;
-  const { at, along } = middle(places);
+  const at = middle(places);
+  const [first, last] = [places[0], places[places.length - 1]];
+  const width = Math.hypot(last[0] - first[0], last[1] - first[1]) || 1;
+  const along = [(last[0] - first[0]) / width, (last[1] - first[1]) / width];
   const normal = [-along[1], along[0]];
   for (const [direction, count] of Object.entries(counts ?? {})) {
     const towards = TOWARDS[direction];
-    const first = places[0];
-    const last = places[places.length - 1];
-    const whole = [-(last[1] - first[1]), last[0] - first[0]];
-    const side = Math.sign(whole[0] * towards[0] + whole[1] * towards[1]) || 1;
+    const side = Math.sign(normal[0] * towards[0] + normal[1] * towards[1]) || 1;
     const out = [side * normal[0], side * normal[1]];
     const tip = [at[0] + 17 * out[0], at[1] + 17 * out[1]];
     const base = [at[0] + 8 * out[0], at[1] + 8 * out[1]];
@@ -73,11 +73,11 @@ function gate(pane, svg, name, { line, role = "neutral" }, { chosen, vertex, cou
 function label(pane, parent, name, places) {
   const [a, b] = places.length > 1 ? places.slice(-2) : [places[0], places[0]];
   const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
-  const half = 3.8 * name.length;
+  const half = 3.1 * name.length;
   const reach = 12 + (half * Math.abs(b[0] - a[0])) / length;
   const x = Math.min(Math.max(b[0] + ((b[0] - a[0]) / length) * reach, half + 4), pane.root.clientWidth - half - 4);
   const y = Math.min(Math.max(b[1] + ((b[1] - a[1]) / length) * reach, 10), pane.root.clientHeight - 10);
-  put(parent, "text", { x, y }, name);
+  put(parent, "text", { x, y, class: "label" }, name);
 }
 
 function zone(pane, svg, name, { polygon }, { chosen, vertex, stays, faulty }) {
@@ -85,7 +85,7 @@ function zone(pane, svg, name, { polygon }, { chosen, vertex, stays, faulty }) {
   const places = shape(pane, parent, polygon, true, chosen, vertex);
   const x = places.reduce((sum, place) => sum + place[0], 0) / places.length;
   const y = places.reduce((sum, place) => sum + place[1], 0) / places.length;
-  put(parent, "text", { x, y }, name);
+  put(parent, "text", { x, y, class: "label" }, name);
   if (stays !== undefined) put(parent, "text", { x, y: y + 18, class: "count" }, stays);
 }
 
@@ -94,7 +94,7 @@ function cross(parent, [x, y], name) {
   put(parent, "path", { d: lines, class: "cross-edge" });
   put(parent, "path", { d: lines, class: "cross" });
   put(parent, "circle", { cx: x, cy: y, r: TOUCH, class: "touch" });
-  put(parent, "text", { x: x + 14, y: y - 12 }, name);
+  put(parent, "text", { x: x + 13, y: y - 11, class: "label" }, name);
 }
 
 function pairs(pane, svg, drawing, shown, chosen) {
@@ -132,6 +132,7 @@ function started(pane, svg, { points, end, closed, kind }) {
 export function render(pane, drawing, shown) {
   const svg = pane.svg;
   svg.replaceChildren();
+  pane.root.classList.toggle("small", pane.root.clientWidth < 440);
   if (!drawing) return;
   const { selection } = shown;
   const choice = (part, name) => {
