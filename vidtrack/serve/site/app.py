@@ -22,7 +22,7 @@ from starlette.staticfiles import StaticFiles
 from vidtrack.errors import Error
 from vidtrack.serve.site.draft import Draft
 from vidtrack.serve.site.file import ChangedError, SiteFile, Tree
-from vidtrack.serve.site.plan import is_world, read_world, write_world
+from vidtrack.serve.site.plan import World, is_world, read_world, write_world
 from vidtrack.traffic.measures.recount import Recount
 
 log = logging.getLogger(__name__)
@@ -130,13 +130,22 @@ class Desk:
             faults = self._draft.look(tree, count=True)["faults"]
         if faults:
             raise HTTPException(422, "\n".join(fault["words"] for fault in faults))
+        numbers = _world(world) if world is not None and self._plan is not None else None
         new = self._file.save(tree, digest)
-        if world is not None and self._plan is not None:
-            numbers = tuple(float(number) for number in world)
-            if not is_world(numbers):
-                raise HTTPException(422, "the scale of the plan is no scale")
+        if numbers is not None and self._plan is not None:
             write_world(self._plan[0], numbers)
         return {"digest": new}
+
+
+def _world(numbers: list[Any]) -> World:
+    """The numbers of a world file. Raises HTTPException."""
+    try:
+        world = tuple(float(number) for number in numbers)
+    except (TypeError, ValueError):
+        world = ()
+    if not is_world(world):
+        raise HTTPException(422, "the scale of the plan is no scale")
+    return world
 
 
 def _picture(picture: Picture | None) -> Response:

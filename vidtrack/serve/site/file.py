@@ -12,6 +12,7 @@ from typing import Any
 
 import tomlkit
 from pydantic import ValidationError
+from tomlkit.items import InlineTable
 
 from vidtrack.errors import ConfigError
 from vidtrack.output.folder import replacing
@@ -119,7 +120,7 @@ def _change(table: MutableMapping[str, Any], tree: Tree, path: tuple[str, ...]) 
     for key in [key for key in table if key not in tree]:
         del table[key]
     for key, value in tree.items():
-        if isinstance(value, dict) and value:
+        if isinstance(value, dict) and value and not isinstance(table, InlineTable):
             if not isinstance(table.get(key), MutableMapping):
                 table[key] = tomlkit.table(is_super_table=all(isinstance(one, dict) for one in value.values()))
             _change(table[key], value, (*path, key))

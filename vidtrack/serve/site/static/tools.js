@@ -238,7 +238,7 @@ export class Tools {
     if (steps[key]) this.#arrow(steps[key], event.shiftKey);
     else if (key === "Enter" && this.started) this.finish();
     else if (key === " " && this.aim) this.#placeAim();
-    else if (key === "Escape" && (this.started || this.drag || this.aim)) this.cancel();
+    else if (key === "Escape" && (this.started || this.drag)) this.cancel();
     else if (key === "Escape" && this.tool !== "select") this.choose("select");
     else if (key === "Escape") this.select(null);
     else if (key === "Backspace" && this.started) this.back();
