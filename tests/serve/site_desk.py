@@ -26,7 +26,13 @@ def desk_over(run, site, scene=None, plan=None):
     recount = Recount([str(run)])
     width, height = recount.size
     new = {"site": {"name": "yard", "width": width, "height": height}}
-    desk = Desk(Path(run).name, recount, SiteFile(site), new, scene, plan)
+    with served(Desk(Path(run).name, recount, SiteFile(site), new, scene, plan)) as url:
+        yield url
+
+
+@contextmanager
+def served(desk):
+    """The address of a page, without its token."""
     listener = listen("0", None)
     server = Server(listener)
     server.start(private(desk.app(), SESAME))

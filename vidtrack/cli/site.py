@@ -13,7 +13,8 @@ import click
 from vidtrack.cli.options import receives, start_log
 
 if TYPE_CHECKING:
-    from vidtrack.serve.site.app import Picture
+    from vidtrack.serve.site.app import Desk, Picture
+    from vidtrack.traffic.site import Site
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,47 +69,53 @@ def command(options: SiteOptions) -> None:
     from threading import Event
 
     from vidtrack.cli.signals import Terminated
-    from vidtrack.errors import SourceError
-    from vidtrack.recording.retention import parts_of
     from vidtrack.serve.access import private
     from vidtrack.serve.listener import LOOPBACK, listen, url_of
     from vidtrack.serve.server import Server
-    from vidtrack.serve.site.app import Desk
-    from vidtrack.serve.site.file import SiteFile
-    from vidtrack.serve.site.plan import read_world
-    from vidtrack.traffic.measures.recount import Recount
-    from vidtrack.traffic.site import Site
 
     start_log(options.verbose, options.quiet)
-    runs = [str(part) for part in parts_of(options.run)] or [str(options.run)]
-    recount = Recount(runs)
-    file = SiteFile(options.site or _tracked_with(Path(runs[-1])) or options.run / "site.toml")
-    if not file.path.parent.is_dir():
-        raise SourceError(f"{file.path.parent}, where the site is to be saved, is no folder")
-    tree, _ = file.read()
-    new = {
-        "site": {"name": _name(options.run.resolve().name)} | dict(zip(("width", "height"), recount.size, strict=True))
-    }
-    drawn = Site.model_validate(tree or new)
-    drawn.scaled(*recount.size)  # refuses a run of another shape
-    plan = None
-    if options.plan is not None:
-        read_world(options.plan)
-        plan = options.plan, _encoded(str(options.plan))
-    desk = Desk(options.run.name, recount, file, new, _scene(options, Path(runs[-1]), drawn), plan)
-    token = secrets.token_urlsafe(16)
-    listener = listen(f"{LOOPBACK}:{options.port}", None)
+    desk = desk_of(options)
+    listener = listen(f"{LOOPBACK}:{options.port}", None, "--port")
     server = Server(listener)
+    token = secrets.token_urlsafe(16)
     server.start(private(desk.app(), token))
     try:
         if not options.quiet:
-            click.echo(f"vidtrack: draws {file.path}; open this address in a browser, and end with Ctrl-C", err=True)
+            click.echo(f"vidtrack: draws {desk.file.path}; open this address, and end with Ctrl-C", err=True)
         click.echo(f"{url_of(listener)}#{token}")
         Event().wait()
     except (KeyboardInterrupt, Terminated):
         pass
     finally:
         server.close()
+
+
+def desk_of(options: SiteOptions) -> Desk:
+    """What the options ask for. Raises an Error for a run, a site or a picture that does not fit."""
+    from vidtrack.errors import SourceError
+    from vidtrack.recording.retention import parts_of
+    from vidtrack.serve.site.app import Desk
+    from vidtrack.serve.site.file import SiteFile
+    from vidtrack.serve.site.plan import read_world
+    from vidtrack.traffic.measures.recount import Recount
+    from vidtrack.traffic.site import Site
+
+    parts = parts_of(options.run) or [options.run]
+    recount = Recount([str(part) for part in parts])
+    file = SiteFile(options.site or _tracked_with(parts[-1]) or options.run / "site.toml")
+    if not file.path.parent.is_dir():
+        raise SourceError(f"{file.path.parent}, where the site is to be saved, is no folder")
+    tree, _ = file.read()
+    width, height = recount.size
+    new = {"site": {"name": _name(options.run.resolve().name), "width": width, "height": height}}
+    drawn = Site.model_validate(tree or new)
+    drawn.scaled(width, height)  # refuses a run of another shape
+    plan = None
+    if options.plan is not None:
+        read_world(options.plan)  # refuses what is none
+        plan = options.plan, _encoded(str(options.plan), None)
+    scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts[-1])
+    return Desk(options.run.resolve().name, recount, file, new, scene, plan)
 
 
 def _tracked_with(run: Path) -> Path | None:
@@ -123,25 +130,24 @@ def _name(folder: str) -> str:
     return re.sub(r"[^\w .-]+", "_", folder).strip("_ .-")[:64].strip() or "site"
 
 
-def _scene(options: SiteOptions, run: Path, drawn: Any) -> Picture | None:
-    """What is drawn over: a given picture, else the run's scene, else its paths over the scene."""
-    from vidtrack.cli.calibrate import first_picture
+def _scene(run: Path) -> Picture | None:
+    """The run's scene; of a run without one, its paths over it."""
     from vidtrack.output.scene import SCENE
     from vidtrack.serve.site.app import Picture
 
-    if options.picture is not None:
-        height, width = first_picture(options.picture).shape[:2]
-        drawn.scaled(width, height)  # refuses a picture of another shape
-        return _encoded(options.picture)
     for name, kind in ((SCENE, "image/jpeg"), ("tracks.png", "image/png")):
         if (run / name).is_file():
             return Picture(name, (run / name).read_bytes(), kind)
     return None
 
 
-def _encoded(source: str) -> Picture:
+def _encoded(source: str, drawn: Site | None) -> Picture:
+    """An image, or the first picture of a video. Raises ConfigError where it has not the shape of the drawn site."""
     from vidtrack.cli.calibrate import first_picture
     from vidtrack.output.scene import jpeg
     from vidtrack.serve.site.app import Picture
 
-    return Picture(Path(source).name, jpeg(first_picture(source)), "image/jpeg")
+    picture = first_picture(source)
+    if drawn is not None:
+        drawn.scaled(picture.shape[1], picture.shape[0])
+    return Picture(Path(source).name, jpeg(picture), "image/jpeg")

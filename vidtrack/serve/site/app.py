@@ -45,6 +45,7 @@ class Desk:
     """A run, the site that is drawn over it, and who draws.
 
     name     of the run
+    file     of the site; new: the site, where there is no file yet
     scene    the camera's picture; None: plain grey
     plan     a plan of the road beside it, and the file that its world file stands beside
     """
@@ -53,7 +54,7 @@ class Desk:
         self, name: str, recount: Recount, file: SiteFile, new: Tree, scene: Picture | None,
         plan: tuple[Path, Picture] | None,
     ) -> None:  # fmt: skip
-        self._name, self._recount, self._file, self._new = name, recount, file, new
+        self._name, self._recount, self.file, self._new = name, recount, file, new
         self._scene, self._plan = scene, plan
         self._draft, self._counting = Draft(recount), Lock()
         self._editors: dict[str, float] = {}
@@ -77,14 +78,14 @@ class Desk:
 
     def drawing(self, request: Request) -> Response:
         """The site as it is in its file, or a new one, and what it is drawn over."""
-        tree, digest = self._file.read()
+        tree, digest = self.file.read()
         plan = None
         if self._plan is not None:
             plan = {"name": self._plan[1].name, "world": read_world(self._plan[0])}
         return JSONResponse(
             {
                 "run": self._name,
-                "file": str(self._file.path),
+                "file": str(self.file.path),
                 "tree": tree or self._new,
                 "digest": digest,
                 "scene": self._scene and self._scene.name,
@@ -113,7 +114,7 @@ class Desk:
         editor = (await _asked(request, editor=str))["editor"]
         now = time.monotonic()
         self._editors = {one: at for one, at in self._editors.items() if now - at < _GONE_S} | {editor[:64]: now}
-        return JSONResponse({"digest": await run_in_threadpool(self._file.digest), "others": len(self._editors) - 1})
+        return JSONResponse({"digest": await run_in_threadpool(self.file.digest), "others": len(self._editors) - 1})
 
     def _look(self, tree: Tree, count: bool) -> dict[str, Any]:
         with self._counting:
@@ -131,7 +132,7 @@ class Desk:
         if faults:
             raise HTTPException(422, "\n".join(fault["words"] for fault in faults))
         numbers = _world(world) if world is not None and self._plan is not None else None
-        new = self._file.save(tree, digest)
+        new = self.file.save(tree, digest)
         if numbers is not None and self._plan is not None:
             write_world(self._plan[0], numbers)
         return {"digest": new}
