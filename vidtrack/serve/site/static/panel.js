@@ -294,7 +294,7 @@ export class Panel {
     const [near, far] = [places[0], places[places.length - 1]];
     const lines = [`Grid of ${step} m.`];
     if (camera?.height_sigma_m)
-      lines.push(`The camera is ${camera.height_m.toFixed(1)} m above the road (± ${camera.height_sigma_m.toFixed(1)} m).`);
+      lines.push(`The camera is ${camera.height_m.toFixed(2)} m above the road (± ${camera.height_sigma_m.toFixed(2)} m).`);
     const span = (name, digits) => [near, far].map((place) => place[name]?.toFixed(digits) ?? "?").join(" to ");
     lines.push(`A pixel is ${span("m_per_px_away", 2)} m, near and far; speeds are off by ${span("speed_sigma_percent", 1)} % by the calibration.`);
     return lines.map((line) => element("p", { class: "note" }, line));

@@ -72,6 +72,7 @@ function gate(pane, svg, name, { line, role = "neutral" }, { chosen, vertex, cou
 /* The name beyond the end of a line that has more room, within the pane. */
 function label(pane, parent, name, places) {
   const [a, b] = places.length > 1 ? places.slice(-2) : [places[0], places[0]];
+  if (!places.some(([x, y]) => x > 0 && y > 0 && x < pane.root.clientWidth && y < pane.root.clientHeight)) return;
   const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
   const half = 3.1 * name.length;
   const reach = 12 + (half * Math.abs(b[0] - a[0])) / length;
@@ -109,6 +110,7 @@ function pairs(pane, svg, drawing, shown, chosen) {
     if (fitted) {
       const [[x1, y1], [x2, y2]] = [pane.screen(at), pane.screen(fitted)];
       put(parent, "line", { x1, y1, x2, y2, class: "off" });
+      put(parent, "circle", { cx: x2, cy: y2, r: 2.5, class: "off" });
     }
     if (k === chosen) {
       const [cx, cy] = pane.screen(at);
