@@ -32,7 +32,6 @@ class SiteOptions:
 
 @click.command(
     name="site",
-    short_help="Draw a site's gates, zones and points over the tracks of a run.",
     epilog="""\b
 Examples:
   vidtrack site runs/traffic
