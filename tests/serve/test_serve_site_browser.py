@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from browser import browser, needs_browser
 from drawn_runs import along, write_run
-from site_desk import SESAME, desk_over
+from site_desk import SESAME, ask_json, desk_over
 
 from vidtrack.serve.site.app import Picture
 from vidtrack.serve.site.plan import read_world
@@ -290,6 +290,13 @@ def test_a_file_that_somebody_else_changed_is_not_written_over(page):
     tab.until("document.querySelector('#title').textContent === 'yard'")
     page.save()
     assert read_site(page.site).gates["west"].line == ((101, 190), (101, 250))
+
+
+def test_a_second_window_is_told_of_the_first(page):
+    ask_json(page.url, "here", {"editor": "another", "open": True})
+    page.tab.until("document.querySelector('#banners').innerText.includes('open in another window')")
+    ask_json(page.url, "here", {"editor": "another", "open": False})
+    page.tab.until("!document.querySelector('#banners').innerText")
 
 
 def test_names_are_text_and_never_markup(page):

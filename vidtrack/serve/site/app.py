@@ -29,7 +29,8 @@ log = logging.getLogger(__name__)
 
 _STATIC = Path(__file__).with_name("static")
 _LARGEST = 4_000_000  # bytes of a request
-_GONE_S = 6.0  # a page that did not ask for so long is closed
+_GONE_S = 90.0  # a page that did not ask for so long is gone; browsers let hidden ones ask once a minute
+_MOST_EDITORS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +111,14 @@ class Desk:
         return JSONResponse(await run_in_threadpool(self._save, asked["tree"], asked["digest"], asked["world"]))
 
     async def here(self, request: Request) -> Response:
-        """A page tells that it is open, {editor}: the file's digest, and how many other pages are."""
-        editor = (await _asked(request, editor=str))["editor"]
+        """A page tells that it is open, or closes: {editor, open}. The file's digest, and how many other pages are open."""
+        asked = await _asked(request, editor=str, open=bool)
         now = time.monotonic()
-        self._editors = {one: at for one, at in self._editors.items() if now - at < _GONE_S} | {editor[:64]: now}
-        return JSONResponse({"digest": await run_in_threadpool(self.file.digest), "others": len(self._editors) - 1})
+        self._editors = {one: at for one, at in self._editors.items() if now - at < _GONE_S and one != asked["editor"]}
+        others = len(self._editors)
+        if asked["open"] and others < _MOST_EDITORS:
+            self._editors[asked["editor"]] = now
+        return JSONResponse({"digest": await run_in_threadpool(self.file.digest), "others": others})
 
     def _look(self, tree: Tree, count: bool) -> dict[str, Any]:
         with self._counting:

@@ -234,7 +234,7 @@ async function reload() {
 
 async function here() {
   try {
-    const answer = await server.here(EDITOR);
+    const answer = await server.here(EDITOR, true);
     banner("gone", null);
     if (answer.digest !== digest && !saving) fileChanged(`${opened.file} was ${answer.digest ? "changed" : "deleted"} by somebody else since it was opened here.`);
     banner("others", answer.others ? "This site is open in another window too; who saves second has to reload first." : null);
@@ -306,6 +306,7 @@ document.addEventListener("keydown", (event) => {
     return;
   }
   if (typing) {
+    if (event.key === "Escape" && event.target.matches("input")) event.target.value = event.target.defaultValue;
     if (event.key === "Escape" || (event.key === "Enter" && !event.target.form)) $("#scene").focus();
     return;
   }
@@ -341,6 +342,7 @@ $("#scale").addEventListener("submit", (event) => {
   $("#plan").focus();
   store.edit((drawing) => (drawing.world = [scale, 0, 0, -scale, 0, scale * (panes.plan.size[1] - 1)]));
 });
+window.addEventListener("pagehide", () => server.here(EDITOR, false).catch(() => {}));
 window.addEventListener("beforeunload", (event) => {
   if (store.now && store.unsaved) event.preventDefault();
 });

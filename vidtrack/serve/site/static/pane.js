@@ -144,7 +144,7 @@ export class Pane {
     pen.scale(ratio, ratio);
     pen.lineWidth = 1.2;
     pen.lineJoin = "round";
-    pen.globalAlpha = Math.min(Math.max(8 / Math.sqrt(this.paths.length), 0.12), 0.8);
+    pen.globalAlpha = Math.min(Math.max(8 / Math.sqrt(this.paths.length), 0.35), 0.8);
     ways.forEach((way, n) => {
       pen.strokeStyle = `hsl(${(360 * n) / WAYS} 85% 68%)`;
       pen.stroke(way);

@@ -12,7 +12,7 @@ export class Refusal extends Error {
 
 async function ask(path, body) {
   const headers = { "X-Vidtrack-Token": TOKEN };
-  const post = body === undefined ? { headers } : { headers, method: "POST", body: JSON.stringify(body) };
+  const post = body === undefined ? { headers } : { headers, method: "POST", body: JSON.stringify(body), keepalive: path === "here" };
   let answer;
   try {
     answer = await fetch(HERE + path, post);
@@ -26,7 +26,7 @@ async function ask(path, body) {
 export const drawing = async () => (await ask("drawing")).json();
 export const look = async (tree, count) => (await ask("look", { tree, count })).json();
 export const save = async (tree, digest, world) => (await ask("save", { tree, digest, world })).json();
-export const here = async (editor) => (await ask("here", { editor })).json();
+export const here = async (editor, open) => (await ask("here", { editor, open })).json();
 export const picture = async (path) => createImageBitmap(await (await ask(path)).blob());
 
 /* The paths as [Float32Array x0 y0 x1 y1 ..., ...]. */

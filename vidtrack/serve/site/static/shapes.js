@@ -64,7 +64,9 @@ function gate(pane, svg, name, { line, role = "neutral" }, { chosen, vertex, cou
     const corners = [tip, [base[0] + wing[0], base[1] + wing[1]], [base[0] - wing[0], base[1] - wing[1]]];
     const opacity = count ? 1 : 0.45;
     put(parent, "polygon", { points: listed(corners), class: "way", opacity });
-    put(parent, "text", { x: at[0] + 30 * out[0], y: at[1] + 30 * out[1], class: "count", opacity }, count);
+    const anchor = out[0] > 0.5 ? "start" : out[0] < -0.5 ? "end" : "middle";
+    const place = { x: at[0] + 22 * out[0], y: at[1] + 29 * out[1], "text-anchor": anchor };
+    put(parent, "text", { ...place, class: "count", opacity }, count);
   }
   label(pane, parent, name, places);
 }
@@ -78,7 +80,7 @@ function label(pane, parent, name, places) {
   const reach = 12 + (half * Math.abs(b[0] - a[0])) / length;
   const x = Math.min(Math.max(b[0] + ((b[0] - a[0]) / length) * reach, half + 4), pane.root.clientWidth - half - 4);
   const y = Math.min(Math.max(b[1] + ((b[1] - a[1]) / length) * reach, 10), pane.root.clientHeight - 10);
-  put(parent, "text", { x, y, class: "label" }, name);
+  put(parent, "text", { x, y, class: "label", "text-anchor": "middle" }, name);
 }
 
 function zone(pane, svg, name, { polygon }, { chosen, vertex, stays, faulty }) {
@@ -86,8 +88,9 @@ function zone(pane, svg, name, { polygon }, { chosen, vertex, stays, faulty }) {
   const places = shape(pane, parent, polygon, true, chosen, vertex);
   const x = places.reduce((sum, place) => sum + place[0], 0) / places.length;
   const y = places.reduce((sum, place) => sum + place[1], 0) / places.length;
-  put(parent, "text", { x, y, class: "label" }, name);
-  if (stays !== undefined) put(parent, "text", { x, y: y + 18, class: "count" }, stays);
+  const place = { x, "text-anchor": "middle" };
+  put(parent, "text", { ...place, y, class: "label" }, name);
+  if (stays !== undefined) put(parent, "text", { ...place, y: y + 18, class: "count" }, stays);
 }
 
 function cross(parent, [x, y], name) {
@@ -95,7 +98,7 @@ function cross(parent, [x, y], name) {
   put(parent, "path", { d: lines, class: "cross-edge" });
   put(parent, "path", { d: lines, class: "cross" });
   put(parent, "circle", { cx: x, cy: y, r: TOUCH, class: "touch" });
-  put(parent, "text", { x: x + 13, y: y - 11, class: "label" }, name);
+  put(parent, "text", { x: x + 9, y: y - 11, class: "label" }, name);
 }
 
 function pairs(pane, svg, drawing, shown, chosen) {

@@ -62,7 +62,7 @@ export class Tools {
     this.active = pane;
     this.aim = null;
     const held = event.target.closest?.("[data-part]");
-    if (this.tool === "point") return this.#pointDown(pane, point, held, event);
+    if (this.tool === "point") return this.#pointDown(pane, point, held);
     if (this.tool === "gate" || this.tool === "zone") return pane === this.panes.scene && this.#drawDown(pane, point, event);
     if (!held) return false;
     const { part, name } = held.dataset;
@@ -139,7 +139,7 @@ export class Tools {
     this.select(part, name);
   }
 
-  #pointDown(pane, point, held, event) {
+  #pointDown(pane, point, held) {
     if (held?.dataset.part === "pairs") {
       this.#take(pane, "pairs", Number(held.dataset.name), point, {});
       return true;
@@ -152,7 +152,7 @@ export class Tools {
     }
     this.pair(pane, pane.inside(point));
     this.#take(pane, "pairs", this.selection.name, point, {});
-    return Boolean(event);
+    return true;
   }
 
   /* A calibration point in one of the panes: of the pair that waits for it, or of a new one. */
@@ -272,7 +272,7 @@ export class Tools {
     const { pane, at } = this.aim;
     const plain = { target: pane.root, shiftKey: false, altKey: false };
     if (this.tool === "point") {
-      this.#pointDown(pane, at, null, plain);
+      this.#pointDown(pane, at, null);
       if (this.drag) {
         this.store.end();
         this.drag = null;
