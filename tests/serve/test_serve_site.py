@@ -72,6 +72,7 @@ def test_a_new_site_is_made_where_there_is_none(run, tmp_path):
         assert opened["tree"] == {"site": {"name": "yard", "width": 640, "height": 480}}
         tree = opened["tree"] | {"gates": {"west": {"line": [[1, 2], [3, 4]], "leg": "west", "role": "entry"}}}
         tree["site"]["start"] = "2026-06-01T07:00:00+02:00"
+        tree["gates"]["west"]["role"], tree["calibration"] = "entry", None
         ask_json(url, "save", {"tree": tree, "digest": opened["digest"], "world": None})
     assert "start = 2026-06-01T07:00:00+02:00\n" in path.read_text()  # a time, not a text
     assert read_site(path).gates["west"].leg == "west"
@@ -199,6 +200,7 @@ def test_paths_are_as_many_as_tracks(desk):
         ("save", {"tree": {}, "digest": 3, "world": None}, 400),
         ("look", b'{"tree": {"a": "' + b"x" * 5_000_000 + b'"}}', 413),
         ("look", b"[" * 100_000, 400),
+        ("look", b'{"tree": {"site": {"name": "\\ud800"}}, "count": true}', 400),
         ("scene", None, 404),
         ("plan", None, 404),
         ("static/../app.py", None, 404),

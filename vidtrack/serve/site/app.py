@@ -111,7 +111,7 @@ class Desk:
         return JSONResponse(await run_in_threadpool(self._save, asked["tree"], asked["digest"], asked["world"]))
 
     async def here(self, request: Request) -> Response:
-        """A page tells that it is open, or closes: {editor, open}. The file's digest, and how many other pages are open."""
+        """A page tells that it is open, or closes: {editor, open}. The file's digest, and how many others are open."""
         asked = await _asked(request, editor=str, open=bool)
         now = time.monotonic()
         self._editors = {one: at for one, at in self._editors.items() if now - at < _GONE_S and one != asked["editor"]}
@@ -168,6 +168,7 @@ async def _asked(request: Request, **kinds: type | tuple[type, ...]) -> dict[str
             raise HTTPException(413, f"a drawing of more than {_LARGEST} bytes")
     try:
         asked = json.loads(content)
+        json.dumps(asked, ensure_ascii=False).encode()  # half a character is no text
     except (ValueError, RecursionError):
         raise HTTPException(400, "no JSON") from None
     if not isinstance(asked, dict) or any(not isinstance(asked.get(name), kind) for name, kind in kinds.items()):

@@ -119,7 +119,7 @@ def _left_out(tree: Tree, key: tuple[str, ...]) -> bool:
 
 
 def _pop(part: Any, key: str) -> bool:
-    """Whether several faults of one part take it out once."""
+    """Take out a part, which a fault before this one may have done; whether it can be in there."""
     if isinstance(part, dict):
         part.pop(key, None)
     return isinstance(part, dict)
@@ -153,8 +153,8 @@ def _known(value: Any) -> Any:
 
 def _to_metres(ground: Ground) -> Floats:
     """(3, 3) from the picture to the road, homogeneous; positive where the road is seen."""
-    into = np.array(
-        [[1, 0, -ground.picture.origin[0]], [0, 1, -ground.picture.origin[1]], [0, 0, ground.picture.scale]]
-    )
-    back = np.array([[ground.plane.scale, 0, ground.plane.origin[0]], [0, ground.plane.scale, ground.plane.origin[1]]])
-    return np.vstack([back, [0, 0, 1]]) @ np.linalg.inv(matrix(ground.k)) @ into
+    view, plane = np.eye(3), np.eye(3)
+    view[:2, 2], view[2, 2] = -ground.picture.origin, ground.picture.scale
+    plane[0, 0] = plane[1, 1] = ground.plane.scale
+    plane[:2, 2] = ground.plane.origin
+    return np.asarray(plane @ np.linalg.inv(matrix(ground.k)) @ view)

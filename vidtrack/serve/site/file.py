@@ -59,7 +59,7 @@ class SiteFile:
                     f"{self.path.name} was {'deleted' if text is None else 'changed'} by somebody else since it was "
                     "opened here; nothing was saved"
                 )
-            new = _merged(text or "", tree).encode()
+            new = _merged(text or "", _plain(tree)).encode()
             with replacing(self.path) as place:
                 place.write_bytes(new)
             return _digest(new)
@@ -89,9 +89,9 @@ def _digest(content: bytes) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """The value with times as text."""
+    """The value with times as text, and without what is None: TOML has no word for it."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(one) for key, one in value.items() if one is not None}
     if isinstance(value, list):
         return [_plain(one) for one in value]
     return value.isoformat() if isinstance(value, (date, time, datetime)) else value
