@@ -62,7 +62,7 @@ class Asker {
         await this.ask(now);
         banner("answer", null);
       } catch (error) {
-        banner("answer", error.message, "bad");
+        complain("answer", error);
       }
     }
     this.busy = false;
@@ -195,6 +195,11 @@ function banner(key, words, kind = "doubt", ms = null, ...buttons) {
   if (ms) setTimeout(() => banners.get(key) === line && banner(key, null), ms);
 }
 
+function complain(key, error) {
+  if (error.status) banner(key, error.message, "bad");
+  else banner("gone", `${error.message} What you draw stays in this window.`, "bad");
+}
+
 function fileChanged(words) {
   banner("changed", words, "bad", null, ["Reload the file (undo brings this drawing back)", reload]);
 }
@@ -214,7 +219,7 @@ async function save() {
     for (const key of ["save", "changed"]) banner(key, null);
   } catch (error) {
     if (error.status === 409) fileChanged(error.message);
-    else banner("save", error.message, "bad");
+    else complain("save", error);
   }
   saving = false;
   changed();
@@ -228,18 +233,18 @@ async function reload() {
     store.markSaved();
     for (const key of ["save", "changed"]) banner(key, null);
   } catch (error) {
-    banner("save", error.message, "bad");
+    complain("save", error);
   }
 }
 
 async function here() {
   try {
     const answer = await server.here(EDITOR, true);
-    banner("gone", null);
+    for (const key of ["gone", "here"]) banner(key, null);
     if (answer.digest !== digest && !saving) fileChanged(`${opened.file} was ${answer.digest ? "changed" : "deleted"} by somebody else since it was opened here.`);
     banner("others", answer.others ? "This site is open in another window too; who saves second has to reload first." : null);
   } catch (error) {
-    banner("gone", `${error.message} What you draw stays in this window.`, "bad");
+    complain("here", error);
   }
 }
 
