@@ -1,6 +1,6 @@
 /* Drawing and moving with the mouse, the finger and the keyboard. */
 
-import { between, distance, metresOfPlan, planOfMetres, rounded, snapped, squared } from "./geometry.js";
+import { distance, metresOfPlan, planOfMetres, rounded, snapped, squared } from "./geometry.js";
 
 const REACH_PX = 9;
 const HINTS = {
@@ -12,7 +12,7 @@ const HINTS = {
 };
 
 export class Tools {
-  /* store: the drawing; panes: {scene, plan}; shown(): draws all anew; moving(part): a drag of gates or points. */
+  /* store: the drawing; panes: {scene, plan}; redraw(): shows all anew. */
   constructor(store, panes, redraw) {
     this.store = store;
     this.panes = panes;
