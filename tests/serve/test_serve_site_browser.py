@@ -111,6 +111,7 @@ class Page:
 
     def save(self):
         self.tab.press("s", "Control")
+        self.ready()
         self.tab.until("document.querySelector('#state').textContent === 'saved'")
 
     def counts(self):
@@ -309,9 +310,20 @@ def test_names_are_text_and_never_markup(page):
     assert name in page.text("#gates")
     assert name in tab.js("document.querySelector('#scene svg').textContent")
     assert not page.has("#panel img, svg img")
-    tab.press("s", "Control")
     assert tab.js("document.querySelector('#save').disabled")
+    tab.press("s", "Control")
+    tab.until("document.querySelector('#banners').innerText.includes('a name begins with a letter')")
     assert page.site.read_text() == DRAWN
+    assert not page.has("#banners img")
+
+
+def test_what_is_typed_is_saved_by_the_keys_alone(page):
+    tab = page.tab
+    tab.click_on("[data-key='site name']")
+    tab.js("document.activeElement.select()")
+    tab.type("Quay 7")
+    page.save()
+    assert read_site(page.site).camera.name == "Quay 7"
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])

@@ -86,6 +86,7 @@ function look() {
   const question = JSON.stringify([tree, count]);
   if (question !== asked) {
     asked = question;
+    banner("save", null);
     looking.put({ tree, count });
   }
   const road = JSON.stringify(tree.calibration ?? null);
@@ -207,7 +208,9 @@ function fileChanged(words) {
 /* The file and vidtrack. */
 
 async function save() {
-  if (saving || $("#save").disabled) return;
+  if (saving || !store.unsaved) return;
+  const lacking = panel.localFaults(); // vidtrack finds all others
+  if (lacking.length) return tools.say(lacking[0].words);
   saving = true;
   const what = store.now;
   changed();
@@ -238,10 +241,11 @@ async function reload() {
 }
 
 async function here() {
+  const before = digest;
   try {
     const answer = await server.here(EDITOR, true);
     for (const key of ["gone", "here"]) banner(key, null);
-    if (answer.digest !== digest && !saving) fileChanged(`${opened.file} was ${answer.digest ? "changed" : "deleted"} by somebody else since it was opened here.`);
+    if (answer.digest !== digest && before === digest && !saving) fileChanged(`${opened.file} was ${answer.digest ? "changed" : "deleted"} by somebody else since it was opened here.`);
     banner("others", answer.others ? "This site is open in another window too; who saves second has to reload first." : null);
   } catch (error) {
     complain("here", error);

@@ -130,7 +130,7 @@ export class Panel {
 
   #rename(part, old, name, follow = () => {}) {
     if (name === old) return;
-    if (name in (this.store.now.tree[part] ?? {})) return this.tools.say(`there is a ${part.slice(0, -1)} ${name} already`);
+    if (Object.hasOwn(this.store.now.tree[part] ?? {}, name)) return this.tools.say(`there is a ${part.slice(0, -1)} ${name} already`);
     this.store.edit((drawing) => {
       drawing.tree[part] = renamed(drawing.tree[part], old, name);
       follow(drawing.tree);

@@ -334,7 +334,7 @@ export const legsOf = (tree) => [...new Set(Object.entries(tree.gates ?? {}).map
 export function forgetGate(tree) {
   const legs = legsOf(tree);
   for (const [name, section] of Object.entries(tree.sections ?? {}))
-    if (!(section.from in tree.gates) || !(section.to in tree.gates)) delete tree.sections[name];
+    if (![section.from, section.to].every((gate) => Object.hasOwn(tree.gates ?? {}, gate))) delete tree.sections[name];
   if (tree.movements?.allowed)
     tree.movements.allowed = tree.movements.allowed.filter((pair) => pair.every((leg) => legs.includes(leg)));
 }
