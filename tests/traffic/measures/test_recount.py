@@ -55,6 +55,12 @@ def test_counts_while_a_gate_is_moved_are_those_of_measure(run, tree):
     assert (joined > 0) == bool(place.calibration)
 
 
+def test_without_a_road_a_calibration_counts_for_nothing(run):
+    """As while its points are drawn and are not right yet."""
+    recount = Recount([run])
+    assert recount.of(site(CALIBRATED), None) == recount.of(site(SITE), None)
+
+
 def test_what_lies_above_the_horizon_counts_nothing_and_the_rest_goes_on(run):
     tilted = {"picture": [[290, 150], [350, 150], [639, 479], [0, 479]], "ground": [[0, 50], [10, 50], [10, 0], [0, 0]]}
     low = {name: {"line": [[x, 200], [x, 479]]} for name, x in (("west", 200), ("east", 400))}

@@ -72,7 +72,7 @@ class Recount:
         gates = {name: gate for name, gate in site.gates.items() if gate.line in self._passed}
         vehicle, counts, moved, trips = np.arange(len(self._reader.names[0])), {}, [], 0
         if gates:
-            drawn = site.model_copy(update={"gates": gates})
+            drawn = site.model_copy(update={"gates": gates, "calibration": site.calibration if ground else None})
             all_gates = gates_of(drawn, ground)
             passed = [one.at_gate(k) for k, one in enumerate(self._passed[gate.line] for gate in gates.values())]
             together = passed[0]
