@@ -35,7 +35,7 @@ def drawing_of(run, site=None, picture=None, plan=None):
         return ask_json(url, "drawing"), cv2.imdecode(content, cv2.IMREAD_COLOR)
 
 
-def test_a_run_opens_with_its_scene_and_a_new_site_in_its_folder(run, tmp_path):
+def test_a_run_opens_with_its_scene_and_a_new_site_beside_it(run, tmp_path):
     cv2.imwrite(str(run / "scene.jpg"), np.zeros((480, 640, 3), np.uint8))
     process = start("site", run, cwd=tmp_path)
     try:
@@ -48,9 +48,9 @@ def test_a_run_opens_with_its_scene_and_a_new_site_in_its_folder(run, tmp_path):
         process.kill()
     assert (process.returncode, "Traceback" in err) == (0, False)
     assert drawing["tree"] == {"site": {"name": "monday_ _1", "width": 640, "height": 480}}
-    assert drawing["file"] == str(run / "site.toml")
+    assert drawing["file"] == f"{run}-site.toml"
     assert drawing["scene"] == "scene.jpg"
-    assert not (run / "site.toml").exists()  # only Save writes
+    assert not Path(drawing["file"]).exists()  # only Save writes
 
 
 def test_the_site_that_the_run_was_tracked_with_is_drawn_on(run, tmp_path):
@@ -70,7 +70,7 @@ def test_the_site_that_the_run_was_tracked_with_is_drawn_on(run, tmp_path):
     (tmp_path / "yard.toml").unlink()
     cv2.imwrite(str(run / "tracks.png"), np.zeros((960, 1280, 3), np.uint8))  # an older run
     drawing, _ = drawing_of(run)
-    assert (drawing["file"], drawing["scene"]) == (str(run / "site.toml"), "tracks.png")
+    assert (drawing["file"], drawing["scene"]) == (f"{run}-site.toml", "tracks.png")
 
 
 @pytest.mark.parametrize(

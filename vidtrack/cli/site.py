@@ -43,7 +43,7 @@ Examples:
     "--site",
     type=click.Path(path_type=Path),
     metavar="SITE.toml",
-    help="The file to draw; made if it is not there.  [default: the one RUN was tracked with, else RUN/site.toml]",
+    help="The file to draw; made if it is not there.  [default: the one RUN was tracked with, else RUN-site.toml]",
 )
 @click.option("--picture", metavar="IMAGE|VIDEO", help="Draw over this, or over its first picture.")
 @click.option(
@@ -99,14 +99,15 @@ def desk_of(options: SiteOptions) -> Desk:
     from vidtrack.traffic.measures.recount import Recount
     from vidtrack.traffic.site import Site
 
-    parts = parts_of(options.run) or [options.run]
+    run = options.run.resolve()
+    parts = parts_of(run) or [options.run]
     recount = Recount([str(part) for part in parts])
-    file = SiteFile(options.site or _tracked_with(parts[-1]) or options.run / "site.toml")
+    file = SiteFile(options.site or _tracked_with(parts[-1]) or run.with_name(f"{run.name}-site.toml"))
     if not file.path.parent.is_dir():
         raise SourceError(f"{file.path.parent}, where the site is to be saved, is no folder")
     tree, _ = file.read()
     width, height = recount.size
-    new = {"site": {"name": _name(options.run.resolve().name), "width": width, "height": height}}
+    new = {"site": {"name": _name(run.name), "width": width, "height": height}}
     drawn = Site.model_validate(tree or new)
     drawn.scaled(width, height)  # refuses a run of another shape
     plan = None
@@ -114,7 +115,7 @@ def desk_of(options: SiteOptions) -> Desk:
         read_world(options.plan)  # refuses what is none
         plan = options.plan, _encoded(str(options.plan), None)
     scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts[-1])
-    return Desk(options.run.resolve().name, recount, file, new, scene, plan)
+    return Desk(run.name, recount, file, new, scene, plan)
 
 
 def _tracked_with(run: Path) -> Path | None:
