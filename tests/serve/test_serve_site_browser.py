@@ -296,8 +296,6 @@ def test_a_file_that_somebody_else_changed_is_not_written_over(page):
 def test_a_second_window_is_told_of_the_first(page):
     ask_json(page.url, "here", {"editor": "another", "open": True})
     page.tab.until("document.querySelector('#banners').innerText.includes('open in another window')")
-    ask_json(page.url, "here", {"editor": "another", "open": False})
-    page.tab.until("!document.querySelector('#banners').innerText")
 
 
 def test_names_are_text_and_never_markup(page):
