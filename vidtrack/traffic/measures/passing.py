@@ -16,6 +16,9 @@ from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.rows import Rows
 
+REACH_M, REACH_PX = 10.0, 100.0
+"""How far from a gate distances are looked at: many times what positions are off."""
+
 TIME, ALONG, SIGMA, SPEED, SPEED_SIGMA, SPEED_SHARED, BEFORE, AFTER = range(8)
 GATE, TRACK, SIDE, LAST, SEEN, SHOWN, MERGED = range(7)
 _T, _X, _Y, _SIGMA, _SPEED, _SPEED_SIGMA, _SPEED_SHARED = range(7)

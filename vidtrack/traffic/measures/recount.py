@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -12,13 +13,13 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.checks import movements
 from vidtrack.traffic.measures.gates import gates_of
+from vidtrack.traffic.measures.journeys import journeys
 from vidtrack.traffic.measures.lives import Lives
-from vidtrack.traffic.measures.measure import REACH_M, REACH_PX, Figures
-from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
 from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
-from vidtrack.traffic.site import Calibration, Fault, Point, Site
+from vidtrack.traffic.site import Calibration, Fault, Gate, Point, Site
 
 MOST_ROWS = 4_000_000
 """Rows that stay in memory, of 100 bytes: 20,000 vehicles of 8 s at 25 frames/s."""
@@ -70,16 +71,10 @@ class Recount:
         self._lay_on(site, ground)
         faults = self._look_over_gates(site, ground) + self._look_into_zones(site, ground)
         gates = {name: gate for name, gate in site.gates.items() if gate.line in self._passed}
-        vehicle, counts, moved, trips = np.arange(len(self._reader.names[0])), {}, [], 0
+        vehicle, counts, moved, trips = np.arange(len(self._ends[0].t)), {}, [], 0
         if gates:
-            drawn = site.model_copy(update={"gates": gates, "calibration": site.calibration if ground else None})
-            all_gates = gates_of(drawn, ground)
-            passed = [one.at_gate(k) for k, one in enumerate(self._passed[gate.line] for gate in gates.values())]
-            together = passed[0]
-            for one in passed[1:]:
-                together = together.and_also(one)
-            nowhere = Staying([], metres=ground is not None)
-            found = Figures(self._day, drawn, all_gates, self._reader, together, self._lives, nowhere)
+            all_gates = gates_of(site.model_copy(update={"gates": gates}), ground)
+            found = journeys(all_gates, self._passings(gates), *self._ends, self._day.spans, ground is not None)
             vehicle, trips = found.vehicle, len(found.trips.vehicle)
             ways = np.bincount(2 * found.passed.gate + found.passed.side, minlength=2 * len(gates)).reshape(-1, 2)
             counts = {
@@ -90,6 +85,11 @@ class Recount:
         zones = {name: self._stays[zone.polygon] for name, zone in site.zones.items() if zone.polygon in self._stays}
         stays = {name: len(staying.in_zones(vehicle).zone) for name, staying in zones.items()}
         return Tally(counts, stays, moved, trips, faults)
+
+    def _passings(self, gates: dict[str, Gate]) -> Passed:
+        """Of all gates, by their numbers."""
+        first, *others = (self._passed[gate.line].at_gate(k) for k, gate in enumerate(gates.values()))
+        return reduce(Passed.and_also, others, first)
 
     def paths(self, site: Site, ground: Ground | None) -> tuple[Ints, Floats]:
         """(T,) numbers of corners of the tracks' paths, and (N, 2) the corners of all [px]: where they are counted."""
@@ -117,7 +117,9 @@ class Recount:
                 break
             blocks.append(rows)
             lives.add(rows)
-        self._calibration, self._reader, self._lives, self._rows = calibration, reader, lives, blocks
+        tracks = len(reader.names[0])
+        self._ends = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
+        self._calibration, self._rows = calibration, blocks
         self._passed: dict[tuple[Point, ...], Passed] = {}
         self._stays: dict[tuple[Point, ...], Staying] = {}
 
