@@ -315,6 +315,28 @@ def test_names_are_text_and_never_markup(page):
     assert not page.has("#banners img")
 
 
+def test_metres_can_be_typed_without_a_plan(page):
+    tab = page.tab
+    tab.press("p")
+    for x, y in POINTS:
+        tab.click(*page.at(x, y))
+    tab.until("document.querySelectorAll('#points tbody tr').length === 6")
+    tab.click_on("[data-key='pair 0 0']")
+    for x, y in POINTS:
+        tab.type(f"{x / 10}".replace(".", ","))  # as in German
+        tab.press("Tab")
+        page.ready()
+        tab.type(f"{48 - y / 10}")
+        for _ in range(3):  # over the cross and the number of the next point
+            tab.press("Tab")
+            page.ready()
+    page.ready()
+    assert "Grid of 5 m" in page.text("#points")
+    page.save()
+    assert read_site(page.site).calibration.ground[1] == (62, 46)
+    assert read_site(page.site).calibration.picture[1] == pytest.approx((620, 20), abs=0.5)
+
+
 def test_what_is_typed_is_saved_by_the_keys_alone(page):
     tab = page.tab
     tab.click_on("[data-key='site name']")

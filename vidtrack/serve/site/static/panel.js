@@ -11,6 +11,7 @@ function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name === "key") made.dataset.key = value; // by which it gets the focus back when it is drawn anew
     else if (value === true) made.setAttribute(name, "");
     else if (value !== false && value !== null && value !== undefined) made.setAttribute(name, value);
   }
@@ -93,8 +94,7 @@ export class Panel {
 
   /* An input that changes the drawing when it is left or Enter is pressed. */
   #input(key, value, change, attributes = {}) {
-    const input = element("input", { type: "text", value: value ?? "", autocomplete: "off", spellcheck: "false", ...attributes });
-    input.dataset.key = key;
+    const input = element("input", { key, type: "text", value: value ?? "", autocomplete: "off", spellcheck: "false", ...attributes });
     input.addEventListener("change", () => {
       input.defaultValue = input.value;
       change(input.value.trim(), input);
@@ -103,8 +103,7 @@ export class Panel {
   }
 
   #choice(key, value, options, change) {
-    const select = element("select", {}, ...options.map((one) => element("option", { value: one, selected: one === value }, one)));
-    select.dataset.key = key;
+    const select = element("select", { key }, ...options.map((one) => element("option", { value: one, selected: one === value }, one)));
     select.addEventListener("change", () => change(select.value));
     return select;
   }
@@ -120,11 +119,10 @@ export class Panel {
   #row(part, name, kind, counts, more = null) {
     const chosen = this.tools.selection?.part === part && this.tools.selection.name === name;
     const row = element(
-      "button", { class: "row", "aria-expanded": String(chosen), onclick: () => this.tools.select(...(chosen ? [null] : [part, name])) },
+      "button", { key: `${part} ${name}`, class: "row", "aria-expanded": String(chosen), onclick: () => this.tools.select(...(chosen ? [null] : [part, name])) },
       element("span", { class: `swatch ${kind}` }), element("span", { class: "name" }, name),
       more && element("span", { class: "leg" }, more), element("span", { class: "counts" }, counts),
     );
-    row.dataset.key = `${part} ${name}`;
     return [chosen, row];
   }
 
@@ -176,7 +174,7 @@ export class Panel {
   }
 
   #delete() {
-    return element("button", { class: "delete", title: "Delete (Del)", onclick: () => this.tools.remove() }, "Delete");
+    return element("button", { key: "delete", class: "delete", title: "Delete (Del)", onclick: () => this.tools.remove() }, "Delete");
   }
 
   /* Change a gate, and let movements follow a leg that has got another name. */
@@ -224,6 +222,7 @@ export class Panel {
     const cell = (a, b) => {
       const count = trips.find(([x, y]) => x === a && y === b)?.[2] ?? 0;
       const button = element("button", {
+        key: `movement ${JSON.stringify([a, b])}`,
         "aria-pressed": String(isAllowed(a, b)), title: `${a} to ${b}`,
         class: count && allowed.length && !isAllowed(a, b) ? "impossible" : null,
         onclick: () => this.store.edit((drawing) => {
@@ -231,7 +230,6 @@ export class Panel {
           drawing.tree.movements = { ...drawing.tree.movements, allowed: isAllowed(a, b) ? others : [...allowed, [a, b]] };
         }),
       }, this.found?.tally ? String(count) : "");
-      button.dataset.key = `movement ${JSON.stringify([a, b])}`;
       return element("td", {}, button);
     };
     section.querySelector(".scroll").replaceChildren(element(
@@ -272,9 +270,8 @@ export class Panel {
           delete one.half;
         }
       }), { "aria-label": `${axis ? north : east} of point ${k + 1}` });
-      const choose = element("button", { title: "Choose", onclick: () => this.tools.select("pairs", k) }, String(k + 1));
-      choose.dataset.key = `pair ${k}`;
-      const remove = element("button", { class: "delete", title: `Delete point ${k + 1}`, onclick: () => { this.tools.select("pairs", k); this.tools.remove(); } }, "×");
+      const choose = element("button", { key: `pair ${k}`, title: "Choose", onclick: () => this.tools.select("pairs", k) }, String(k + 1));
+      const remove = element("button", { key: `delete pair ${k}`, class: "delete", title: `Delete point ${k + 1}`, onclick: () => { this.tools.select("pairs", k); this.tools.remove(); } }, "×");
       const classes = [chosen && "chosen", number && calibration?.wrong.includes(number) && "wrong"].filter(Boolean).join(" ");
       const shown = (value, digits) => element("td", {}, value === null || value === undefined ? "" : value.toFixed(digits));
       return element("tr", { class: classes }, element("td", {}, choose), element("td", {}, metres(0)), element("td", {}, metres(1)),
@@ -311,7 +308,7 @@ export class Panel {
         element("label", {}, "From"), this.#choice(`section from ${name}`, section.from, gates, (gate) => set("from", gate)),
         element("label", {}, "To"), this.#choice(`section to ${name}`, section.to, gates, (gate) => set("to", gate)),
         element("label", {}, "Length, m"), this.#number(`section length ${name}`, section.length_m || "", (value) => set("length_m", value)),
-        element("div", { class: "wide" }, "", element("button", { class: "delete", onclick: () => this.store.edit((drawing) => delete drawing.tree.sections[name]) }, "Delete")));
+        element("div", { class: "wide" }, "", element("button", { key: `delete section ${name}`, class: "delete", onclick: () => this.store.edit((drawing) => delete drawing.tree.sections[name]) }, "Delete")));
     });
     this.root.querySelector("#sections ol").replaceChildren(...rows);
   }
