@@ -336,7 +336,7 @@ def test_a_folder_named_like_a_video_is_a_folder(vidtrack, tmp_path):
     assert "street.avi" in err
 
 
-PAGES = {"review"}
+PAGES = {"review", "site"}
 """Commands that serve a page, which writes beside what it shows."""
 
 

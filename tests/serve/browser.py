@@ -34,20 +34,23 @@ class Tab:
 
     def send(self, method, **parameters):
         """The result of a DevTools command."""
-        self._number += 1
-        self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
+        number = self._post(method, parameters)
         while True:
             message = json.loads(self._socket.recv())
             if message.get("method") == "Runtime.exceptionThrown":
                 self._faults.append(message["params"]["exceptionDetails"]["exception"].get("description", message))
             if message.get("method") == "Page.javascriptDialogOpening":
-                self._number += 1
-                accept = {"id": self._number, "method": "Page.handleJavaScriptDialog", "params": {"accept": True}}
-                self._socket.send(json.dumps(accept))
-            if message.get("id") == self._number and "method" not in message:
+                self._post("Page.handleJavaScriptDialog", {"accept": True})
+            if message.get("id") == number and "method" not in message:
                 assert "error" not in message, message
                 assert not self._faults, self._faults
                 return message["result"]
+
+    def _post(self, method, parameters):
+        """Send a command; its number."""
+        self._number += 1
+        self._socket.send(json.dumps({"id": self._number, "method": method, "params": parameters}))
+        return self._number
 
     def open(self, url):
         """Go to an address, and wait until it is loaded."""

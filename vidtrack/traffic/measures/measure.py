@@ -13,22 +13,18 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
-from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
+from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.journeys import journeys
 from vidtrack.traffic.measures.lives import Lives
-from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.tables import stamps, table
-from vidtrack.traffic.measures.trips import at_edge, trips_of
 from vidtrack.traffic.site import Site
-
-REACH_M, REACH_PX = 10.0, 100.0
-"""How far from a gate distances are looked at: many times what positions are off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,23 +68,12 @@ class _Figures:
         self.spans = day.spans
         self.session, self.track_id = reader.names
         tracks = len(self.track_id)
-        self.head, self.tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
-        self.joins = self._joins(passed)
-        self.vehicle = self.joins.vehicles(tracks)
-        across = self._across()
-        self.probability = np.concatenate([confidence(passed), self.joins.probability[across.track]])
-        self.reason = [*reasons(passed), *(["joined"] * len(across))]
-        passed = passed.and_also(across.of(self.joins.before[across.track]))
-        order = np.argsort(passed.t, kind="stable")
-        self.passed, self.probability = passed.only(order), self.probability[order]
-        self.reason = [self.reason[k] for k in order.tolist()]
+        head, tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
+        driven = journeys(gates, passed, head, tail, self.length, self.spans, self.metres)
+        self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
+        self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
-        begin = np.full(tracks, np.inf)
-        end = -begin
-        np.fmin.at(begin, self.vehicle, self.head.t)
-        np.fmax.at(end, self.vehicle, self.tail.t)
-        self.trips = trips_of(self.passed, gates, self.vehicle[self.passed.track], begin, end, self.spans)
         zone = site.camera.start
         self.edges = edges_of(self.spans, site.report.interval_s, day.utc, None if zone is None else zone.tzinfo)
         self.watched = coverage(self.spans, self.edges)
@@ -133,24 +118,6 @@ class _Figures:
             "vanished": int(self.trips.vanished.sum()),
         }
         return Measures(tables, report)
-
-    def _joins(self, passed: Passed) -> Joins:
-        """Joins of tracks that end before an exit, and of those that begin after an entry."""
-        tracks = len(self.track_id)
-        if not self.metres:
-            return Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
-        left, entered = np.zeros((2, tracks), bool)
-        left[passed.track[self.gates.role("exit", "both")[passed.gate]]] = True
-        entered[passed.track[self.gates.role("entry", "both")[passed.gate]]] = True
-        ends = ~left & np.isfinite(self.tail.t) & ~at_edge(self.tail.t, self.spans[:, 1])
-        begins = ~entered & np.isfinite(self.head.t) & ~at_edge(self.head.t, self.spans[:, 0])
-        return joined(self.tail, self.head, self.length, ends, begins, float(np.diff(self.spans).sum()))
-
-    def _across(self) -> Passed:
-        """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
-        passing = Passing(self.gates, REACH_M)
-        passing.add(gap_rows(self.tail, self.head, self.joins))
-        return passing.passed()
 
     def _sections(self) -> list[tuple[int, int, float]]:
         names = self.gates.names

@@ -50,6 +50,7 @@ def write_run(
     *,
     seconds=60.0,
     metres=False,
+    covariances=False,
     csv=False,
     length_m=4.0,
     began=None,
@@ -60,6 +61,7 @@ def write_run(
     """A finished run of these tracks (id, times (N,), positions (N, 2) px), in order of frames.
 
     metres  at 10 px/m, seen from above; first: its first frame [s]
+    covariances  of the whole state, so that metres of any site can be computed
     status  (N,) words for all tracks, None: confirmed
     watched as in summary.json; None: as earlier versions, without
     """
@@ -79,6 +81,9 @@ def write_run(
         **dict.fromkeys(("sigma_x_px", "sigma_y_px"), 0.5 * ones),
         **{"left_px": xy[:, 0] - 20, "top_px": xy[:, 1] - 15, "width_px": 40 * ones, "height_px": 20 * ones},
     }
+    if covariances:
+        columns |= dict.fromkeys(("sigma_vx_px_s", "sigma_vy_px_s"), ones)
+        columns |= dict.fromkeys(("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy"), 0 * ones)
     if metres:
         columns |= {
             **{"x_m": xy[:, 0] / 10, "y_m": 48 - xy[:, 1] / 10},
