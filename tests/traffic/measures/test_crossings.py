@@ -109,7 +109,9 @@ def test_passings_are_those_of_brute_force(paths, size):
     yes = np.ones(count, bool)
     t = np.array([float(k) for k, _ in rows])
     number = np.array([track for _, track in rows])
-    whole = Rows(number, t, yes, ~yes, xy, unknown, np.full(count, margin), np.zeros((count, 2)), *(unknown,) * 4)
+    nothing = np.full((count, 3), np.nan)
+    state = xy, unknown, np.full(count, margin), np.zeros((count, 2)), *(unknown,) * 5
+    whole = Rows(number, t, yes, ~yes, *state, nothing[:, :2], nothing)
     passing = Passing(gates, 50.0)
     for first in range(0, count, size):  # blocks of any size give the same
         passing.add(whole.only(np.arange(first, min(first + size, count))))

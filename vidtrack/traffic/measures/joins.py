@@ -96,7 +96,7 @@ def gap_rows(tail: End, head: End, joins: Joins) -> Rows:
         )
 
     rows = 2 * len(last)
-    yes, unknown = np.ones(rows, bool), np.full(rows, np.nan)
+    yes, unknown = np.ones(rows, bool), np.full((rows, 5), np.nan)
     number = np.repeat(np.arange(len(last)), 2)
     state = both("xy"), both("sigma"), np.zeros(rows), np.full((rows, 2), np.nan)
-    return Rows(number, both("t"), yes, ~yes, *state, *(unknown,) * 4)
+    return Rows(number, both("t"), yes, ~yes, *state, *unknown.T, unknown[:, :2], unknown[:, :3])
