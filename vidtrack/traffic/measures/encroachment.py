@@ -5,8 +5,8 @@ least time between two moments at which the rectangle of the one and that of the
 count: who drives behind another has a headway.
 
 Which moments to compare is found by a grid: two rectangles that overlap have a cell in common. Each stay of a vehicle
-in a cell is compared with those in the same cell soon after, if their headings differ. Between two rows vehicles are taken
-to go straight on. With d between the middles of the first at t_a and the second at t_b, and g the vector with
+in a cell is compared with those in the same cell soon after, if their headings differ. Between two rows vehicles are
+taken to go straight on. With d between the middles of the first at t_a and the second at t_b, and g the vector with
 g v_a = g v_b = -1,
 
     PET = t_b - t_a + g d - h(g)
