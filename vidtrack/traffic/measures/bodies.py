@@ -114,10 +114,10 @@ class Encounters:
         """Those of a mask or of indices."""
         return Encounters(*(getattr(self, column.name)[chosen] for column in fields(self)))
 
-    def and_also(self, other: Encounters) -> Encounters:
-        """Both, these first."""
-        names = [column.name for column in fields(self)]
-        return Encounters(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+    @classmethod
+    def together(cls, parts: list[Encounters]) -> Encounters:
+        """All of several, one after the other."""
+        return cls(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(cls)))
 
     def between(self, vehicle: Ints) -> Encounters:
         """The same between vehicles; `vehicle` (T,) of each number. Those of one vehicle with itself fall out."""

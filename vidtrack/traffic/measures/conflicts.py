@@ -52,12 +52,12 @@ class Conflicts:
 
 
 class Meeting:
-    """Takes blocks of rows in order of time; remembers those of the last PET_S, and each two vehicles' least times."""
+    """Takes blocks of rows in order of time; remembers those of the last PET_S, and each block's encounters."""
 
     def __init__(self) -> None:
         self._recent: Bodies | None = None
         self._done = -np.inf
-        self._least = [Encounters.nothing(), Encounters.nothing()]
+        self._closed, self._encroached = [Encounters.nothing()], [Encounters.nothing()]
 
     def add(self, rows: Rows) -> None:
         """Look at some rows. Their last moment may go on in the next block and waits for it."""
@@ -72,15 +72,16 @@ class Meeting:
         """Take the moments before `until` that are new."""
         first, last = np.searchsorted(bodies.t, [self._done, until])
         if first < last:
-            for kind, found in ((TTC, closing(bodies.only(slice(first, last)))), (PET, encroachments(bodies))):
-                self._least[kind] = self._least[kind].and_also(found).least()
+            self._closed.append(closing(bodies.only(slice(first, last))))
+            self._encroached.append(encroachments(bodies))
         self._done = until
 
     def conflicts(self, vehicle: Ints, spans: Floats) -> Conflicts:
         """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break."""
         if self._recent is not None and len(self._recent):
             self._look(self._recent, until=np.inf)
-        closed, encroached = (found.between(vehicle).least() for found in self._least)
+        both = Encounters.together(self._closed), Encounters.together(self._encroached)
+        closed, encroached = (found.between(vehicle).least() for found in both)
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
         return _joined(closed, encroached.only(span[0] == span[1]))
 
