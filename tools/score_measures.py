@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
+from exact_run import write_exact_run
 from scipy.optimize import linear_sum_assignment
 
 from vidtrack.traffic.measures.measure import measured
@@ -28,7 +27,7 @@ from vidtrack.traffic.site import read_site
 
 TOLERANCE_S = 1.0
 FPS = 25.0
-SIGMA = 0.01  # of exact states, in the units of their columns
+SIZE = (1280, 720)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -41,24 +40,10 @@ def exact_run(clip: Path, folder: Path) -> None:
     states = rows_of(clip / "road_truth.csv")
     column = {name: np.array([float(row[name]) for row in states]) for name in states[0] if name != "class"}
     boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)[:, 2:6]
-    count = len(states)
-    small, none = np.full(count, SIGMA), np.zeros(count)
-    table = {
-        "time_s": column["time_s"],
-        "track_id": column["target_id"].astype(np.int64),
-        "status": np.full(count, "confirmed"),
-        **{name: column[name] for name in ("x_m", "y_m", "speed_kmh", "length_m", "width_m")},
-        **dict.fromkeys(("sigma_x_m", "sigma_y_m", "speed_sigma_kmh", "length_sigma_m"), small),
-        **{"corr_xy_m": none, "speed_shared_sigma_kmh": none},
-        "heading_deg": 90 - column["heading_deg"],
-        **dict.fromkeys(("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px"), none),
-        **dict(zip(("left_px", "top_px", "width_px", "height_px"), boxes.T, strict=True)),
-    }
-    folder.mkdir()
-    pq.write_table(pa.table(table), folder / "tracks.parquet")
-    frames = int(column["frame"].max())
-    summary = {"frames": frames, "media_s": float(column["time_s"].max()), "fps": FPS, "width": 1280, "height": 720}
-    (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": 0.0}}}))
+    names = ("time_s", "x_m", "y_m", "speed_kmh", "length_m", "width_m")
+    exact = {name: column[name] for name in names}
+    exact |= {"track_id": column["target_id"], "heading_deg": 90 - column["heading_deg"]}
+    write_exact_run(folder, exact, boxes, FPS, SIZE, float(column["time_s"].max()))
 
 
 def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:

@@ -126,10 +126,10 @@ def test_times_to_collision_are_those_of_brute_force(drawn, block):
 
 
 def curved(rng, count, fps):
-    """Vehicles on circles through the middle of a junction."""
+    """Vehicles on wide circles through the middle of a junction, from directions that stay apart."""
     parts = []
     for track in range(count):
-        speed, start, turn = rng.uniform(4, 14), rng.uniform(0, 2 * np.pi), rng.uniform(-0.25, 0.25)
+        speed, start, turn = rng.uniform(4, 14), track * 2 * np.pi / count, rng.uniform(-0.03, 0.03)
         t = np.arange(round(rng.uniform(0, 3) * fps), round(rng.uniform(6, 9) * fps)) / fps
         heading = start + turn * (t - 4.5)
         v = speed * np.column_stack([np.cos(heading), np.sin(heading)])
@@ -146,7 +146,7 @@ def test_post_encroachment_times_are_those_of_brute_force(seed, block):
     track, t, xy, v = curved(np.random.default_rng(seed), 5, fps)
     rows = rows_of(track, t, xy, v, 4.0, 1.8)
     found, whole = found_in(rows, block), found_in(rows)
-    assert np.array_equal(found.value, whole.value, equal_nan=True)
+    assert found.value == pytest.approx(whole.value, abs=1e-9, nan_ok=True)
     ours = {(min(pair), max(pair)): pet for *pair, pet in zip(found.first, found.second, found.value[PET], strict=True)}
     heading = np.arctan2(rows.v[:, 1], rows.v[:, 0])
     base = footprints(rows.xy, heading, np.full(len(rows), 4.0), np.full(len(rows), 1.8))
@@ -162,6 +162,34 @@ def test_post_encroachment_times_are_those_of_brute_force(seed, block):
                 assert sampled - 2 / fps - 1e-9 <= ours[a, b] <= sampled + 1e-9
             else:
                 assert np.isnan(ours.get((a, b), np.nan))
+
+
+def bend(track, start_s, turn_rad, speed=6.0, radius=7.0):
+    """A vehicle that drives 30 m to the east, turns left by an angle, and goes straight on for 30 m."""
+    s = np.arange(0, 60 + radius * turn_rad, speed / 25)
+    angle = np.clip((s - 30) / radius, 0, turn_rad)
+    heading = np.column_stack([np.cos(angle), np.sin(angle)])
+    xy = np.cumsum(heading, axis=0) * speed / 25
+    return np.full(len(s), track), start_s + s / speed, xy, speed * heading
+
+
+def both(*ways):
+    return rows_of(*(np.concatenate(column) for column in zip(*ways, strict=True)), width=1.8)
+
+
+@pytest.mark.parametrize(("first", "second"), [(np.pi / 2, np.pi / 2), (0.0, np.pi / 2), (np.pi / 2, 0.0)])
+def test_vehicles_behind_each_other_have_no_encroachment_on_a_bend_and_where_one_turns_off(first, second):
+    assert len(found_in(both(bend(0, 0.0, first), bend(1, 2.0, second)))) == 0
+
+
+def test_one_that_turns_into_the_way_of_another_encroaches():
+    track, t, xy, v = bend(1, 2.0, np.pi / 2)
+    turned = np.column_stack([xy[:, 1], -xy[:, 0]]) + (30.0, 37.0)  # comes from the north and leaves to the east
+    south = np.column_stack([v[:, 1], -v[:, 0]])
+    found = found_in(both(bend(0, 0.0, 0.0), (track, t, turned, south)))
+    assert (found.first.tolist(), found.second.tolist()) == ([0], [1])
+    assert 0 < found.value[PET, 0] < 5
+    assert found.kinds[0] in ("merging", "crossing")
 
 
 def test_the_finer_the_rows_the_same_the_post_encroachment_time():

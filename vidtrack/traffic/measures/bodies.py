@@ -77,6 +77,7 @@ class Encounters:
 
     first, second   (E,) numbers
     value, sigma    (E,) s; the time to collision or the post-encroachment time, and its standard deviation
+    rank    (E,) s; of several moments of the same two vehicles the one with the least rank counts
     t       (E,) s; when
     xy      (E, 2) m; where they touch
     angle   (E,) rad; between their headings, 0 to pi
@@ -88,6 +89,7 @@ class Encounters:
     second: Ints
     value: Floats
     sigma: Floats
+    rank: Floats
     t: Floats
     xy: Floats
     angle: Floats
@@ -98,14 +100,14 @@ class Encounters:
     def nothing(cls) -> Encounters:
         """None."""
         whole, real, pair = np.empty(0, np.int64), np.empty(0), np.empty((0, 2))
-        return cls(whole, whole, real, real, real, pair, real, pair, np.empty(0, bool))
+        return cls(whole, whole, *(real,) * 4, pair, real, pair, np.empty(0, bool))
 
     @classmethod
-    def at(cls, a: Bodies, b: Bodies, value: Floats, sigma: Floats, t: Floats, xy: Floats) -> Encounters:
+    def at(cls, a: Bodies, b: Bodies, value: Floats, sigma: Floats, rank: Floats, t: Floats, xy: Floats) -> Encounters:
         """Those of vehicles a and b (E,), in this order."""
         speed = np.column_stack([np.linalg.norm(one.v, axis=1) for one in (a, b)])
         angle = np.arccos(np.clip(_dot(a.ahead, b.ahead), -1, 1))
-        return cls(a.track, b.track, value, sigma, t, xy, angle, speed, a.merged | b.merged)
+        return cls(a.track, b.track, value, sigma, rank, t, xy, angle, speed, a.merged | b.merged)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -131,12 +133,11 @@ class Encounters:
         """(E, 2) the two vehicles, the smaller number first."""
         return np.sort(np.column_stack([self.first, self.second]), axis=1)
 
-    def least(self) -> Encounters:
-        """Of each two vehicles the moment with the least value, the earlier one of equals."""
+    def least(self) -> Ints:
+        """Indices of the moments that count, one of each two vehicles, the earlier one of equals."""
         pair = self.pair
-        order = np.lexsort((self.t, self.value, pair[:, 1], pair[:, 0]))
-        new = np.diff(pair[order], axis=0, prepend=-1).any(axis=1)
-        return self.only(order[new])
+        order = np.lexsort((self.value, self.t, np.round(self.rank, 6), pair[:, 1], pair[:, 0]))
+        return order[np.diff(pair[order], axis=0, prepend=-1).any(axis=1)]
 
 
 def touching_place(a: Bodies, b: Bodies, n: Floats) -> Floats:

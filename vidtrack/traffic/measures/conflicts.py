@@ -80,8 +80,8 @@ class Meeting:
         """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break."""
         if self._recent is not None and len(self._recent):
             self._look(self._recent, until=np.inf)
-        both = Encounters.together(self._closed), Encounters.together(self._encroached)
-        closed, encroached = (found.between(vehicle).least() for found in both)
+        both = (Encounters.together(found).between(vehicle) for found in (self._closed, self._encroached))
+        closed, encroached = (found.only(found.least()) for found in both)
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
         return _joined(closed, encroached.only(span[0] == span[1]))
 

@@ -1,8 +1,9 @@
 """Post-encroachment time: from when the first vehicle leaves a place until the second one comes to it.
 
 Allen, Shin, Cooper: Analysis of traffic conflicts and collisions, Transportation Research Record 667 (1978). It is the
-least time between two moments at which the rectangle of the one and that of the other overlap. Only ways that cross
-count: who drives behind another has a headway.
+least time between two moments at which the rectangle of the one and that of the other overlap, with headings that
+differ. Only ways that meet there count: who drove along the way of the other before has a headway, also when one of
+them turns off or the road bends.
 
 Which moments to compare is found by a grid: two rectangles that overlap have a cell in common. Each stay of a vehicle
 in a cell is compared with those in the same cell soon after, if their headings differ. Between two rows vehicles are
@@ -19,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.bodies import Bodies, Encounters, touching_place
 
@@ -27,7 +28,9 @@ PET_S = 5.0
 """s; a longer post-encroachment time is no conflict (FHWA-HRT-08-049, the default of SSAM)"""
 CROSSING_RAD = np.radians(30)
 """Vehicles whose headings differ less follow each other (SSAM: rear-end)"""
+_FOLLOWS = float(np.cos(CROSSING_RAD))
 _CELL_M = 4.0
+_ROUNDING_S = 1e-6
 _SLOWEST = 0.5
 """m/s; for when a vehicle that is about to stand leaves or comes, since it does not go on with that speed"""
 
@@ -41,11 +44,14 @@ def encroachments(bodies: Bodies) -> Encounters:
     bodies = bodies.only(order)
     stay, turned = _stays(bodies)
     one, other = _soon_after(bodies, stay, turned)
-    i, j = _nearest(
-        stay[one], stay[other], bodies.t, bodies.xy, bodies.ahead, bodies.sides, PET_S, np.cos(CROSSING_RAD)
-    )
-    met = i >= 0
-    return _details(bodies, i[met], j[met]).least()
+    i, j = _nearest(stay[one], stay[other], bodies.t, bodies.xy, bodies.ahead, bodies.sides)
+    i, j = i[i >= 0], j[i >= 0]
+    late = bodies.t[i] > bodies.t[j]
+    i, j = np.where(late, j, i), np.where(late, i, j)
+    found = _details(bodies, i, j)
+    least = found.least()
+    follows = _follows(i[least], j[least], bodies.track, bodies.t, bodies.xy, bodies.ahead, bodies.sides)
+    return found.only(least[~follows])
 
 
 def _stays(bodies: Bodies) -> tuple[Ints, Floats]:
@@ -86,9 +92,7 @@ def _soon_after(bodies: Bodies, stay: Ints, turned: Floats) -> tuple[Ints, Ints]
 
 
 def _details(bodies: Bodies, i: Ints, j: Ints) -> Encounters:
-    """Encounters of overlapping rectangles, rows i and j (E,) at different times."""
-    late = bodies.t[i] > bodies.t[j]
-    i, j = np.where(late, j, i), np.where(late, i, j)
+    """Encounters of overlapping rectangles, rows i and later j (E,)."""
     a, b = bodies.only(i), bodies.only(j)
     later = b.t - a.t
     g = _slowness(a, b)
@@ -96,7 +100,7 @@ def _details(bodies: Bodies, i: Ints, j: Ints) -> Encounters:
     steps = _step(bodies, i, 1) + _step(bodies, j, -1)
     pet = np.clip(straight, np.maximum(later - steps, 0), later)
     sigma = np.sqrt(a.variance(g) + b.variance(g))
-    return Encounters.at(a, b, pet, sigma, b.t, touching_place(a, b, a.ahead))
+    return Encounters.at(a, b, pet, sigma, later, b.t, touching_place(a, b, a.ahead))
 
 
 def _slowness(a: Bodies, b: Bodies) -> Floats:
@@ -150,30 +154,49 @@ def _in(x: int, y: int, cells: Ints) -> bool:
 
 
 @kernel
-def _nearest(
-    one: Ints, other: Ints, t: Floats, xy: Floats, ahead: Floats, sides: Floats, limit: float, follows: float
-) -> tuple[Ints, Ints]:
-    """For each pair of stays the two rows, nearest in time, whose rectangles overlap; -1 where there are none.
-
-    follows  cosine between headings from which on vehicles follow each other
-    """
+def _nearest(one: Ints, other: Ints, t: Floats, xy: Floats, ahead: Floats, sides: Floats) -> tuple[Ints, Ints]:
+    """For each pair of stays the two rows, nearest in time, whose rectangles overlap; -1 where there are none."""
     rows = np.full((2, len(one)), -1)
     for k in range(len(one)):
-        best, low = limit, one[k, 1]
+        best, low = PET_S, one[k, 1]
         for j in range(other[k, 1], other[k, 2] + 1):
             while low <= one[k, 2] and t[low] < t[j] - best:
                 low += 1
             for i in range(low, one[k, 2] + 1):
                 if t[i] > t[j] + best:
                     break
-                if rows[0, k] >= 0 and abs(t[j] - t[i]) >= best:
+                if rows[0, k] >= 0 and abs(t[j] - t[i]) > best - _ROUNDING_S:
                     continue
-                if ahead[i, 0] * ahead[j, 0] + ahead[i, 1] * ahead[j, 1] > follows:
+                if _aligned(ahead[i], ahead[j]):
                     continue
                 if _overlap(xy[j, 0] - xy[i, 0], xy[j, 1] - xy[i, 1], ahead[i], ahead[j], sides[i], sides[j]):
                     best = abs(t[j] - t[i])
                     rows[0, k], rows[1, k] = i, j
     return rows[0], rows[1]
+
+
+@kernel
+def _follows(first: Ints, second: Ints, track: Ints, t: Floats, xy: Floats, ahead: Floats, sides: Floats) -> Mask:
+    """(E,) whether the vehicle of row `second`, a length earlier, is on the way of that of row `first` already."""
+    follows = np.zeros(len(first), np.bool_)
+    for k in range(len(first)):
+        i, j = first[k], second[k]
+        at, length = j, sides[j, 0]
+        while at > 0 and track[at - 1] == track[j] and np.hypot(xy[at, 0] - xy[j, 0], xy[at, 1] - xy[j, 1]) < length:
+            at -= 1
+        while i > 0 and track[i - 1] == track[i] and t[i - 1] > t[at] - PET_S:
+            i -= 1
+        while i < len(t) and track[i] == track[first[k]] and t[i] < t[at] + PET_S and not follows[k]:
+            if _aligned(ahead[i], ahead[at]):
+                dx, dy = xy[at, 0] - xy[i, 0], xy[at, 1] - xy[i, 1]
+                follows[k] = _overlap(dx, dy, ahead[i], ahead[at], sides[i], sides[at])
+            i += 1
+    return follows
+
+
+@kernel
+def _aligned(e: Floats, other: Floats) -> bool:
+    return e[0] * other[0] + e[1] * other[1] > _FOLLOWS
 
 
 @kernel
