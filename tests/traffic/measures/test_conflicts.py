@@ -184,7 +184,7 @@ def test_vehicles_behind_each_other_have_no_encroachment_on_a_bend_and_where_one
 
 def test_one_that_turns_into_the_way_of_another_encroaches():
     track, t, xy, v = bend(1, 2.0, np.pi / 2)
-    turned = np.column_stack([xy[:, 1], -xy[:, 0]]) + (30.0, 37.0)  # comes from the north and leaves to the east
+    turned = np.array([30.0, 37.0]) + np.column_stack([xy[:, 1], -xy[:, 0]])  # from the north to the east
     south = np.column_stack([v[:, 1], -v[:, 0]])
     found = found_in(both(bend(0, 0.0, 0.0), (track, t, turned, south)))
     assert (found.first.tolist(), found.second.tolist()) == ([0], [1])
