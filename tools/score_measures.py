@@ -7,7 +7,7 @@ track CLIP/video.avi --site CLIP/site.toml -o CLIP/run`) these are scored as wel
 as if they were tracks: what is missed then is missed by the geometry.
 
 A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
-same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 8 m of the second vehicle.
+same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
 Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
 """
 
@@ -26,7 +26,7 @@ from scipy.optimize import linear_sum_assignment
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.site import read_site
 
-TOLERANCE_S, TOLERANCE_M = 1.0, 8.0
+TOLERANCE_S, TOLERANCE_M = 1.0, 15.0
 FPS = 25.0
 SIZE = (1280, 720)
 
@@ -139,7 +139,11 @@ def told(name: str, results: list[dict[str, float]]) -> str:
     off, sigma, pet, pet_sigma = (
         np.concatenate([result[key] for result in results]) for key in ("off", "sigma", "pet", "pet_sigma")
     )
-    late = "" if len(pet) == 0 else f"{np.median(pet):+.2f}, {np.median(np.abs(pet)):.2f} | {np.mean(np.abs(pet) <= 1.96 * pet_sigma):.2f}"
+    late = (
+        ""
+        if len(pet) == 0
+        else f"{np.median(pet):+.2f}, {np.median(np.abs(pet)):.2f} | {np.mean(np.abs(pet) <= 1.96 * pet_sigma):.2f}"
+    )
     inside = np.mean(np.abs(off) <= 1.96 * sigma)
     return (
         f"| {name} | {total['true']:.0f} | {total['hit'] / total['true']:.3f} | {total['hit'] / total['found']:.3f} "

@@ -31,14 +31,19 @@ CROSSING_RAD = np.radians(30)
 _FOLLOWS = float(np.cos(CROSSING_RAD))
 _CELL_M = 4.0
 _ROUNDING_S = 1e-6
+_SURE = 2.0
+"""Standard deviations of a time that must be less than PET_S: where ways are almost parallel nobody knows where they
+cross"""
 _SLOWEST = 0.5
 """m/s; for when a vehicle that is about to stand leaves or comes, since it does not go on with that speed"""
 
 
 def encroachments(bodies: Bodies) -> Encounters:
-    """The least post-encroachment time of each two vehicles, of at most PET_S and known to be no longer.
+    """The least post-encroachment time of each two vehicles, of at most PET_S.
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
+
+    Two that are in the same place at the same time have none: vehicles are not, so it is their error.
     """
     order = np.lexsort((bodies.t, bodies.track))
     bodies = bodies.only(order)
@@ -50,6 +55,7 @@ def encroachments(bodies: Bodies) -> Encounters:
     i, j = np.where(late, j, i), np.where(late, i, j)
     found = _details(bodies, i, j)
     least = found.least()
+    least = least[(found.rank[least] > _ROUNDING_S) & (_SURE * found.sigma[least] < PET_S)]
     follows = _follows(i[least], j[least], bodies.track, bodies.t, bodies.xy, bodies.ahead, bodies.sides)
     return found.only(least[~follows])
 
@@ -104,13 +110,11 @@ def _details(bodies: Bodies, i: Ints, j: Ints) -> Encounters:
 
 
 def _slowness(a: Bodies, b: Bodies) -> Floats:
-    """(E, 2) g [s/m] with g v_a = g v_b = -1, for speeds of at least _SLOWEST and ways that are not parallel."""
+    """(E, 2) g [s/m] with g v_a = g v_b = -1, for speeds of at least _SLOWEST."""
     va, vb = (np.maximum(np.linalg.norm(one.v, axis=1), _SLOWEST)[:, None] * one.ahead for one in (a, b))
     cross = va[:, 0] * vb[:, 1] - va[:, 1] * vb[:, 0]
-    least = np.sin(CROSSING_RAD) * np.linalg.norm(va, axis=1) * np.linalg.norm(vb, axis=1)
-    cross = np.where(cross < 0, -1, 1) * np.maximum(np.abs(cross), least)
     change = va - vb
-    return np.column_stack([change[:, 1], -change[:, 0]]) / cross[:, None]
+    return np.column_stack([change[:, 1], -change[:, 0]]) / np.where(cross == 0, 1e-9, cross)[:, None]
 
 
 def _step(bodies: Bodies, row: Ints, way: int) -> Floats:
