@@ -139,11 +139,10 @@ def told(name: str, results: list[dict[str, float]]) -> str:
     off, sigma, pet, pet_sigma = (
         np.concatenate([result[key] for result in results]) for key in ("off", "sigma", "pet", "pet_sigma")
     )
-    late = (
-        ""
-        if len(pet) == 0
-        else f"{np.median(pet):+.2f}, {np.median(np.abs(pet)):.2f} | {np.mean(np.abs(pet) <= 1.96 * pet_sigma):.2f}"
-    )
+    late = "|"
+    if len(pet):
+        covered = np.mean(np.abs(pet) <= 1.96 * pet_sigma)
+        late = f"{np.median(pet):+.2f}, {np.median(np.abs(pet)):.2f} | {covered:.2f}"
     inside = np.mean(np.abs(off) <= 1.96 * sigma)
     return (
         f"| {name} | {total['true']:.0f} | {total['hit'] / total['true']:.3f} | {total['hit'] / total['found']:.3f} "
@@ -151,7 +150,7 @@ def told(name: str, results: list[dict[str, float]]) -> str:
         f"| {total['right'] / total['trips']:.3f} | {np.median(off):+.2f}, {np.median(np.abs(off)):.2f} "
         f"| {inside:.2f} | {len(off) / total['hit']:.2f} | {total['untracked']:.0f} "
         f"| {total['close']:.0f} | {total['met'] / total['close']:.3f} | {total['met'] / total['said']:.3f} "
-        f"| {late or '|'} |"
+        f"| {late} |"
     )
 
 

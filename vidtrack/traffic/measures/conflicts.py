@@ -77,13 +77,16 @@ class Meeting:
         self._done = until
 
     def conflicts(self, vehicle: Ints, spans: Floats) -> Conflicts:
-        """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break."""
+        """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break.
+
+        Two that are in one place at one time have no post-encroachment time: vehicles are not, so it is their error.
+        """
         if self._recent is not None and len(self._recent):
             self._look(self._recent, until=np.inf)
         both = (Encounters.together(found).between(vehicle) for found in (self._closed, self._encroached))
         closed, encroached = (found.only(found.least()) for found in both)
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
-        return _joined(closed, encroached.only(span[0] == span[1]))
+        return _joined(closed, encroached.only((span[0] == span[1]) & (encroached.rank > 0)))
 
 
 def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:

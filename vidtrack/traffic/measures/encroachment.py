@@ -42,8 +42,6 @@ def encroachments(bodies: Bodies) -> Encounters:
     """The least post-encroachment time of each two vehicles, of at most PET_S.
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
-
-    Two that are in the same place at the same time have none: vehicles are not, so it is their error.
     """
     order = np.lexsort((bodies.t, bodies.track))
     bodies = bodies.only(order)
@@ -55,7 +53,7 @@ def encroachments(bodies: Bodies) -> Encounters:
     i, j = np.where(late, j, i), np.where(late, i, j)
     found = _details(bodies, i, j)
     least = found.least()
-    least = least[(found.rank[least] > _ROUNDING_S) & (_SURE * found.sigma[least] < PET_S)]
+    least = least[_SURE * found.sigma[least] < PET_S]
     follows = _follows(i[least], j[least], bodies.track, bodies.t, bodies.xy, bodies.ahead, bodies.sides)
     return found.only(least[~follows])
 
