@@ -10,7 +10,7 @@ from vidtrack.traffic.measures.crossings import confidence, following
 from vidtrack.traffic.measures.gates import gates_of
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed, Passing
-from vidtrack.traffic.measures.rows import Rows
+from vidtrack.traffic.measures.rows import Rows, off_road
 
 
 def crossings(run, place=None):
@@ -109,9 +109,8 @@ def test_passings_are_those_of_brute_force(paths, size):
     yes = np.ones(count, bool)
     t = np.array([float(k) for k, _ in rows])
     number = np.array([track for _, track in rows])
-    nothing = np.full((count, 3), np.nan)
-    state = xy, unknown, np.full(count, margin), np.zeros((count, 2)), *(unknown,) * 5
-    whole = Rows(number, t, yes, ~yes, *state, nothing[:, :2], nothing)
+    state = xy, unknown, np.full(count, margin), np.zeros((count, 2))
+    whole = Rows(number, t, yes, ~yes, *state, *off_road(count))
     passing = Passing(gates, 50.0)
     for first in range(0, count, size):  # blocks of any size give the same
         passing.add(whole.only(np.arange(first, min(first + size, count))))

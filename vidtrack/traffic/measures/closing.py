@@ -57,8 +57,8 @@ def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
     rate = np.sum((b.v - a.v) * normal, axis=1)
     drift = (ttc * np.hypot(a.speed_sigma, b.speed_sigma)) ** 2
     sigma = np.sqrt(a.variance(normal) + b.variance(normal) + drift) / np.abs(rate)
-    then = [replace(one, xy=one.xy + ttc[:, None] * one.v) for one in (a, b)]
-    return Encounters.at(a, b, ttc, sigma, ttc, a.t, touching_place(*then, normal))
+    then_a, then_b = (replace(one, xy=one.xy + ttc[:, None] * one.v) for one in (a, b))
+    return Encounters.at(a, b, ttc, sigma, ttc, a.t, touching_place(then_a, then_b, normal))
 
 
 @kernel

@@ -79,6 +79,12 @@ class Rows:
         return Rows(*(getattr(self, column.name)[chosen] for column in fields(self)))
 
 
+def off_road(count: int) -> tuple[Floats, ...]:
+    """The last seven columns of rows (count,) of which nothing is known on the road: NaN."""
+    nothing = np.full((count, 3), np.nan)
+    return *(nothing[:, 0] for _ in range(5)), nothing[:, :2], nothing
+
+
 _MARGIN = 0.15
 """Share of a vehicle's length, or of its extent in the picture, by which it must pass a gate."""
 _USUAL_M = 4.5
@@ -128,8 +134,7 @@ class Reader:
             sigma = np.hypot(column["sigma_x_px"], column["sigma_y_px"]) / np.sqrt(2)
             margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
-            none = np.full((len(t), 5), np.nan)
-            return Rows(track, t, seen, merged, xy, sigma, margin, v, *none.T, none[:, :2], none[:, :3])
+            return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
             column |= _stand(road, track, column)
         xy, sigma = _positions(ground, column)
