@@ -173,9 +173,10 @@ def site() -> str:
     return "\n".join([*lines, "[report]", f"interval_s = {MINUTE_S}", ""])
 
 
-def compare_loops(folder: Path, tables: dict[str, pa.Table]) -> str:
-    """Vehicles in each minute and their mean speed."""
-    loops = {
+def loops(folder: Path, tables: dict[str, pa.Table]) -> tuple[np.ndarray, np.ndarray]:
+    """(M, 2) vehicles in each minute at each gate, here and there; differences of mean speeds [km/h] where both have the
+    same number."""
+    there = {
         (one.get("id"), float(one.get("begin"))): (float(one.get("nVehContrib")), float(one.get("speed")))
         for one in ET.parse(folder / "e1.xml").getroot().iter("interval")
     }
@@ -184,25 +185,20 @@ def compare_loops(folder: Path, tables: dict[str, pa.Table]) -> str:
         key = row["gate"], row["begin_s"]
         if row["count"] is not None:
             ours.setdefault(key, []).append((row["count"], row["time_mean_speed_kmh"]))
-    off, speeds, total = [], [], np.zeros(2)
-    for key, (count, speed) in loops.items():
+    counts, speeds = [], []
+    for key, (count, speed) in there.items():
         mine = ours[key]
         counted = sum(one[0] for one in mine)
-        total += counted, count
-        off.append(counted - count)
+        counts.append((counted, count))
         fast = [one[1] for one in mine if one[0]]
         if count and counted == count and len(fast) == 1:
             speeds.append(fast[0] - 3.6 * speed)
-    off, speeds = np.array(off), np.array(speeds)
-    return (
-        f"E1: {total[0]:.0f} crossings of {total[1]:.0f}; {np.mean(off == 0):.3f} of {len(off)} minutes and gates "
-        f"equal, largest difference {np.abs(off).max():.0f}; mean speed in equal ones: {np.mean(speeds):+.2f} km/h in "
-        f"the mean, {np.abs(speeds).max():.2f} at most"
-    )
+    return np.array(counts), np.array(speeds)
 
 
-def compare_queues(folder: Path, tables: dict[str, pa.Table]) -> str:
-    """The most vehicles in E2's jam while each of our queues lasts; queues of E2 outside ours."""
+def queues(folder: Path, tables: dict[str, pa.Table]) -> tuple[np.ndarray, np.ndarray, int]:
+    """How many more vehicles and metres each of our queues has than the largest jam of E2 meanwhile; seconds with a jam
+    of E2 outside our queues."""
     jam: dict[str, dict[float, tuple[float, float]]] = {}
     for one in ET.parse(folder / "e2.xml").getroot().iter("interval"):
         values = float(one.get("maxJamLengthInVehicles")), float(one.get("maxJamLengthInMeters"))
@@ -219,12 +215,7 @@ def compare_queues(folder: Path, tables: dict[str, pa.Table]) -> str:
             metres.append(row["length_m"] - most[then, 1].max(initial=0))
             free &= ~then
         alone += int(np.count_nonzero(free))
-    off, metres = np.array(off), np.array(metres)
-    return (
-        f"E2: {len(off)} queues; {np.mean(off == 0):.3f} with the same number of vehicles, "
-        f"{np.mean(np.abs(off) <= 1):.3f} within one, {off.min():+.0f} to {off.max():+.0f}; length "
-        f"{np.median(metres):+.1f} m in the median; {alone} s with a jam of E2 and no queue of ours"
-    )
+    return np.array(off), np.array(metres), alone
 
 
 def ssm_of(folder: Path) -> tuple[dict, dict]:
@@ -246,22 +237,28 @@ def ssm_of(folder: Path) -> tuple[dict, dict]:
     return ttc, pet
 
 
-def compare_conflicts(folder: Path, tables: dict[str, pa.Table]) -> list[str]:
-    """TTC and PET of the same two vehicles."""
+def conflicts(folder: Path, tables: dict[str, pa.Table]) -> dict[str, tuple[int, int, np.ndarray]]:
+    """For ttc and pet: pairs of vehicles there, and here, and the differences [s] of those in both."""
     ours = {
         tuple(sorted((row["first_track_id"], row["second_track_id"]))): row for row in tables["conflicts"].to_pylist()
     }
-    lines = []
+    found = {}
     for name, theirs in zip(("ttc", "pet"), ssm_of(folder), strict=True):
-        mine = {pair for pair, row in ours.items() if row[f"{name}_s"] is not None}
-        both = sorted(mine & set(theirs))
-        off = np.array([ours[pair][f"{name}_s"] - theirs[pair][0] for pair in both] or [np.nan])
-        lines.append(
-            f"SSM {name.upper()}: {len(theirs)} pairs of vehicles there, {len(mine)} here, {len(both)} in both, with a "
-            f"difference of {np.median(off):+.3f} s in the median, {np.median(np.abs(off)):.3f} s absolute; "
-            f"{np.mean(np.abs(off) < 0.3):.2f} within 0.3 s"
-        )
-    return lines
+        mine = {pair: row[f"{name}_s"] for pair, row in ours.items() if row[f"{name}_s"] is not None}
+        off = np.array([mine[pair] - theirs[pair][0] for pair in sorted(mine.keys() & theirs.keys())])
+        found[name] = len(theirs), len(mine), off
+    return found
+
+
+def compared(folder: Path, seconds: float, seed: int) -> dict[str, pa.Table]:
+    """Simulate, convert and measure; the tables."""
+    folder.mkdir(parents=True, exist_ok=True)
+    simulate(folder, seconds, seed)
+    convert(folder, seconds)
+    found = measured([str(folder / "run")], read_site(folder / "site.toml"))
+    (folder / "measures").mkdir(exist_ok=True)
+    write_figures(folder / "measures", found.tables, found.report)
+    return found.tables
 
 
 def main() -> None:
@@ -270,19 +267,26 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=900.0)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    folder = options.output
-    folder.mkdir(parents=True, exist_ok=True)
-    simulate(folder, options.seconds, options.seed)
-    convert(folder, options.seconds)
-    found = measured([str(folder / "run")], read_site(folder / "site.toml"))
-    (folder / "measures").mkdir(exist_ok=True)
-    write_figures(folder / "measures", found.tables, found.report)
-    for line in (
-        compare_loops(folder, found.tables),
-        compare_queues(folder, found.tables),
-        *compare_conflicts(folder, found.tables),
-    ):
-        print(line)
+    tables = compared(options.output, options.seconds, options.seed)
+    counts, speeds = loops(options.output, tables)
+    off = np.abs(counts[:, 0] - counts[:, 1])
+    print(
+        f"E1: {counts[:, 0].sum():.0f} crossings of {counts[:, 1].sum():.0f}; {np.mean(off == 0):.3f} of {len(off)} "
+        f"minutes and gates equal, largest difference {off.max():.0f}; mean speed in equal ones: "
+        f"{np.mean(speeds):+.2f} km/h in the mean, {np.abs(speeds).max():.2f} at most"
+    )
+    vehicles, metres, alone = queues(options.output, tables)
+    print(
+        f"E2: {len(vehicles)} queues; {np.mean(vehicles == 0):.3f} with the same number of vehicles, "
+        f"{np.mean(np.abs(vehicles) <= 1):.3f} within one, {vehicles.min():+.0f} to {vehicles.max():+.0f}; length "
+        f"{np.median(metres):+.1f} m in the median; {alone} s with a jam of E2 and no queue here"
+    )
+    for name, (theirs, mine, late) in conflicts(options.output, tables).items():
+        print(
+            f"SSM {name.upper()}: {theirs} pairs of vehicles there, {mine} here, {len(late)} in both, with a difference "
+            f"of {np.median(late):+.3f} s in the median, {np.median(np.abs(late)):.3f} s absolute; "
+            f"{np.mean(np.abs(late) < 0.3):.2f} within 0.3 s"
+        )
 
 
 if __name__ == "__main__":
