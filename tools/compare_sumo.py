@@ -174,8 +174,8 @@ def site() -> str:
 
 
 def loops(folder: Path, tables: dict[str, pa.Table]) -> tuple[np.ndarray, np.ndarray]:
-    """(M, 2) vehicles in each minute at each gate, here and there; differences of mean speeds [km/h] where both have the
-    same number."""
+    """(M, 2) vehicles in each minute at each gate, here and there; differences of mean speeds [km/h] where these are
+    the same."""
     there = {
         (one.get("id"), float(one.get("begin"))): (float(one.get("nVehContrib")), float(one.get("speed")))
         for one in ET.parse(folder / "e1.xml").getroot().iter("interval")
@@ -283,8 +283,8 @@ def main() -> None:
     )
     for name, (theirs, mine, late) in conflicts(options.output, tables).items():
         print(
-            f"SSM {name.upper()}: {theirs} pairs of vehicles there, {mine} here, {len(late)} in both, with a difference "
-            f"of {np.median(late):+.3f} s in the median, {np.median(np.abs(late)):.3f} s absolute; "
+            f"SSM {name.upper()}: {theirs} pairs of vehicles there, {mine} here, {len(late)} in both, with a "
+            f"difference of {np.median(late):+.3f} s in the median, {np.median(np.abs(late)):.3f} s absolute; "
             f"{np.mean(np.abs(late) < 0.3):.2f} within 0.3 s"
         )
 
