@@ -271,3 +271,10 @@ def test_without_metres_there_is_no_table_and_the_report_says_so(tmp_path):
     found = measured([crossing_run(tmp_path / "run", metres=False)], site(SITE))
     assert "conflicts" not in found.tables
     assert found.report["conflicts"] is None
+
+
+@pytest.mark.parametrize("seconds", [0, 1])
+def test_nobody_and_one_alone_are_in_no_conflict(tmp_path, seconds):
+    tracks = [along(1, np.arange(25) / 25, 100 + 2 * np.arange(25))] if seconds else []
+    found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(CALIBRATED))
+    assert len(found.tables["conflicts"]) == found.report["conflicts"] == 0

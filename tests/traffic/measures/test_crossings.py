@@ -101,7 +101,7 @@ POINT = st.tuples(st.floats(0, 640), st.floats(0, 480))
 @given(st.lists(st.lists(POINT, min_size=2, max_size=8), min_size=1, max_size=4), st.integers(1, 7))
 def test_passings_are_those_of_brute_force(paths, size):
     """Steps that meet the middle gate, pairs of opposite ones within the margin taken away, then the first of each."""
-    gates = gates_of(site(gates={"bend": {"line": [[300, 0], [340, 200], [300, 479]]}}), None)
+    gates = gates_of(site(gates={"bend": {"line": [[300.3, 0.37], [340.1, 200.7], [300.9, 478.3]]}}), None)
     rows = sorted((k, track) for track, path in enumerate(paths) for k in range(len(path)))
     xy = np.array([paths[track][k] for k, track in rows])
     count, margin = len(rows), 8.0

@@ -21,7 +21,7 @@ from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.bodies import Bodies, Encounters, touching_place
 
 TTC_S = 1.5
-"""s; a longer time to collision is no conflict (FHWA-HRT-08-049, the default of SSAM)"""
+"""s; a longer time to collision is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
 _SURE = 2.0
 """Standard deviations by which a closing speed must differ from 0: else vehicles that stand would collide"""
 

@@ -25,7 +25,7 @@ from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.bodies import Bodies, Encounters, touching_place
 
 PET_S = 5.0
-"""s; a longer post-encroachment time is no conflict (FHWA-HRT-08-049, the default of SSAM)"""
+"""s; a longer post-encroachment time is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
 CROSSING_RAD = np.radians(30)
 """Vehicles whose headings differ less follow each other (SSAM: rear-end)"""
 _FOLLOWS = float(np.cos(CROSSING_RAD))
