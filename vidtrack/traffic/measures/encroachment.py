@@ -132,16 +132,16 @@ def _enter(
     turned  the least cosine between the first heading in the cell and a later one
     """
     for i in range(row, len(track)):
-        x0, y0, x1, y1 = cells[i]
+        x0, y0, x1, y1 = cells[i, 0], cells[i, 1], cells[i, 2], cells[i, 3]
         if count + (x1 - x0 + 1) * (y1 - y0 + 1) > len(stay):
             return i, count
         old = i > 0 and track[i - 1] == track[i]
         for x in range(x0, x1 + 1):
             for y in range(y0, y1 + 1):
-                if old and _in(x, y, cells[i - 1]):
+                if old and _in(x, y, cells, i - 1):
                     continue
                 last, least = i, 1.0
-                while last + 1 < len(track) and track[last + 1] == track[i] and _in(x, y, cells[last + 1]):
+                while last + 1 < len(track) and track[last + 1] == track[i] and _in(x, y, cells, last + 1):
                     last += 1
                     least = min(least, ahead[i, 0] * ahead[last, 0] + ahead[i, 1] * ahead[last, 1])
                 stay[count, 0], stay[count, 1], stay[count, 2] = (x << 32) + y, i, last
@@ -151,8 +151,8 @@ def _enter(
 
 
 @kernel
-def _in(x: int, y: int, cells: Ints) -> bool:
-    return cells[0] <= x <= cells[2] and cells[1] <= y <= cells[3]
+def _in(x: int, y: int, cells: Ints, row: int) -> bool:
+    return cells[row, 0] <= x <= cells[row, 2] and cells[row, 1] <= y <= cells[row, 3]
 
 
 @kernel
