@@ -54,9 +54,10 @@ def command(options: MeasureOptions) -> None:
     runs = [part for run in options.runs for part in ([str(part) for part in parts_of(Path(run))] or [run])]
     found = measured(runs, site)
     folder = open_folder(options.output, options.site.stem, options.force)
-    for name in ("conflicts.csv", "conflicts.parquet"):  # of an earlier measurement, with a calibration
-        (folder / name).unlink(missing_ok=True)
     write_figures(folder, found.tables, found.report)
+    if found.report["conflicts"] is None:
+        for name in ("conflicts.csv", "conflicts.parquet"):  # of an earlier measurement, with a calibration
+            (folder / name).unlink(missing_ok=True)
     with replacing(folder / "site.toml") as new:  # the report draws its gates
         new.write_bytes(options.site.read_bytes())
     if options.json_to is not None:
