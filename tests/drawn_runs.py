@@ -87,10 +87,10 @@ def write_run(
     if metres:
         columns |= {
             **{"x_m": xy[:, 0] / 10, "y_m": 48 - xy[:, 1] / 10},
-            **{"sigma_x_m": 0.05 * ones, "sigma_y_m": 0.05 * ones},
+            **{"sigma_x_m": 0.05 * ones, "sigma_y_m": 0.05 * ones, "corr_xy_m": 0 * ones},
             **{"speed_kmh": 0.36 * np.hypot(*v.T), "speed_sigma_kmh": ones, "speed_shared_sigma_kmh": 0.5 * ones},
             "heading_deg": np.degrees(np.arctan2(v[:, 0], -v[:, 1])),
-            **{"length_m": length_m * ones, "length_sigma_m": 0.2 * ones},
+            **{"length_m": length_m * ones, "length_sigma_m": 0.2 * ones, "width_m": 2 * ones},
         }
     order = np.lexsort((ids, t))
     table = pa.table({name: pa.array(np.asarray(values)[order]) for name, values in columns.items()})

@@ -41,7 +41,7 @@ Examples:
 @json_option
 @receives(MeasureOptions)
 def command(options: MeasureOptions) -> None:
-    """Crossings, trips, intervals, stays, queues and checks from finished runs, without tracking again.
+    """Crossings, trips, intervals, stays, queues, conflicts and checks from finished runs, without tracking again.
 
     All RUNs are of one site and one day: files of hours, or a live run with its parts. RUN@TIME gives the time of a
     run's first picture; without it a live run knows its own, and a file goes on where the one before it ended.
@@ -63,6 +63,9 @@ def command(options: MeasureOptions) -> None:
     name = f"{first.name}-measures" if options.site is None else options.site.stem
     folder = open_folder(options.output, name, options.force)
     write_figures(folder, found.tables, found.report)
+    if found.report["conflicts"] is None:
+        for name in ("conflicts.csv", "conflicts.parquet"):  # of an earlier measurement, with a calibration
+            (folder / name).unlink(missing_ok=True)
     with replacing(folder / "site.toml") as new:  # the report draws its gates
         new.write_bytes(text)
     if options.json_to is not None:
@@ -76,9 +79,11 @@ def command(options: MeasureOptions) -> None:
 def _told(report: dict[str, Any]) -> str:
     """One line: what was found."""
     wrong = sum(movement["trips"] for movement in report["impossible_movements"])
+    conflicts = report["conflicts"]
+    close = "no conflicts without a calibration" if conflicts is None else f"{conflicts} conflicts"
     return (
         f"vidtrack: watched {report['watched_s']:.0f} s: {report['crossings']} crossings, "
         f"{report['complete_trips']} whole trips of {report['trips']}, {report['joins']} broken tracks joined; "
         f"{wrong} trips over impossible movements, {report['appeared']} vehicles appeared between the gates, "
-        f"{report['vanished']} vanished"
+        f"{report['vanished']} vanished; {close}"
     )

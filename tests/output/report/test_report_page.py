@@ -65,6 +65,41 @@ def test_the_page_needs_nothing_from_elsewhere(made):
     assert set(sources) == {"data:image/png;base64,"}
 
 
+def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made):
+    assert "Conflicts" not in words(made[1])
+    assert not (made[1] / "conflicts.csv").exists()
+    nothing = np.nan
+    close = [
+        ("crossing", nothing, 2.5),
+        ("rear-end", 1.2, nothing),
+        ("crossing", 0.75, 0.5),
+        ("crossing", nothing, 4.0),
+    ]
+    out = report(write_day(tmp_path / "day", [4], close=close))
+    rows = [{name: cell for name, cell in row.items() if cell} for row in table(out / "conflicts.csv")]
+    assert rows == [
+        {
+            "kind": "crossing",
+            "conflicts": "3",
+            "with_ttc": "1",
+            "with_pet": "3",
+            "least_ttc_s": "0.75",
+            "least_pet_s": "0.5",
+        },
+        {"kind": "rear-end", "conflicts": "1", "with_ttc": "1", "with_pet": "0", "least_ttc_s": "1.2"},
+    ]
+    text = words(out)
+    times = [
+        text.index(one)
+        for one in ("06:02 crossing 0.8 ± 0.2 0.5 ± 0.4", "06:01 rear-end 1.2 ± 0.2 –", "06:00 crossing –")
+    ]
+    assert times == sorted(times)  # the closest first
+
+
+def test_no_conflicts_is_said(tmp_path):
+    assert "No two vehicles came so close" in words(report(write_day(tmp_path / "day", [4], close=[])))
+
+
 def test_nobody_watched_is_said_and_not_zero(made):
     _, out = made
     gap = [row for row in table(out / "turning_movements.csv") if row["coverage"] == "0"]

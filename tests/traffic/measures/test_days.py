@@ -18,7 +18,7 @@ from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
 
 BEGAN = "2026-06-01T05:00:00.000+00:00"
-TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks"}
+TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks", "conflicts"}
 ZONES = {"zones": {"box": {"polygon": [[200, 100], [400, 100], [400, 400], [200, 400]]}}}
 
 
@@ -289,10 +289,12 @@ def test_the_command_writes_each_table_twice(tmp_path):
     assert process.returncode == 0, err
     assert out == "out\n"
     assert "1 crossings" in err
-    for name in TABLES:
+    assert "no conflicts without a calibration" in err
+    for name in TABLES - {"conflicts"}:
         table = pq.read_table(tmp_path / "out" / f"{name}.parquet")
         lines = (tmp_path / "out" / f"{name}.csv").read_text().splitlines()
         assert lines[0] == ",".join(table.column_names)
         assert len(lines) == len(table) + 1
+    assert not (tmp_path / "out" / "conflicts.csv").exists()
     assert pq.read_schema(tmp_path / "out" / "crossings.parquet").field("speed_kmh").metadata == {b"unit": b"km/h"}
     assert json.loads((tmp_path / "report.json").read_text())["crossings"] == 1

@@ -11,6 +11,7 @@ from vidtrack.output.folder import replacing
 from vidtrack.output.report import charts, pictures
 from vidtrack.output.report.page import Page, rendered
 from vidtrack.output.report.sheets import write_sheets
+from vidtrack.traffic.report.close import close_of
 from vidtrack.traffic.report.findings import Findings
 from vidtrack.traffic.report.legs import legs_of
 from vidtrack.traffic.report.paths import Paths, paths_of
@@ -33,7 +34,8 @@ def write_report(folder: Path, found: Findings, scene: Image | None, reviewed: R
     peak = peak_hour(sheet.total, found.coverage >= WATCHED, found.edges)
     paths, gone = _paths(found, sheet)
     why_no_peak = "" if peak else _why_no_peak(found)
-    page = Page(found, sheet, peak, why_no_peak, legs_of(found), speeds_of(found), paths, scene is not None, reviewed)
+    legs, speeds, close = legs_of(found), speeds_of(found), close_of(found)
+    page = Page(found, sheet, peak, why_no_peak, legs, speeds, paths, close, scene is not None, reviewed)
     missing = _missing(page, gone)
     made = _pictures(page, scene, missing)
     for name, content in made.items():

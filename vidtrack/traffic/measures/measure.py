@@ -11,8 +11,10 @@ import pyarrow as pa
 
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
+from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
@@ -51,20 +53,32 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
     staying = Staying(outlines, metres=site.calibration is not None)
+    meeting = Meeting()
     for rows in reader:
-        for part in (passing, lives, staying):
+        for part in (passing, lives, staying, meeting):
             part.add(rows)
-    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
+    ground = grounds[sizes[0]]
+    return _Figures(day, site, gates, ground, reader, passing.passed(), lives, staying, meeting).measures()
 
 
 class _Figures:
     """All figures of a day, from what is left of its tracks."""
 
     def __init__(
-        self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives, staying: Staying
+        self,
+        day: Day,
+        site: Site,
+        gates: Gates,
+        ground: Ground | None,
+        reader: Reader,
+        passed: Passed,
+        lives: Lives,
+        staying: Staying,
+        meeting: Meeting,
     ) -> None:
-        self.day, self.site, self.gates, self.staying = day, site, gates, staying
-        self.metres = site.calibration is not None
+        self.day, self.site, self.gates, self.ground = day, site, gates, ground
+        self.staying, self.meeting = staying, meeting
+        self.metres = ground is not None
         self.spans = day.spans
         self.session, self.track_id = reader.names
         tracks = len(self.track_id)
@@ -91,6 +105,8 @@ class _Figures:
             "queues": self._queues(),
             "checks": self._checks(),
         }
+        if self.ground is not None:
+            tables["conflicts"] = self._conflicts(self.ground)
         report = {
             "site": self.site.camera.name,
             "metres": self.metres,
@@ -110,6 +126,7 @@ class _Figures:
             "trips": len(self.trips.vehicle),
             "complete_trips": int(self.trips.complete.sum()),
             "joins": len(self.joins.before),
+            "conflicts": len(tables["conflicts"]) if self.metres else None,
             "movements": [{"from": a, "to": b, "trips": count} for (a, b), count in sorted(moved.items())],
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
@@ -254,6 +271,32 @@ class _Figures:
                 "length_m": ("m", found.length),
             }
         )
+
+    def _conflicts(self, ground: Ground) -> pa.Table:
+        found = self.meeting.conflicts(self.vehicle, self.spans)
+        columns: dict[str, tuple[str, Any]] = {
+            "time_s": ("s", found.t),
+            "utc": ("utc", stamps(self.day.utc, found.t)),
+            "kind": ("", found.kinds),
+            "angle_deg": ("deg", np.degrees(found.angle)),
+            "run": ("n", self.session[found.second]),
+        }
+        for name, who, speed in zip(("first", "second"), (found.first, found.second), found.speed.T, strict=True):
+            columns |= {
+                f"{name}_track_id": ("n", self.track_id[who]),
+                f"{name}_class": ("", class_of(self.length[who], self.site.classes)),
+                f"{name}_speed_kmh": ("km/h", 3.6 * speed),
+            }
+        for name, kind in (("ttc", TTC), ("pet", PET)):
+            (x, y), (x_px, y_px) = found.xy[kind].T, ground.pixels(found.xy[kind]).T
+            columns |= {
+                f"{name}_s": ("s", found.value[kind]),
+                f"{name}_sigma_s": ("s", found.sigma[kind]),
+                f"{name}_time_s": ("s", found.when[kind]),
+                **{f"{name}_x_m": ("m", x), f"{name}_y_m": ("m", y)},
+                **{f"{name}_x_px": ("px", x_px), f"{name}_y_px": ("px", y_px)},
+            }
+        return table(columns | {"reason": ("", ["merged" if one else "seen" for one in found.merged.tolist()])})
 
     def _checks(self) -> pa.Table:
         found = balance(self.trips, self.edges, self.watched)
