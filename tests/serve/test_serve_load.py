@@ -90,7 +90,7 @@ def test_the_number_of_connections_is_bounded(monkeypatch):
 
 
 def connections_of(page):
-    return len(page._server.server_state.connections)
+    return len(page._server._server.server_state.connections)
 
 
 def is_open(client):

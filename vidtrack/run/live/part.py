@@ -14,6 +14,7 @@ from vidtrack.output.counts import HEADER, crossing_lines
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.linefile import LineFile, sort_rows
 from vidtrack.output.sink import Step
+from vidtrack.output.site_copy import SiteCopy
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import Column
 from vidtrack.run.live.track_files import TRACK_FILES, write_lines
@@ -34,7 +35,9 @@ class Part:
         self._counted: Counter[tuple[str, str]] = Counter()
         with ExitStack() as stack:  # on a full disk, files already open are closed
             self._summary = subject.summary(folder, self._totals)
-            self._counts = self._decisions = None
+            self._counts = self._decisions = self._site = None
+            if subject.site is not None:
+                self._site = SiteCopy(folder, subject.site)
             if subject.counter is not None:
                 self._counts = LineFile(folder / "counts.csv", HEADER)
                 stack.callback(self._counts.close)
@@ -53,8 +56,10 @@ class Part:
     def write(self, steps: Sequence[Step], chosen: Sequence[Step], rows: pa.Table | None) -> None:
         """Write and synchronise the chosen ones of these steps, and the rows of their confirmed tracks."""
         self._tracks.write(chosen, rows)
-        if self._decisions is not None:
-            for step in steps:
+        for step in steps:
+            if self._site is not None:
+                self._site.step(step)
+            if self._decisions is not None:
                 self._decisions.step(step)
         count(self._summary, steps)
 
