@@ -109,7 +109,8 @@ def test_passings_are_those_of_brute_force(paths, size):
     yes = np.ones(count, bool)
     t = np.array([float(k) for k, _ in rows])
     number = np.array([track for _, track in rows])
-    whole = Rows(number, t, yes, ~yes, xy, unknown, np.full(count, margin), np.zeros((count, 2)), *(unknown,) * 4)
+    state = xy, unknown, np.full(count, margin), np.zeros((count, 2))
+    whole = Rows(number, t, yes, ~yes, *state, *(unknown,) * 4, np.full((count, 4), np.nan))
     passing = Passing(gates, 50.0)
     for first in range(0, count, size):  # blocks of any size give the same
         passing.add(whole.only(np.arange(first, min(first + size, count))))

@@ -99,4 +99,4 @@ def gap_rows(tail: End, head: End, joins: Joins) -> Rows:
     yes, unknown = np.ones(rows, bool), np.full(rows, np.nan)
     number = np.repeat(np.arange(len(last)), 2)
     state = both("xy"), both("sigma"), np.zeros(rows), np.full((rows, 2), np.nan)
-    return Rows(number, both("t"), yes, ~yes, *state, *(unknown,) * 4)
+    return Rows(number, both("t"), yes, ~yes, *state, *(unknown,) * 4, np.full((rows, 4), np.nan))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.lengths import class_of
@@ -26,6 +27,8 @@ from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.tables import stamps, table
 from vidtrack.traffic.measures.trips import at_edge, trips_of
 from vidtrack.traffic.site import Site
+from vidtrack.traffic.vehicles.classes import named, named_by_length
+from vidtrack.traffic.vehicles.vehicles import Vehicles
 
 REACH_M, REACH_PX = 10.0, 100.0
 """How far from a gate distances are looked at: many times what positions are off."""
@@ -55,24 +58,45 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
     staying = Staying(outlines, metres=site.calibration is not None)
+    vehicles = Vehicles(grounds[sizes[0]])
     for rows in reader:
         for part in (passing, lives, staying):
             part.add(rows)
-    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
+        vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
+    return _Figures(day, site, gates, reader, passing.passed(), lives, staying, vehicles).measures()
 
 
 class _Figures:
     """All figures of a day, from what is left of its tracks."""
 
     def __init__(
-        self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives, staying: Staying
+        self,
+        day: Day,
+        site: Site,
+        gates: Gates,
+        reader: Reader,
+        passed: Passed,
+        lives: Lives,
+        staying: Staying,
+        vehicles: Vehicles,
     ) -> None:
         self.day, self.site, self.gates, self.staying = day, site, gates, staying
         self.metres = site.calibration is not None
         self.spans = day.spans
         self.session, self.track_id = reader.names
         tracks = len(self.track_id)
-        self.head, self.tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
+        self.head, self.tail = lives.head(tracks), lives.tail(tracks)
+        self.length = lives.length(tracks)
+        self.kind: list[str | None] = class_of(self.length, site.classes)
+        self.kind_probability = np.full(tracks, np.nan)
+        found = vehicles.fitted(tracks, passed.track, passed.t)
+        if found is not None:
+            speeds, kinds = found
+            passed = passed.with_speeds(speeds.speed, speeds.own, speeds.shared)
+            self.length = kinds.size[:, 0]
+            self.kind, self.kind_probability = (
+                named_by_length(kinds, site.classes) if site.classes else named(kinds)
+            )
         self.joins = self._joins(passed)
         self.vehicle = self.joins.vehicles(tracks)
         across = self._across()
@@ -170,7 +194,7 @@ class _Figures:
                 "direction": ("", direction),
                 "run": ("n", self.session[passed.track]),
                 "track_id": ("n", self.track_id[passed.track]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(passed.track),
                 "length_m": ("m", length),
                 "speed_kmh": ("km/h", 3.6 * passed.speed),
                 "speed_sigma_kmh": ("km/h", 3.6 * passed.speed_sigma),
@@ -202,7 +226,7 @@ class _Figures:
             {
                 "run": ("n", self.session[trips.vehicle]),
                 "track_id": ("n", self.track_id[trips.vehicle]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(trips.vehicle),
                 "length_m": ("m", length),
                 "entry_gate": ("", [names[g] for g in entry]),
                 "exit_gate": ("", [names[g] for g in exit_]),
@@ -248,13 +272,12 @@ class _Figures:
 
     def _stays(self) -> pa.Table:
         stays, names = self.staying.in_zones(self.vehicle), list(self.site.zones)
-        length = self.length[stays.vehicle]
         return table(
             {
                 "zone": ("", [names[zone] for zone in stays.zone.tolist()]),
                 "run": ("n", self.session[stays.vehicle]),
                 "track_id": ("n", self.track_id[stays.vehicle]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(stays.vehicle),
                 "begin_s": ("s", stays.begin),
                 "end_s": ("s", stays.end),
                 "begin_utc": ("utc", stamps(self.day.utc, stays.begin)),
@@ -301,6 +324,13 @@ class _Figures:
                 "vanished": ("n", found.vanished),
             }
         )
+
+    def _class_of(self, track: Ints) -> dict[str, tuple[str, Any]]:
+        """The classes of tracks, and how sure they are."""
+        return {
+            "class": ("", [self.kind[k] for k in track.tolist()]),
+            "class_probability": ("1", self.kind_probability[track]),
+        }
 
     def _when(self, times: int) -> dict[str, tuple[str, Any]]:
         """Begin, end and coverage of the intervals, all of them so many times."""

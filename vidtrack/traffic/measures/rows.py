@@ -31,8 +31,11 @@ _STATE = (
     *("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "sigma_vx_px_s", "sigma_vy_px_s"),
     *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *_BOX),
 )
+_EDGES = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
 """What is read of a run with metres."""
+_BORDER = 0.01
+"""Share of the picture's width; edges nearer to the border may be cut by it"""
 _NOT_SEEN = "coasting"
 
 
@@ -51,6 +54,8 @@ class Rows:
     v        (N, 2) its velocity, in the unit of xy per second
     speed_sigma, speed_shared   (N,) m/s; standard deviations of the speed on the road, own and by the calibration
     length, length_sigma   (N,) m
+    edge     (N, 4) px of the picture; left, top, right and lower edges that were seen of the vehicle alone; NaN where
+             the border cuts them, in runs of earlier versions, and without a calibration
     """
 
     track: Ints
@@ -65,6 +70,7 @@ class Rows:
     speed_shared: Floats
     length: Floats
     length_sigma: Floats
+    edge: Floats
 
     def __len__(self) -> int:
         return len(self.t)
@@ -85,12 +91,14 @@ _ROUGH_M = 1.0
 class Reader:
     """Reads the recordings of a day, one block after the other; numbers the tracks of all of them from 0.
 
-    grounds  by the size of the picture; None: positions stay in pixels, and there are no speeds
+    grounds  by the size of the picture; None: positions stay in pixels, and there are no speeds. Edges are in pixels of
+             the smallest
     """
 
     def __init__(self, day: Day, grounds: dict[tuple[int, int], Ground | None]) -> None:
         self._day = day
         self._grounds = grounds
+        self._size = min(grounds)
         self._numbers: dict[tuple[int, int], int] = {}
 
     @property
@@ -124,7 +132,7 @@ class Reader:
             sigma = np.hypot(column["sigma_x_px"], column["sigma_y_px"]) / np.sqrt(2)
             margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
-            return Rows(track, t, seen, merged, xy, sigma, margin, v, *(nothing for _ in range(4)))
+            return Rows(track, t, seen, merged, xy, sigma, margin, v, *(nothing,) * 4, np.full((len(t), 4), np.nan))
         if road is not None:
             column |= _stand(road, track, column)
         xy, sigma = _positions(ground, column)
@@ -133,7 +141,8 @@ class Reader:
         length = column["length_m"]
         margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
         sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
-        return Rows(track, t, seen, merged, xy, sigma, margin, v, *sigmas, length, column["length_sigma_m"])
+        edge = (_edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
+        return Rows(track, t, seen, merged, xy, sigma, margin, v, *sigmas, length, column["length_sigma_m"], edge)
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
         """(N,) numbers over the whole day."""
@@ -148,10 +157,11 @@ def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
+    edges = _EDGES if set(_EDGES) <= names else ()
     if set(_ROAD) <= names and _of_this_site(folder, ground):
-        return ROAD_COLUMNS
+        return *ROAD_COLUMNS, *edges
     _demand(folder, names, _STATE, "has no metres of this site, and they cannot be computed")
-    return *_ALWAYS, *_STATE
+    return *_ALWAYS, *_STATE, *edges
 
 
 def _demand(folder: Path, names: set[str], needed: tuple[str, ...], what: str) -> None:
@@ -170,6 +180,16 @@ def _of_this_site(folder: Path, ground: Ground) -> bool:
             held = (x > left) & (x < left + width) & (y > top + height / 4) & (y < top + height)
             return bool(np.mean(held[known]) > 1 / 2)
     return True
+
+
+def _edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
+    """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
+    if _EDGES[0] not in column:
+        return np.full((len(column["time_s"]), 4), np.nan)
+    edge = np.column_stack([column[name] for name in _EDGES])
+    limit = np.array([0, 0, *size]) + _BORDER * size[0] * np.array([1, 1, -1, -1])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where((edge > limit) == np.array([True, True, False, False]), edge, np.nan))
 
 
 def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Floats]:

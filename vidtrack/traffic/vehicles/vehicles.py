@@ -1,0 +1,128 @@
+"""All vehicles of a day: their rows go in one after the other, their speeds, sizes and classes come out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.vehicles.classes import Classified, classified
+from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
+from vidtrack.traffic.vehicles.knots import Knots, Knotting
+from vidtrack.traffic.vehicles.pieces import pieces
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Speeds:
+    """W speeds, NaN where they are not known: (W,) m/s, standard deviations of the own and of the shared error."""
+
+    speed: Floats
+    own: Floats
+    shared: Floats
+
+
+class Vehicles:
+    """Takes rows in order of time; None for the ground: nothing is known in metres."""
+
+    def __init__(self, ground: Ground | None) -> None:
+        self._ground = ground
+        self._knotting = Knotting()
+
+    def add(self, track: Ints, t: Floats, xy: Floats, edge: Floats) -> None:
+        """Look at rows: track (N,), t (N,) s, xy (N, 2) m, edge (N, 4) px left, top, right and lower edges seen."""
+        if self._ground is not None:
+            self._knotting.add(track, t, xy, edge)
+
+    def fitted(self, tracks: int, track: Ints, t: Floats) -> tuple[Speeds, Classified] | None:
+        """Speeds of tracks (W,) at times (W,) s, in order of tracks; classes and sizes of all; None without edges."""
+        if self._ground is None:
+            return None
+        knots = self._knotting.knots(tracks)
+        if len(knots.t) == 0:
+            return None
+        with np.errstate(invalid="ignore"):
+            place = self._ground.metres(self._ground.inside(_foot(knots.edge)))
+        sure = np.isfinite(place[:, 0])
+        return _fitted(self._ground, knots.only(sure), place[sure], track, t)
+
+
+def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats) -> tuple[Speeds, Classified]:
+    """As `fitted`; place (K, 2) m roughly of the knots. What is fitted is the piece of a track that a time lies in."""
+    first = pieces(ground, knots, place)
+    owner = np.searchsorted(knots.first, first[:-1], side="right") - 1
+    of_piece = _piece_of(knots, first, owner, track, t)
+    order = np.argsort(of_piece, kind="stable")
+    window_of = np.searchsorted(of_piece[order], np.arange(len(owner) + 1))
+    path, speed = np.empty((len(knots.t), 2)), np.full((len(t), 6), np.nan)
+    size, cov, misfit = np.empty((len(owner), SIZE)), np.empty((len(owner), SIZE, SIZE)), np.empty(len(owner))
+    pose = ground.pose()
+    up = np.zeros(3) if pose is None else pose.up
+    fit(
+        first, knots.t, _straight(ground, knots.edge), knots.rows, place, ground.homography, up,
+        window_of, np.repeat(t[order, None], 2, axis=1), path, size, cov, misfit, speed,
+    )  # fmt: skip
+    result = np.empty((3, len(t)))
+    result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
+    result[2, order] = _by_shared(ground, knots.t, path, speed)
+    return Speeds(*result), _classes(knots, first, owner, path, size, cov, misfit)
+
+
+def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats:
+    """(W,) m/s; standard deviation of speeds (W, 6) by the calibration: it moves the two ends of a step apart."""
+    sigma = np.full(len(speed), np.nan)
+    known = np.flatnonzero(np.isfinite(speed[:, 0]))
+    i, j = speed[known, 4].astype(int), speed[known, 5].astype(int)
+    apart = ground.by_shared_error(path[j]) - ground.by_shared_error(path[i])
+    along = np.einsum("wi,wik->wk", speed[known, 2:4], apart) / (t[j] - t[i])[:, None]
+    sigma[known] = np.linalg.norm(along, axis=1)
+    return sigma
+
+
+def _classes(
+    knots: Knots, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats
+) -> Classified:
+    """The classes of T tracks by the piece of each with most knots; NaN for those without a fit."""
+    tracks = len(knots.first) - 1
+    length = np.where(np.isfinite(misfit), np.diff(first), 0)
+    order = np.lexsort((length, owner))
+    last_of = np.flatnonzero(np.diff(owner[order], append=-1) != 0)
+    best = order[last_of]
+    best = best[length[best] > 0]
+    begin, end = first[best], first[best + 1] - 1
+    mean_speed = np.linalg.norm(path[end] - path[begin], axis=1) / (knots.t[end] - knots.t[begin])
+    known = np.diag(1 / SIGMA[:3] ** 2)
+    inverse = np.linalg.inv(cov[best, :3, :3])
+    told = (inverse - known) / misfit[best, None, None]
+    vector = (np.einsum("tij,tj->ti", inverse, size[best, :3]) - known @ MEAN[:3]) / misfit[best, None]
+    found = classified(told, vector, mean_speed)
+    result = [np.full((tracks, part.shape[1]), np.nan) for part in (found.probability, found.size, found.sigma)]
+    for whole, part in zip(result, (found.probability, found.size, found.sigma), strict=True):
+        whole[owner[best]] = part
+    return Classified(*result)
+
+
+def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) -> Ints:
+    """(W,) the piece of a track (W,) that a time (W,) lies in or after; len(owner) where there is none."""
+    begin = np.append(knots.t, np.inf)[first[:-1]]
+    day = 2 * (max(np.abs(knots.t).max(), np.abs(t).max(initial=0)) + 1)  # longer than all times
+    at = np.searchsorted(begin + day * owner, t + day * track, side="right") - 1
+    found = (at >= 0) & (owner[np.maximum(at, 0)] == track)
+    return np.where(found, at, len(owner))
+
+
+def _foot(edge: Floats) -> Floats:
+    """(N, 2) middles of the lower edges [px]; of one whose side the border cuts, its other corner."""
+    left, _, right, bottom = edge.T
+    return np.column_stack([(np.where(np.isnan(left), right, left) + np.where(np.isnan(right), left, right)) / 2, bottom])
+
+
+def _straight(ground: Ground, edge: Floats) -> Floats:
+    """(K, 4) edges without the lens's distortion, each at its middle."""
+    if ground.lens is None:
+        return edge
+    left, top, right, bottom = edge.T
+    x, y = (left + right) / 2, (top + bottom) / 2
+    points = ((left, y, 0), (x, top, 1), (right, y, 0), (x, bottom, 1))
+    return np.column_stack([ground.straight(np.column_stack([a, b]))[:, axis] for a, b, axis in points])
