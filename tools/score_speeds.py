@@ -33,7 +33,7 @@ from vidtrack.simulate.roads.write import write_road
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.site import read_site
 
-SECONDS, HEIGHT_M, FLOW = 9.0, 8.0, 1800.0
+SECONDS, HEIGHT_M, FLOW = 9.0, 8.0, 1200.0
 NEAR_M, FAR_M, PATH_M = 15.0, 60.0, 15.0
 GATE_M = 3.8  # half the length of the gate
 SLOWEST, FASTEST = 20.0, 80.0  # km/h

@@ -24,8 +24,8 @@ SIZE = 4
 MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 0.6, 1.2, 1.0])
 """The size as it is known beforehand."""
 LEAST = np.array([0.3, 0.3, 0.5, -5.0])
-_JOLT = 0.7
-"""m2/s3; by how much the variance of a velocity grows in a second: 1.2 m/s in two seconds"""
+_JOLT = 1.5
+"""m2/s3; by how much the variance of a velocity grows in a second"""
 _EDGE_PX, _ROW_PX = 0.4, 1.8
 """px; standard deviation of the edges of a knot, and that of one row which goes down with their number"""
 _SHAPE_M = np.array([0.10, 0.30, 0.10, 0.06])
@@ -38,9 +38,9 @@ _COARSE = (16.0, 8.0, 4.0, 2.0, 1.0, 1.0, 1.0)
 """Factors of the standard deviations in the rounds: edges that are far off lose their weight only when the path is known."""
 _HEADING_M = 4.0
 """m of path that a heading is taken from"""
-_LEAST_MISFIT = 0.1
+_LEAST_MISFIT = 0.05
 _BAND = 4
-LEAST_KNOTS, LEAST_PATH_M = 4, 3.0
+LEAST_KNOTS, LEAST_PATH_M = 3, 2.0
 
 
 @kernel(error_model="numpy")
@@ -93,6 +93,7 @@ def fit(
         cov[i] = np.linalg.inv(whole)
         quality[i] = max(misfit, _LEAST_MISFIT)
         if strange > _FAR_SHARE:
+            size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
             continue
         for w in range(window_of[i], window_of[i + 1]):
             _speed(t[a:b], path[a:b], window[w], band[:n], right[:n], cov[i], quality[i], speed[w])
@@ -193,7 +194,7 @@ def _normal(
                 for j in range(i + 1):
                     band[2 * (k - 1 + i) + axis, 2 * (i - j)] += w * c[i] * c[j]
                 right[2 * (k - 1 + i) + axis, SIZE] -= w * c[i] * bend
-    return total / max(count - len(t), 1), strange / max(count, 1)
+    return total / max(count, 1), strange / max(count, 1)
 
 
 @kernel(error_model="numpy")

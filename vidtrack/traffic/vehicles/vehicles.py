@@ -83,13 +83,12 @@ def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats
 def _classes(
     knots: Knots, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats
 ) -> Classified:
-    """The classes of T tracks by the piece of each with most knots; NaN for those without a fit."""
+    """The classes of T tracks by the piece of each that tells most; NaN for those without a fit."""
     tracks = len(knots.first) - 1
-    length = np.where(np.isfinite(misfit), np.diff(first), 0)
-    order = np.lexsort((length, owner))
-    last_of = np.flatnonzero(np.diff(owner[order], append=-1) != 0)
-    best = order[last_of]
-    best = best[length[best] > 0]
+    worth = np.nan_to_num(np.diff(first) / misfit)
+    order = np.lexsort((worth, owner))
+    best = order[np.diff(owner[order], append=-1) != 0]
+    best = best[worth[best] > 0]
     begin, end = first[best], first[best + 1] - 1
     mean_speed = np.linalg.norm(path[end] - path[begin], axis=1) / (knots.t[end] - knots.t[begin])
     known = np.diag(1 / SIGMA[:3] ** 2)
@@ -106,10 +105,9 @@ def _classes(
 def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) -> Ints:
     """(W,) the piece of a track (W,) that a time (W,) lies in or after; len(owner) where there is none."""
     begin = np.append(knots.t, np.inf)[first[:-1]]
-    day = 2 * (max(np.abs(knots.t).max(), np.abs(t).max(initial=0)) + 1)  # longer than all times
+    day = 2 * (max(np.abs(knots.t).max(initial=0), np.abs(t).max(initial=0)) + 1)  # longer than all times
     at = np.searchsorted(begin + day * owner, t + day * track, side="right") - 1
-    found = (at >= 0) & (owner[np.maximum(at, 0)] == track)
-    return np.where(found, at, len(owner))
+    return np.where(np.append(owner, -1)[at] == track, at, len(owner))
 
 
 def _foot(edge: Floats) -> Floats:
