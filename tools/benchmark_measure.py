@@ -114,15 +114,19 @@ def _rows(frame, who, start, speed, lane, length, rng) -> pa.Table:
         "heading_deg": np.round(90 + rng.standard_normal(count), 2),
         "length_m": np.round(length[who], 3),
         "length_sigma_m": noisy(0.4),
+        "seen_left_px": np.round(SCALE * (x - length[who] / 2), 3),
+        "seen_top_px": np.round(720 - SCALE * y - high / 2, 3),
+        "seen_right_px": np.round(SCALE * (x + length[who] / 2), 3),
+        "seen_bottom_px": np.round(720 - SCALE * y + high / 2, 3),
     }
     return pa.table(columns)
 
 
 def read(folder: Path) -> None:
     """Read the columns that figures need, and nothing else."""
-    from vidtrack.traffic.measures.rows import ROAD_COLUMNS, blocks
+    from vidtrack.traffic.measures.rows import EDGE_COLUMNS, ROAD_COLUMNS, blocks
 
-    for table in blocks(folder, ROAD_COLUMNS):
+    for table in blocks(folder, (*ROAD_COLUMNS, *EDGE_COLUMNS)):
         for name in table.column_names:
             table[name].combine_chunks()
 

@@ -27,34 +27,41 @@ from vidtrack.simulate.ground import ASPHALT, KERB
 from vidtrack.simulate.roads.clip import FPS, SIZE, RoadClip
 from vidtrack.simulate.roads.layout import EAST, LANE_M, MARK_M, GroundGate, Layout, at
 from vidtrack.simulate.roads.network import Network, Route, smooth
-from vidtrack.simulate.roads.pinhole import pinhole
+from vidtrack.simulate.roads.pinhole import Pinhole, pinhole
 from vidtrack.simulate.roads.traffic import drive
 from vidtrack.simulate.roads.write import write_road
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.site import read_site
 
 SECONDS, HEIGHT_M, FLOW = 9.0, 8.0, 1200.0
-NEAR_M, FAR_M, PATH_M = 15.0, 60.0, 15.0
+NEAR_M, FAR_M, PATH_M, LEAST_REACH_M = 15.0, 60.0, 15.0, 25.0
 GATE_M = 3.8  # half the length of the gate
 SLOWEST, FASTEST = 20.0, 80.0  # km/h
 TOLERANCE_S = 1.0
 HEAVY = ("lorry", "bus")
 
 
+def shown(eye: Pinhole, aside: float) -> np.ndarray:
+    """(N,) m along the road where the camera shows both of its edges, 15 to 60 m away (12 m: vehicles are long)."""
+    x = np.arange(0, 80, 0.5)
+    edges = [eye.shows(np.column_stack([x, np.full(len(x), side)]), SIZE) for side in (-GATE_M, GATE_M)]
+    away = np.hypot(x, aside)
+    return x[edges[0] & edges[1] & (away > NEAR_M - 3) & (away < FAR_M)]
+
+
 def drawn(seed: int) -> RoadClip:
     """A site and its traffic; the road runs east, the camera stands south of it and looks along it."""
     rng, traffic_rng, camera_rng = np.random.default_rng(seed).spawn(3)
-    view, azimuth, aside = np.radians(rng.uniform(50, 70)), np.radians(rng.uniform(8, 45)), rng.uniform(5, 12)
-    tilt = np.radians(rng.uniform(13, 19))
-    away = HEIGHT_M / np.tan(tilt)
-    aim = away * np.cos(azimuth), away * np.sin(azimuth) - aside
-    eye = pinhole(aim, azimuth, tilt, HEIGHT_M, SIZE, view, 0.0)
+    reach = np.zeros(0)
+    while len(reach) == 0 or np.ptp(reach) < LEAST_REACH_M:
+        view, azimuth, aside = np.radians(rng.uniform(50, 70)), np.radians(rng.uniform(8, 45)), rng.uniform(5, 12)
+        tilt = np.radians(rng.uniform(13, 19))
+        away = HEIGHT_M / np.tan(tilt)
+        aim = away * np.cos(azimuth), away * np.sin(azimuth) - aside
+        eye = pinhole(aim, azimuth, tilt, HEIGHT_M, SIZE, view, 0.0)
+        reach = shown(eye, aside)
+    begin, end = reach[0], reach[-1]
     far, y = 150.0, LANE_M / 2
-    x = np.arange(0, 80, 0.5)
-    edges = [eye.shows(np.column_stack([x, np.full(len(x), side)]), SIZE) for side in (-GATE_M, GATE_M)]
-    reach = np.hypot(x, aside)
-    x = x[edges[0] & edges[1] & (reach > NEAR_M - 3) & (reach < FAR_M)]
-    begin, end = x[0], x[-1]
     gate_x = rng.uniform(begin + 0.25 * (end - begin), begin + 0.75 * (end - begin))
     limits = rng.uniform(25, 75, 2) / 3.6
     lanes = [

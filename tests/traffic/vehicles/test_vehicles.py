@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from driven import BIKE, CAR, GROUND, LORRY, VAN, WALKER, arc, edges_of, straight
+from driven import BIKE, CAMERA, CAR, GROUND, LORRY, VAN, WALKER, arc, edges_of, straight
+from pinhole import POINTS, site_of
 
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.vehicles.classes import UNKNOWN, named, named_by_length
 from vidtrack.traffic.vehicles.vehicles import Vehicles
 
@@ -22,7 +24,8 @@ def fitted(parts, at, track=0, noise=0.0, seed=0):
     edge = np.concatenate([edges_of(part[1], part[2], part[3]) for part in parts])
     edge += noise * rng.standard_normal(edge.shape)
     vehicles.add(np.full(len(t), track), t, xy, edge)
-    return vehicles.fitted(track + 1, np.full(len(at), track), np.asarray(at, float))
+    found = vehicles.fitted(track + 1, np.full(len(at), track), np.asarray(at, float))
+    return found.speeds, found.classes
 
 
 @pytest.mark.parametrize("name", DRIVES)
@@ -30,7 +33,7 @@ def test_speed_and_size_of_exact_boxes(name):
     t, xy, heading = DRIVES[name]
     speed = np.linalg.norm(xy[1] - xy[0]) * 25
     speeds, classes = fitted([(t, xy, heading, CAR)], [t.mean()])
-    assert speeds.speed[0] == pytest.approx(speed, rel=0.015)
+    assert speeds.speed[0] == pytest.approx(speed, rel=0.02)
     assert classes.size[0] == pytest.approx(CAR, abs=0.5)
     assert named(classes)[0] == ["car"]
 
@@ -81,6 +84,32 @@ def test_a_track_that_goes_over_to_another_vehicle_has_the_speeds_of_both():
     parts = [(t, xy, heading, CAR), (later[0] + t[-1] + 0.04, *later[1:], CAR)]
     speeds, _ = fitted(parts, [1.2, t[-1] + 1.0])
     assert speeds.speed == pytest.approx([12.0, 8.0], rel=0.03)
+
+
+def traffic(ground):
+    """A dozen cars and vans that drive through the pictures of CAMERA, on another ground."""
+    vehicles, (t, xy, heading) = Vehicles(ground), DRIVES["across"]
+    for track in range(14):
+        size = np.array(VAN if track % 5 == 4 else CAR) * (1 + 0.01 * (track % 3 - 1))
+        edge = edges_of(xy + [0.0, 0.3 * track], heading, size)
+        vehicles.add(np.full(len(t), track), t + 3.0 * track, ground.metres(edge[:, [0, 3]]), edge)
+    return vehicles.fitted(14, np.zeros(0, int), np.zeros(0))
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.3, 3.28])
+def test_sizes_of_the_traffic_tell_a_wrong_scale(factor):
+    ground = calibrated(site_of(CAMERA.picture(POINTS), POINTS * factor, sigma_picture_px=0.5))
+    scale = traffic(ground).scale
+    assert scale.vehicles == 14
+    assert scale.factor == pytest.approx(factor, rel=0.1)
+    assert scale.off == (factor != 1.0)
+
+
+def test_a_few_vehicles_say_nothing_about_the_scale():
+    t, xy, heading = DRIVES["away"]
+    vehicles = Vehicles(GROUND)
+    vehicles.add(np.zeros(len(t), int), t, xy, edges_of(xy, heading, CAR))
+    assert vehicles.fitted(1, np.zeros(0, int), np.zeros(0)).scale is None
 
 
 def test_nothing_is_said_of_boxes_that_are_of_no_vehicle_or_too_few_or_outside_the_points():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -90,13 +91,12 @@ class _Figures:
         self.kind: list[str | None] = class_of(self.length, site.classes)
         self.kind_probability = np.full(tracks, np.nan)
         found = vehicles.fitted(tracks, passed.track, passed.t)
+        self.scale = None if found is None else found.scale
         if found is not None:
-            speeds, kinds = found
-            passed = passed.with_speeds(speeds.speed, speeds.own, speeds.shared)
-            self.length = kinds.size[:, 0]
-            self.kind, self.kind_probability = (
-                named_by_length(kinds, site.classes) if site.classes else named(kinds)
-            )
+            passed = passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
+            self.length = found.classes.size[:, 0]
+            by = partial(named_by_length, bounds=site.classes) if site.classes else named
+            self.kind, self.kind_probability = by(found.classes)
         self.joins = self._joins(passed)
         self.vehicle = self.joins.vehicles(tracks)
         across = self._across()
@@ -153,6 +153,7 @@ class _Figures:
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
+            "scale": None if self.scale is None else self.scale.told(),
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }

@@ -31,9 +31,9 @@ _STATE = (
     *("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "sigma_vx_px_s", "sigma_vy_px_s"),
     *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *_BOX),
 )
-_EDGES = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
+EDGE_COLUMNS = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
-"""What is read of a run with metres."""
+"""What is read of a run with metres, besides the edges."""
 _BORDER = 0.01
 """Share of the picture's width; edges nearer to the border may be cut by it"""
 _NOT_SEEN = "coasting"
@@ -157,7 +157,7 @@ def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
-    edges = _EDGES if set(_EDGES) <= names else ()
+    edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= names else ()
     if set(_ROAD) <= names and _of_this_site(folder, ground):
         return *ROAD_COLUMNS, *edges
     _demand(folder, names, _STATE, "has no metres of this site, and they cannot be computed")
@@ -184,9 +184,9 @@ def _of_this_site(folder: Path, ground: Ground) -> bool:
 
 def _edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
     """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
-    if _EDGES[0] not in column:
+    if EDGE_COLUMNS[0] not in column:
         return np.full((len(column["time_s"]), 4), np.nan)
-    edge = np.column_stack([column[name] for name in _EDGES])
+    edge = np.column_stack([column[name] for name in EDGE_COLUMNS])
     limit = np.array([0, 0, *size]) + _BORDER * size[0] * np.array([1, 1, -1, -1])
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where((edge > limit) == np.array([True, True, False, False]), edge, np.nan))

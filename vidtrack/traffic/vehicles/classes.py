@@ -74,24 +74,28 @@ def classified(information: Floats, vector: Floats, speed: Floats) -> Classified
 
     information (T, 3, 3) A, vector (T, 3) b; speed (T,) m/s
     """
-    logs, sizes, covs = [], [], []
-    for kind in KINDS:
-        prior = np.diag(1 / np.square(kind.sigma))
-        cov = np.linalg.inv(information + prior)
-        b = vector + prior @ kind.mean
-        size = np.einsum("tij,tj->ti", cov, b)
-        log = np.log(kind.share) + np.einsum("ti,ti->t", b, size) / 2 - prior @ kind.mean @ kind.mean / 2
-        log += (np.linalg.slogdet(cov)[1] + np.linalg.slogdet(prior)[1]) / 2
-        if kind.speed is None:
-            log -= np.log(_FASTEST)
-        else:
-            mean, sigma = kind.speed
-            log -= ((speed - mean) / sigma) ** 2 / 2 + np.log(np.sqrt(2 * np.pi) * sigma)
-        logs.append(log)
-        sizes.append(size)
-        covs.append(np.diagonal(cov, axis1=1, axis2=2))
+    logs, sizes, variances = zip(*(evidence(kind, information, vector, speed) for kind in KINDS), strict=True)
     probability = np.exp(np.array(logs) - np.max(logs, axis=0))
     probability /= probability.sum(axis=0)
     size = np.einsum("kt,kti->ti", probability, sizes)
-    square = np.einsum("kt,kti->ti", probability, np.array(covs) + np.square(sizes))
+    square = np.einsum("kt,kti->ti", probability, np.array(variances) + np.square(sizes))
     return Classified(probability[:-1].T, size, np.sqrt(np.maximum(square - size**2, 0)))
+
+
+def evidence(kind: Kind, information: Floats, vector: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
+    """(T,) logarithm of share and likelihood of a kind, (T, 3) the sizes if it is this kind, and their variances.
+
+    The integral of the normal density of the kind's sizes times exp(-s' A s / 2 + b' s).
+    """
+    mean, prior = np.array(kind.mean), np.diag(1 / np.square(kind.sigma))
+    cov = np.linalg.inv(information + prior)
+    b = vector + prior @ mean
+    size = np.einsum("tij,tj->ti", cov, b)
+    log = np.log(kind.share) + (np.einsum("ti,ti->t", b, size) - mean @ prior @ mean) / 2
+    log += (np.linalg.slogdet(cov)[1] + np.linalg.slogdet(prior)[1]) / 2
+    if kind.speed is None:
+        log -= np.log(_FASTEST)
+    else:
+        walk, sigma = kind.speed
+        log -= ((speed - walk) / sigma) ** 2 / 2 + np.log(np.sqrt(2 * np.pi) * sigma)
+    return log, size, np.diagonal(cov, axis1=1, axis2=2)

@@ -21,10 +21,10 @@ from vidtrack.traffic.vehicles.cuboid import box_edges
 
 SIZE = 4
 """Length, width, height [m], rim [px]."""
-MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 0.6, 1.2, 1.0])
+MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 1.0, 1.2, 1.0])
 """The size as it is known beforehand."""
 LEAST = np.array([0.3, 0.3, 0.5, -5.0])
-_JOLT = 1.5
+_JOLT = 1.0
 """m2/s3; by how much the variance of a velocity grows in a second"""
 _EDGE_PX, _ROW_PX = 0.4, 1.8
 """px; standard deviation of the edges of a knot, and that of one row which goes down with their number"""
@@ -34,7 +34,7 @@ _FREEDOM = 4.0
 """of Student's t"""
 _FAR, _FAR_SHARE = 3.0, 0.2
 """Standard deviations by which an edge is far off; where more than a share are, the track is not of one vehicle."""
-_COARSE = (16.0, 8.0, 4.0, 2.0, 1.0, 1.0, 1.0)
+_COARSE = (10.0, 3.0, 1.0, 1.0, 1.0)
 """Factors of the standard deviations in the rounds: edges that are far off lose their weight only when the path is known."""
 _HEADING_M = 4.0
 """m of path that a heading is taken from"""
@@ -61,7 +61,8 @@ def fit(
     for i in range(len(first) - 1):
         most = max(most, first[i + 1] - first[i])
     band, right = np.empty((2 * most, _BAND + 1)), np.empty((2 * most, SIZE + 1))
-    heading, whole, rest = np.empty((most, 2)), np.empty((SIZE, SIZE)), np.empty(SIZE)
+    coupling, heading = np.empty((2 * most, SIZE)), np.empty((most, 2))
+    whole, rest = np.empty((SIZE, SIZE)), np.empty(SIZE)
     for i in range(len(first) - 1):
         a, b = first[i], first[i + 1]
         size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
@@ -77,10 +78,10 @@ def fit(
             _headings(path[a:b], heading)
             misfit, strange = _normal(t[a:b], edge[a:b], rows[a:b], path[a:b], heading, size[i], G, up, coarse,
                                       band[:n], right[:n], whole, rest)  # fmt: skip
+            coupling[:n] = right[:n, :SIZE]
             _factor(band[:n])
             _solve(band[:n], right[:n])
-            _eliminate(t[a:b], edge[a:b], rows[a:b], path[a:b], heading, size[i], G, up, coarse, right[:n], whole,
-                       rest)  # fmt: skip
+            _eliminate(coupling[:n], right[:n], whole, rest)
             step = np.linalg.solve(whole, rest)
             for s in range(SIZE):
                 size[i, s] = max(size[i, s] + step[s], LEAST[s])
@@ -231,23 +232,13 @@ def _solve(band: Floats, right: Floats) -> None:
 
 
 @kernel(error_model="numpy")
-def _eliminate(
-    t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
-    coarse: float, solved: Floats, whole: Floats, rest: Floats,
-) -> None:  # fmt: skip
-    """Take the path out of the size's equations (Schur complement); solved (2 K, SIZE + 1) is from `_solve`."""
-    state, model, by_state = np.empty(5), np.empty(4), np.zeros((4, 5))
-    residual, by_size, weight = np.zeros(4), np.zeros((4, SIZE)), np.zeros(4)
-    for k in range(len(t)):
-        _residuals(edge[k], rows[k], path[k], heading[k], size, G, up, coarse, state, model, by_state, residual,
-                   by_size, weight)  # fmt: skip
-        for side in range(4):
-            for i in range(2):
-                wi = weight[side] * by_state[side, i]
-                for s in range(SIZE):
-                    for r in range(SIZE):
-                        whole[s, r] -= wi * by_size[side, s] * solved[2 * k + i, r]
-                    rest[s] -= wi * by_size[side, s] * solved[2 * k + i, SIZE]
+def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) -> None:
+    """Take the path out of the size's equations (Schur complement): coupling (2 K, SIZE), solved (2 K, SIZE + 1)."""
+    for k in range(len(coupling)):
+        for s in range(SIZE):
+            for r in range(SIZE):
+                whole[s, r] -= coupling[k, s] * solved[k, r]
+            rest[s] -= coupling[k, s] * solved[k, SIZE]
 
 
 @kernel(error_model="numpy")

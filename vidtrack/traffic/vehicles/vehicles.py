@@ -12,6 +12,7 @@ from vidtrack.traffic.vehicles.classes import Classified, classified
 from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
 from vidtrack.traffic.vehicles.knots import Knots, Knotting
 from vidtrack.traffic.vehicles.pieces import pieces
+from vidtrack.traffic.vehicles.scale import Scale, scale_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,6 +22,15 @@ class Speeds:
     speed: Floats
     own: Floats
     shared: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """What T tracks tell: speeds that were asked for, classes, NaN where there is no fit, and the calibration's scale."""
+
+    speeds: Speeds
+    classes: Classified
+    scale: Scale | None
 
 
 class Vehicles:
@@ -35,8 +45,8 @@ class Vehicles:
         if self._ground is not None:
             self._knotting.add(track, t, xy, edge)
 
-    def fitted(self, tracks: int, track: Ints, t: Floats) -> tuple[Speeds, Classified] | None:
-        """Speeds of tracks (W,) at times (W,) s, in order of tracks; classes and sizes of all; None without edges."""
+    def fitted(self, tracks: int, track: Ints, t: Floats) -> Fitted | None:
+        """Speeds of tracks (W,) at times (W,) s, and the classes of all `tracks`; None without edges."""
         if self._ground is None:
             return None
         knots = self._knotting.knots(tracks)
@@ -48,7 +58,7 @@ class Vehicles:
         return _fitted(self._ground, knots.only(sure), place[sure], track, t)
 
 
-def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats) -> tuple[Speeds, Classified]:
+def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats) -> Fitted:
     """As `fitted`; place (K, 2) m roughly of the knots. What is fitted is the piece of a track that a time lies in."""
     first = pieces(ground, knots, place)
     owner = np.searchsorted(knots.first, first[:-1], side="right") - 1
@@ -66,7 +76,7 @@ def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats)
     result = np.empty((3, len(t)))
     result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
     result[2, order] = _by_shared(ground, knots.t, path, speed)
-    return Speeds(*result), _classes(knots, first, owner, path, size, cov, misfit)
+    return Fitted(Speeds(*result), *_classes(knots, first, owner, path, size, cov, misfit))
 
 
 def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats:
@@ -82,8 +92,8 @@ def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats
 
 def _classes(
     knots: Knots, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats
-) -> Classified:
-    """The classes of T tracks by the piece of each that tells most; NaN for those without a fit."""
+) -> tuple[Classified, Scale | None]:
+    """The classes of T tracks by the piece of each that tells most, NaN for those without a fit; the scale by them."""
     tracks = len(knots.first) - 1
     worth = np.nan_to_num(np.diff(first) / misfit)
     order = np.lexsort((worth, owner))
@@ -99,7 +109,7 @@ def _classes(
     result = [np.full((tracks, part.shape[1]), np.nan) for part in (found.probability, found.size, found.sigma)]
     for whole, part in zip(result, (found.probability, found.size, found.sigma), strict=True):
         whole[owner[best]] = part
-    return Classified(*result)
+    return Classified(*result), scale_of(told, vector, mean_speed)
 
 
 def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) -> Ints:
