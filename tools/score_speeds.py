@@ -4,8 +4,9 @@
 
 Each site has a straight road of two lanes before a camera 8 m high (1280x720, 25 frames/s, horizontal view 50 to 70
 degrees), 8 calibration points with errors of 1 px, one gate, and vehicles of 20 to 80 km/h. The clip is tracked and
-measured as a user would do it (`vidtrack track --site`, `vidtrack measure`). A crossing counts where the vehicle is whole
-in the picture, 15 to 60 m away, over at least 15 m of path around the gate. Finished sites in DIR are not drawn again.
+measured as a user would do it (`vidtrack track --site`, `vidtrack measure`). A crossing counts where the vehicle is
+whole in the picture, 15 to 60 m away, over at least 15 m of path around the gate. Finished sites in DIR are not drawn
+again.
 """
 
 from __future__ import annotations
@@ -75,9 +76,7 @@ def drawn(seed: int) -> RoadClip:
     )
     survey = [(a, b) for a in np.linspace(begin, end, 4) for b in (-3.75, 3.75)]
     gates = {"gate": GroundGate(at((gate_x, -GATE_M), (gate_x, GATE_M)), "road", "neutral")}
-    layout = Layout(
-        Network(lanes), ground, gates, {}, {}, np.array(survey), aim, azimuth, tilt, flow=FLOW, warm_s=60.0
-    )
+    layout = Layout(Network(lanes), ground, gates, {}, {}, np.array(survey), aim, azimuth, tilt, flow=FLOW, warm_s=60.0)
     times = np.arange(round(SECONDS * FPS)) / FPS
     history, fleet = drive(layout.network, FLOW, -layout.warm_s, float(times[-1]), traffic_rng)
     picture = camera(SIZE, SIZE, times, camera_rng, noise=2.0, shake=0.0, light_steps=0)
@@ -103,8 +102,8 @@ def make(folder: Path, seed: int) -> None:
 
 @dataclass(frozen=True)
 class Passing:
-    """A vehicle at the gate: true and measured speed [km/h], standard deviations own and shared, true and measured class,
-    length [m]; NaN and "" where nothing was found or stated."""
+    """A vehicle at the gate: true and measured speed [km/h], standard deviations own and shared, true and measured
+    class, true and measured length [m]; NaN and "" where nothing was found or stated."""
 
     true: float
     speed: float
@@ -175,8 +174,8 @@ def told(sites: list[list[Passing]]) -> None:
     print(f"{len(sites)} sites, {len(rows)} vehicles, {len(found)} found, {len(pooled)} with a speed")
     print(
         f"speed: mean absolute error {np.abs(error).mean():.2f} km/h, median {np.median(np.abs(error)):.2f}, "
-        f"95 % {np.quantile(np.abs(error), 0.95):.2f}, largest {np.abs(error).max():.1f}; mean error {error.mean():+.2f}; "
-        f"within 95 % interval {inside.mean():.3f}; median sigma {np.median(sigma):.2f}"
+        f"95 % {np.quantile(np.abs(error), 0.95):.2f}, largest {np.abs(error).max():.1f}; "
+        f"mean error {error.mean():+.2f}; within 95 % interval {inside.mean():.3f}; median sigma {np.median(sigma):.2f}"
     )
     print(f"mean absolute errors of sites: median {np.median(means):.2f}, 90 % {np.quantile(means, 0.9):.2f}")
     known = [row for row in found if row.found != "unknown"]
@@ -189,7 +188,8 @@ def told(sites: list[list[Passing]]) -> None:
     table = Counter((row.kind, row.found) for row in found)
     print("true class: measured as")
     for kind in sorted({kind for kind, _ in table}):
-        print(f"  {kind}: " + ", ".join(f"{name} {count}" for (one, name), count in sorted(table.items()) if one == kind))
+        counts = (f"{name} {count}" for (one, name), count in sorted(table.items()) if one == kind)
+        print(f"  {kind}: {', '.join(counts)}")
 
 
 def main() -> None:

@@ -3,9 +3,9 @@
     python tools/score_walkers.py pets09 -o DIR
 
 The folder has video.avi (7 frames/s) and gt.txt, whose columns 8 and 9 are metres. The site is calibrated by a dozen of
-its rows, the middles of the boxes' lower edges. The video is tracked (`vidtrack track --fps 7 --site`); a row of a track
-is of the walker whose box has the largest intersection over union with its own, at least 0.5. Speeds are asked for every
-second, and compared with the truth's over two seconds.
+its rows, the middles of the boxes' lower edges. The video is tracked (`vidtrack track --fps 7 --site`); a row of a
+track is of the walker whose box has the largest intersection over union with its own, at least 0.5. Speeds are asked
+for every second, and compared with the truth's over two seconds.
 """
 
 from __future__ import annotations

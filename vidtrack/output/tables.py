@@ -135,8 +135,8 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
     """
     counts = [len(step.tracks) for step in steps]
     position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
-    on_road = {} if road is None else _road_values(steps, road)
     seen = np.concatenate([step.seen for step in steps])
+    on_road = {} if road is None else _road_values(steps, seen, road)
     steps = [step.in_picture() for step in steps]
     x, P, box = (stacked(steps, name) for name in ("x", "P", "box"))
     cov = P[:, position][:, :, position]
@@ -166,11 +166,14 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
     return pa.Table.from_arrays([_array(c, values[c.name]) for c in columns], schema=schema(columns))
 
 
-def _road_values(steps: Sequence[Step], road: Footprints) -> dict[str, Floats]:
-    """The values of ROAD, all (N,)."""
+def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[str, Floats]:
+    """The values of ROAD, all (N,); edge (N, 4) px that were seen."""
+    from vidtrack.traffic.footprint import Seen
+
+    t = np.repeat([step.time_s for step in steps], [len(step.tracks) for step in steps])
     plane = [*steps[0].tracks.position[:2], *steps[0].tracks.velocity[:2]]
     x, P = stacked(steps, "x")[:, plane], stacked(steps, "P")[:, plane][:, :, plane]
-    stand = road.place(stacked(steps, "id"), x[:, :2], x[:, 2:], P, stacked(steps, "box"))
+    stand = road.place(stacked(steps, "id"), x[:, :2], x[:, 2:], P, stacked(steps, "box"), Seen(t, edge))
     sigma = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     shared = np.linalg.norm(stand.xy_shared, axis=2)
     return {

@@ -91,7 +91,7 @@ def traffic(ground):
     vehicles, (t, xy, heading) = Vehicles(ground), DRIVES["across"]
     for track in range(14):
         size = np.array(VAN if track % 5 == 4 else CAR) * (1 + 0.01 * (track % 3 - 1))
-        edge = edges_of(xy + [0.0, 0.3 * track], heading, size)
+        edge = edges_of(xy + np.array([0.0, 0.3 * track]), heading, size)
         vehicles.add(np.full(len(t), track), t + 3.0 * track, ground.metres(edge[:, [0, 3]]), edge)
     return vehicles.fitted(14, np.zeros(0, int), np.zeros(0))
 
@@ -118,7 +118,7 @@ def test_nothing_is_said_of_boxes_that_are_of_no_vehicle_or_too_few_or_outside_t
     assert np.isnan(speeds.speed).all()
     assert named(classes)[0] == [UNKNOWN]
     assert np.isnan(fitted([(t[:8], xy[:8], heading[:8], CAR)], [t[4]])[0].speed).all()
-    assert np.isnan(fitted([(t, xy + [30.0, 0.0], heading, CAR)], [t.mean()])[0].speed).all()
+    assert np.isnan(fitted([(t, xy + np.array([30.0, 0.0]), heading, CAR)], [t.mean()])[0].speed).all()
     assert np.isnan(fitted([(t, xy, heading, CAR)], [t[-1] + 1.0])[0].speed).all()
 
 

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, footprint
+from vidtrack.traffic.footprint import Footprints, Seen, footprint
 from vidtrack.traffic.measures.runs import Day, Recording
 
 BLOCK = 1 << 18
@@ -219,7 +219,10 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str
         corr[:, i, j] = corr[:, j, i] = column[f"corr_{name}"]
     P = corr * sigma[:, :, None] * sigma[:, None, :]
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
-    stand = road.place(track, xy, u, P, np.column_stack([column[name] for name in _BOX]))
+    box = np.column_stack([column[name] for name in _BOX])
+    edge = [column[name] for name in EDGE_COLUMNS if name in column]
+    seen = Seen(column["time_s"], np.column_stack(edge)) if edge else None
+    stand = road.place(track, xy, u, P, box, seen)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],

@@ -38,8 +38,8 @@ KINDS = (
     Kind(0.08, (10.0, 2.5, 3.2), (3.5, 0.25, 0.4)),
     Kind(0.02, (4.0, 2.0, 2.0), (4.0, 1.5, 1.5)),
 )
-"""Of CLASSES, and last of what is none of them, as two vehicles in one blob. A cuboid around a car is lower than the car,
-since roofs are narrower than bodies; sizes have the errors of the fit's shape."""
+"""Of CLASSES, and last of what is none of them, as two vehicles in one blob. A cuboid around a car is lower than the
+car, since roofs are narrower than bodies; the standard deviations hold what cuboids are off by."""
 _FASTEST = 40.0
 """m/s; up to which any speed is as likely where a kind has none"""
 

@@ -20,10 +20,10 @@ from vidtrack.compiled import kernel
 from vidtrack.traffic.vehicles.cuboid import box_edges
 
 SIZE = 4
-"""Length, width, height [m], rim [px]."""
+"""Numbers of the whole track: length, width, height [m], and by how much the boxes are too wide [px]."""
 MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 1.0, 1.2, 1.0])
 """The size as it is known beforehand."""
-LEAST = np.array([0.3, 0.3, 0.5, -5.0])
+_LEAST = np.array([0.3, 0.3, 0.5, -5.0])
 _JOLT = 1.0
 """m2/s3; by how much the variance of a velocity grows in a second"""
 _EDGE_PX, _ROW_PX = 0.4, 1.8
@@ -35,27 +35,29 @@ _FREEDOM = 4.0
 _FAR, _FAR_SHARE = 3.0, 0.2
 """Standard deviations by which an edge is far off; where more than a share are, the track is not of one vehicle."""
 _COARSE = (10.0, 3.0, 1.0, 1.0, 1.0)
-"""Factors of the standard deviations in the rounds: edges that are far off lose their weight only when the path is known."""
+"""Factors of the standard deviations in the rounds: what is far off loses its weight only when the path is known."""
 _HEADING_M = 4.0
 """m of path that a heading is taken from"""
 _LEAST_MISFIT = 0.05
+"""Of noise as it is stated above: it is not taken to be less, however well a short track fits."""
 _BAND = 4
+"""Places beside the diagonal of the normal matrix, for two coordinates and two neighbours"""
 LEAST_KNOTS, LEAST_PATH_M = 3, 2.0
 
 
 @kernel(error_model="numpy")
 def fit(
     first: Ints, t: Floats, edge: Floats, rows: Floats, start: Floats, G: Floats, up: Floats,
-    window_of: Ints, window: Floats, path: Floats, size: Floats, cov: Floats, quality: Floats, speed: Floats,
+    asked_of: Ints, asked: Floats, path: Floats, size: Floats, cov: Floats, quality: Floats, speed: Floats,
 ) -> None:  # fmt: skip
     """Fit T tracks of K knots.
 
     first (T + 1,), t (K,), edge (K, 4), rows (K,) as in `Knots`, edges straightened; start (K, 2) m rough places
     G (3, 3), up (3,) as in `cuboid`
-    window_of (T + 1,) where the windows of each track begin; window (W, 2) s between which speeds are wanted
+    asked_of (T + 1,) where the times of each track begin among those at which speeds are asked for, asked (W,) s
 
     Writes path (K, 2), size (T, SIZE), cov (T, SIZE, SIZE), NaN for those that are too short; speed (W, 6): metres per
-    second and standard deviation, the velocity's direction (2,), the two knots around the window's middle.
+    second and standard deviation, the velocity's direction (2,), the numbers of the two knots around that time.
     """
     most = 0
     for i in range(len(first) - 1):
@@ -66,7 +68,7 @@ def fit(
     for i in range(len(first) - 1):
         a, b = first[i], first[i + 1]
         size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
-        speed[window_of[i] : window_of[i + 1]] = np.nan
+        speed[asked_of[i] : asked_of[i + 1]] = np.nan
         path[a:b] = start[a:b]
         driven = np.hypot(start[b - 1, 0] - start[a, 0], start[b - 1, 1] - start[a, 1]) if b > a else 0.0
         if b - a < LEAST_KNOTS or not driven > LEAST_PATH_M:
@@ -82,9 +84,8 @@ def fit(
             _factor(band[:n])
             _solve(band[:n], right[:n])
             _eliminate(coupling[:n], right[:n], whole, rest)
-            step = np.linalg.solve(whole, rest)
-            for s in range(SIZE):
-                size[i, s] = max(size[i, s] + step[s], LEAST[s])
+            step = np.maximum(np.linalg.solve(whole, rest), _LEAST - size[i])
+            size[i] += step
             for k in range(b - a):
                 for axis in range(2):
                     change = right[2 * k + axis, SIZE]
@@ -96,8 +97,8 @@ def fit(
         if strange > _FAR_SHARE:
             size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
             continue
-        for w in range(window_of[i], window_of[i + 1]):
-            _speed(t[a:b], path[a:b], window[w], band[:n], right[:n], cov[i], quality[i], speed[w])
+        for w in range(asked_of[i], asked_of[i + 1]):
+            _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], cov[i], quality[i], speed[w])
             speed[w, 4] += a
             speed[w, 5] += a
 
@@ -153,9 +154,10 @@ def _normal(
     t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
     coarse: float, band: Floats, right: Floats, whole: Floats, rest: Floats,
 ) -> tuple[float, float]:  # fmt: skip
-    """Write the normal equations: of the path, band (2 K, _BAND + 1), its coupling to the size and its right side, right
-    (2 K, SIZE + 1); of the size, whole (SIZE, SIZE) and rest (SIZE,). Returns the misfit, 1 where the noise is as
-    stated, and the share of edges that are far off.
+    """Write the normal equations: of the path band (2 K, _BAND + 1) and, with its coupling to the size and its right
+    side, right (2 K, SIZE + 1); of the size whole (SIZE, SIZE) and rest (SIZE,).
+
+    Returns the misfit, 1 where the noise is as stated, and the share of edges that are far off.
     """
     band[:], right[:], whole[:], rest[:] = 0.0, 0.0, 0.0, 0.0
     state, model, by_state = np.empty(5), np.empty(4), np.zeros((4, 5))
@@ -243,14 +245,14 @@ def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) ->
 
 @kernel(error_model="numpy")
 def _speed(
-    t: Floats, path: Floats, window: Floats, band: Floats, right: Floats, cov: Floats, misfit: float, speed: Floats
+    t: Floats, path: Floats, asked: float, band: Floats, right: Floats, cov: Floats, misfit: float, speed: Floats
 ) -> None:
-    """Write the mean speed over a window and its error (6,)."""
+    """Write the slope of the path at a time, and its error (6,)."""
     last = len(t) - 1
-    if window[1] < t[0] or window[0] > t[last]:
+    if not t[0] <= asked <= t[last]:
         return
-    i = min(max(np.searchsorted(t, window[0]) - 1, 0), last - 1)
-    j = min(max(np.searchsorted(t, window[1]), i + 1), last)
+    j = max(np.searchsorted(t, asked), 1)
+    i = j - 1
     h = t[j] - t[i]
     vx, vy = (path[j, 0] - path[i, 0]) / h, (path[j, 1] - path[i, 1]) / h
     v = np.hypot(vx, vy)

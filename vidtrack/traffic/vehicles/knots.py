@@ -85,9 +85,11 @@ def _gather(track: Ints, t: Floats, xy: Floats, edge: Floats, open_: Floats, who
         if np.isnan(edge[i, 3]) or np.isnan(xy[i, 0]):
             continue
         knot = open_[track[i]]
-        if knot[_ROWS] > 0 and t[i] - knot[_BEGIN] >= STEP_S and np.hypot(
-            xy[i, 0] - knot[_X], xy[i, 1] - knot[_Y]
-        ) >= STEP_M:
+        if (
+            knot[_ROWS] > 0
+            and t[i] - knot[_BEGIN] >= STEP_S
+            and np.hypot(xy[i, 0] - knot[_X], xy[i, 1] - knot[_Y]) >= STEP_M
+        ):
             _mean(knot, done[count])
             who[count] = track[i]
             count += 1

@@ -1,4 +1,4 @@
-"""Breaks tracks where their boxes jump: another vehicle shares the blob from there on, or hides a part, or takes over."""
+"""Breaks tracks where their boxes jump: another vehicle shares the blob, hides a part of it, or takes over."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _SIGMAS = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """By what factor vehicles are larger than vehicles are, its standard deviation as a share, from how many of them."""
+    """By what factor vehicles come out too large, its standard deviation as a share, and from how many of them."""
 
     factor: float
     sigma: float
@@ -53,6 +53,6 @@ def scale_of(information: Floats, vector: Floats, speed: Floats) -> Scale | None
 
 
 def _log_likelihood(information: Floats, vector: Floats, speed: Floats, factor: float) -> float:
-    """The sum over all vehicles if all sizes are larger by a factor: their boxes then say the same about size / factor."""
+    """The sum over all vehicles if all sizes are too large by a factor: the boxes say the same of size / factor."""
     told = [evidence(kind, information * factor**2, vector * factor, speed / factor)[0] for kind in KINDS]
     return float(np.logaddexp.reduce(told).sum())

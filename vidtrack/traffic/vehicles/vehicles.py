@@ -26,7 +26,7 @@ class Speeds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """What T tracks tell: speeds that were asked for, classes, NaN where there is no fit, and the calibration's scale."""
+    """Speeds that were asked for; the classes of T tracks, NaN where there is no fit; the calibration's scale."""
 
     speeds: Speeds
     classes: Classified
@@ -64,14 +64,14 @@ def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats)
     owner = np.searchsorted(knots.first, first[:-1], side="right") - 1
     of_piece = _piece_of(knots, first, owner, track, t)
     order = np.argsort(of_piece, kind="stable")
-    window_of = np.searchsorted(of_piece[order], np.arange(len(owner) + 1))
+    asked_of = np.searchsorted(of_piece[order], np.arange(len(owner) + 1))
     path, speed = np.empty((len(knots.t), 2)), np.full((len(t), 6), np.nan)
     size, cov, misfit = np.empty((len(owner), SIZE)), np.empty((len(owner), SIZE, SIZE)), np.empty(len(owner))
     pose = ground.pose()
     up = np.zeros(3) if pose is None else pose.up
     fit(
         first, knots.t, _straight(ground, knots.edge), knots.rows, place, ground.homography, up,
-        window_of, np.repeat(t[order, None], 2, axis=1), path, size, cov, misfit, speed,
+        asked_of, t[order], path, size, cov, misfit, speed,
     )  # fmt: skip
     result = np.empty((3, len(t)))
     result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
@@ -123,7 +123,8 @@ def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) ->
 def _foot(edge: Floats) -> Floats:
     """(N, 2) middles of the lower edges [px]; of one whose side the border cuts, its other corner."""
     left, _, right, bottom = edge.T
-    return np.column_stack([(np.where(np.isnan(left), right, left) + np.where(np.isnan(right), left, right)) / 2, bottom])
+    left, right = np.where(np.isnan(left), right, left), np.where(np.isnan(right), left, right)
+    return np.column_stack([(left + right) / 2, bottom])
 
 
 def _straight(ground: Ground, edge: Floats) -> Floats:
