@@ -42,8 +42,9 @@ class _Commands(click.Group):
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
             return None
-        command = import_module(f"vidtrack.cli.{name}").command
+        command = import_module(f"vidtrack.cli.{name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
+        command.short_help = COMMANDS[name]
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

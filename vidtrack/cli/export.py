@@ -32,7 +32,6 @@ Rows outside the calibrated part of the picture have no position and are left ou
 @click.command(
     name="export",
     help=_HELP,
-    short_help="Tracks in metres for other programs.",
     epilog="""\b
 Examples:
   vidtrack export runs/motorway --as geojson

@@ -23,7 +23,6 @@ class MeasureOptions(Options):
 
 @click.command(
     name="measure",
-    short_help="Traffic figures of a site from finished runs.",
     epilog="""\b
 Examples:
   vidtrack measure runs/traffic --site site.toml

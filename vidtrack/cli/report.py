@@ -20,7 +20,6 @@ class ReportOptions(Options):
 
 @click.command(
     name="report",
-    short_help="A site's report as a page, pictures and spreadsheets.",
     epilog="""\b
 Examples:
   vidtrack report runs/site

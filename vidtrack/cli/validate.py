@@ -29,7 +29,6 @@ class ValidateOptions(Options):
 
 @click.command(
     name="validate",
-    short_help="Compare counted crossings with a count by hand.",
     epilog="""\b
 Examples:
   vidtrack validate runs/motorway manual.csv
