@@ -72,10 +72,11 @@ def test_classes_by_size_and_speed():
 def test_a_site_s_bounds_of_length_come_first():
     t, xy, heading = DRIVES["across"]
     _, classes = fitted([(t, xy, heading, CAR)], [t.mean()])
-    names, probability = named_by_length(classes, {"small": (0.0, 3.0), "large": (3.0, 9.0)})
+    length = classes.size[:, 0], classes.sigma[:, 0]
+    names, probability = named_by_length(*length, {"small": (0.0, 3.0), "large": (3.0, 9.0)})
     assert names == ["large"]
     assert probability[0] > 0.9
-    assert named_by_length(classes, {"small": (0.0, 3.0)})[0] == [None]
+    assert named_by_length(*length, {"small": (0.0, 3.0)})[0] == [None]
 
 
 def test_a_track_that_goes_over_to_another_vehicle_has_the_speeds_of_both():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -94,9 +93,11 @@ class _Figures:
         self.scale = None if found is None else found.scale
         if found is not None:
             passed = passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
-            self.length = found.classes.size[:, 0]
-            by = partial(named_by_length, bounds=site.classes) if site.classes else named
-            self.kind, self.kind_probability = by(found.classes)
+            self.length = np.where(np.isnan(found.classes.size[:, 0]), self.length, found.classes.size[:, 0])
+            if site.classes:
+                self.kind, self.kind_probability = named_by_length(self.length, found.classes.sigma[:, 0], site.classes)
+            else:
+                self.kind, self.kind_probability = named(found.classes)
         self.joins = self._joins(passed)
         self.vehicle = self.joins.vehicles(tracks)
         across = self._across()

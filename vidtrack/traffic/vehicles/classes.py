@@ -61,9 +61,13 @@ def named(found: Classified) -> tuple[list[str | None], Floats]:
     return [names[k] for k in number.tolist()], np.where(np.isnan(found.size[:, 0]), np.nan, best)
 
 
-def named_by_length(found: Classified, bounds: dict[str, tuple[float, float]]) -> tuple[list[str | None], Floats]:
-    """(T,) the class of each vehicle by a site's bounds [m], the first that holds its length; (T,) its probability."""
-    length, sigma = found.size[:, 0], found.sigma[:, 0]
+def named_by_length(
+    length: Floats, sigma: Floats, bounds: dict[str, tuple[float, float]]
+) -> tuple[list[str | None], Floats]:
+    """(T,) the class of each vehicle by a site's bounds, the first that holds its length; (T,) its probability.
+
+    length, sigma (T,) m; NaN where they are not known
+    """
     names = class_of(length, bounds)
     low, high = np.array([bounds.get(name or "", (np.nan, np.nan)) for name in names]).reshape(-1, 2).T
     return names, np.asarray(ndtr((high - length) / sigma) - ndtr((low - length) / sigma))

@@ -30,6 +30,12 @@ class Knots:
     edge: Floats
     rows: Floats
 
+    def between(self, begin: int, end: int) -> Knots:
+        """Those of the tracks begin, begin + 1, ..., end - 1."""
+        first = self.first[begin : end + 1]
+        rows = slice(first[0], first[-1])
+        return Knots(first - first[0], self.t[rows], self.edge[rows], self.rows[rows])
+
     def only(self, chosen: Mask) -> Knots:
         """The knots of a mask (K,)."""
         before = np.concatenate([[0], np.cumsum(chosen)])
@@ -41,7 +47,7 @@ class Knotting:
 
     def __init__(self) -> None:
         self._open = np.full((0, COLUMNS), np.nan)
-        self._done: list[tuple[Ints, Floats]] = []
+        self._done: list[tuple[Ints, Floats, Floats]] = []
 
     def add(self, track: Ints, t: Floats, xy: Floats, edge: Floats) -> None:
         """Look at rows: track (N,), t (N,) s, xy (N, 2) m roughly, edge (N, 4) px."""
@@ -53,19 +59,23 @@ class Knotting:
             self._open = np.vstack([self._open, np.full((more, COLUMNS), np.nan)])
         who, done = np.empty(len(track), np.int64), np.empty((len(track), 6))
         count = _gather(track, t, xy, edge, self._open, who, done)
-        self._done.append((who[:count].astype(np.int32), done[:count].copy()))
+        self._keep(who[:count], done[:count])
 
     def knots(self, tracks: int) -> Knots:
-        """All knots of `tracks` tracks, with those that rows are still gathered for."""
+        """All knots of `tracks` tracks, with those that rows are still gathered for; what is kept is given away."""
         open_ = np.flatnonzero(self._open[:, _ROWS] > 0)
         rest = np.empty((len(open_), 6))
-        for i, one in enumerate(open_.tolist()):
-            _mean(self._open[one], rest[i])
-        who = np.concatenate([*(who for who, _ in self._done), open_])
-        done = np.concatenate([*(done for _, done in self._done), rest])
-        order = np.lexsort((done[:, 0], who))
+        _means(self._open[open_], rest)
+        self._keep(open_, rest)
+        who, t, values = (np.concatenate(column) for column in zip(*self._done, strict=True))
+        self._done.clear()
+        order = np.lexsort((t, who))
         first = np.searchsorted(who[order], np.arange(tracks + 1))
-        return Knots(first, done[order, 0], done[order, 1:5], done[order, 5])
+        return Knots(first, t[order], values[order, :4].astype(float), values[order, 4].astype(float))
+
+    def _keep(self, who: Ints, done: Floats) -> None:
+        """A day has millions of knots: edges in single precision are as good as a thousandth of a pixel."""
+        self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))
 
 
 @kernel(error_model="numpy")
@@ -75,6 +85,12 @@ def _mean(knot: Floats, done: Floats) -> None:
     for side in range(4):
         done[1 + side] = knot[_EDGE + side] / knot[_SEEN + side]  # 0 / 0: never seen
     done[5] = knot[_ROWS]
+
+
+@kernel
+def _means(knots: Floats, done: Floats) -> None:
+    for i in range(len(knots)):
+        _mean(knots[i], done[i])
 
 
 @kernel(error_model="numpy")

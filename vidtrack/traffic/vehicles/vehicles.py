@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
 from vidtrack.traffic.vehicles.knots import Knots, Knotting
 from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
+
+_BATCH = 4096
+"""Tracks that are fitted at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,14 +55,36 @@ class Vehicles:
         knots = self._knotting.knots(tracks)
         if len(knots.t) == 0:
             return None
-        with np.errstate(invalid="ignore"):
-            place = self._ground.metres(self._ground.inside(_foot(knots.edge)))
-        sure = np.isfinite(place[:, 0])
-        return _fitted(self._ground, knots.only(sure), place[sure], track, t)
+        speeds, sizes = np.full((3, len(t)), np.nan), []
+        for begin in range(0, tracks, _BATCH):
+            asked = np.flatnonzero((track >= begin) & (track < begin + _BATCH))
+            some = knots.between(begin, min(begin + _BATCH, tracks))
+            speeds[:, asked], found = _fitted(self._ground, some, track[asked] - begin, t[asked])
+            sizes.append(replace(found, track=found.track + begin))
+        told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
+        scale = scale_of(told.information, told.vector, told.speed)
+        return Fitted(Speeds(*speeds), _classes(told, tracks), scale)
 
 
-def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats) -> Fitted:
-    """As `fitted`; place (K, 2) m roughly of the knots. What is fitted is the piece of a track that a time lies in."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sizes:
+    """What B tracks (B,) say about the size s of their vehicles, exp(-s' A s / 2 + b' s), and their mean speeds [m/s].
+
+    information (B, 3, 3) A, vector (B, 3) b, speed (B,)
+    """
+
+    track: Ints
+    information: Floats
+    vector: Floats
+    speed: Floats
+
+
+def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Floats, _Sizes]:
+    """(3, W) speeds as in `Speeds`, and sizes, of some tracks; each time is looked up in the piece that it lies in."""
+    with np.errstate(invalid="ignore"):
+        place = ground.metres(ground.inside(_foot(knots.edge)))
+    sure = np.isfinite(place[:, 0])
+    knots, place = knots.only(sure), place[sure]
     first = pieces(ground, knots, place)
     owner = np.searchsorted(knots.first, first[:-1], side="right") - 1
     of_piece = _piece_of(knots, first, owner, track, t)
@@ -76,7 +101,7 @@ def _fitted(ground: Ground, knots: Knots, place: Floats, track: Ints, t: Floats)
     result = np.empty((3, len(t)))
     result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
     result[2, order] = _by_shared(ground, knots.t, path, speed)
-    return Fitted(Speeds(*result), *_classes(knots, first, owner, path, size, cov, misfit))
+    return result, _sizes(knots.t, first, owner, path, size, cov, misfit)
 
 
 def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats:
@@ -90,26 +115,32 @@ def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats
     return sigma
 
 
-def _classes(
-    knots: Knots, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats
-) -> tuple[Classified, Scale | None]:
-    """The classes of T tracks by the piece of each that tells most, NaN for those without a fit; the scale by them."""
-    tracks = len(knots.first) - 1
+def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats) -> _Sizes:
+    """By the piece of each track that tells most; without what was known beforehand."""
     worth = np.nan_to_num(np.diff(first) / misfit)
     order = np.lexsort((worth, owner))
     best = order[np.diff(owner[order], append=-1) != 0]
     best = best[worth[best] > 0]
     begin, end = first[best], first[best + 1] - 1
-    mean_speed = np.linalg.norm(path[end] - path[begin], axis=1) / (knots.t[end] - knots.t[begin])
     known = np.diag(1 / SIGMA[:3] ** 2)
     inverse = np.linalg.inv(cov[best, :3, :3])
-    told = (inverse - known) / misfit[best, None, None]
-    vector = (np.einsum("tij,tj->ti", inverse, size[best, :3]) - known @ MEAN[:3]) / misfit[best, None]
-    found = classified(told, vector, mean_speed)
-    result = [np.full((tracks, part.shape[1]), np.nan) for part in (found.probability, found.size, found.sigma)]
-    for whole, part in zip(result, (found.probability, found.size, found.sigma), strict=True):
-        whole[owner[best]] = part
-    return Classified(*result), scale_of(told, vector, mean_speed)
+    vector = np.einsum("tij,tj->ti", inverse, size[best, :3]) - known @ MEAN[:3]
+    return _Sizes(
+        owner[best],
+        (inverse - known) / misfit[best, None, None],
+        vector / misfit[best, None],
+        np.linalg.norm(path[end] - path[begin], axis=1) / (t[end] - t[begin]),
+    )
+
+
+def _classes(told: _Sizes, tracks: int) -> Classified:
+    """The classes of all tracks; NaN for those that tell nothing."""
+    found = classified(told.information, told.vector, told.speed)
+    parts = found.probability, found.size, found.sigma
+    result = [np.full((tracks, part.shape[1]), np.nan) for part in parts]
+    for whole, part in zip(result, parts, strict=True):
+        whole[told.track] = part
+    return Classified(*result)
 
 
 def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) -> Ints:
