@@ -135,17 +135,11 @@ class Footprints:
 
     def _paced(self, stand: Stand, track: Ints, seen: Seen) -> Stand:
         """The same with velocities that were filtered on the road, where their errors are smaller."""
-        ground, (left, _, right, bottom) = self._ground, seen.edge.T
-        left, right = (np.where(np.abs(x - border) < 1 + _NEAR * self._size[0], np.nan, x)
-                       for x, border in ((left, 0), (right, self._size[0])))  # fmt: skip
-        bottom = np.where(bottom > self._size[1] - 1 - _NEAR * self._size[0], np.nan, bottom)
+        ground, (left, _, right, bottom) = self._ground, uncut(seen.edge, self._size).T
         foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
         v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
         cov = cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
-        better = np.isfinite(stand.v[:, 0]) & ~(
-            np.trace(cov, axis1=1, axis2=2) > np.trace(stand.v_own, axis1=1, axis2=2)
-        )
-        better &= np.isfinite(v[:, 0])
+        better = np.trace(cov, axis1=1, axis2=2) < np.trace(stand.v_own, axis1=1, axis2=2)
         ahead, behind = stand.xy + v / 2, stand.xy - v / 2  # half a second
         shared = ground.by_shared_error(ahead) - ground.by_shared_error(behind)
         return replace(
@@ -226,6 +220,13 @@ class Footprints:
         """(N,) whether the left, right or lower border of the picture cuts the box."""
         (left, top, wide, high), (width, height) = box.T, self._size
         return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
+
+
+def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
+    """(N, 4) left, top, right and lower edges [px]; NaN where the border of a picture (width, height) may cut them."""
+    near = _NEAR * size[0]
+    inside = np.hstack([edge[:, :2] > near, edge[:, 2:] < np.array(size) - near])
+    return np.asarray(np.where(inside, edge, np.nan))
 
 
 def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, Seen, footprint
+from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
 from vidtrack.traffic.measures.runs import Day, Recording
 
 BLOCK = 1 << 18
@@ -34,8 +34,6 @@ _STATE = (
 EDGE_COLUMNS = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
 """What is read of a run with metres, besides the edges."""
-_BORDER = 0.01
-"""Share of the picture's width; edges nearer to the border may be cut by it"""
 _NOT_SEEN = "coasting"
 
 
@@ -186,10 +184,8 @@ def _edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
     """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
     if EDGE_COLUMNS[0] not in column:
         return np.full((len(column["time_s"]), 4), np.nan)
-    edge = np.column_stack([column[name] for name in EDGE_COLUMNS])
-    limit = np.array([0, 0, *size]) + _BORDER * size[0] * np.array([1, 1, -1, -1])
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.where((edge > limit) == np.array([True, True, False, False]), edge, np.nan))
+        return uncut(np.column_stack([column[name] for name in EDGE_COLUMNS]), size)
 
 
 def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Floats]:
