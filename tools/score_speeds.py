@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from vidtrack.simulate.camera import camera
 from vidtrack.simulate.conditions import Conditions
@@ -38,7 +39,7 @@ SECONDS, HEIGHT_M, FLOW = 9.0, 8.0, 1200.0
 NEAR_M, FAR_M, PATH_M, LEAST_REACH_M = 15.0, 60.0, 15.0, 25.0
 GATE_M = 3.8  # half the length of the gate
 SLOWEST, FASTEST = 20.0, 80.0  # km/h
-TOLERANCE_S = 1.0
+TOLERANCE_S, FAR = 1.0, 1e3
 HEAVY = ("lorry", "bus")
 
 
@@ -130,23 +131,27 @@ def passings(folder: Path) -> list[Passing]:
     away = np.hypot(*(xy - eye[:2]).T)
     near = whole & (away > NEAR_M) & (away < FAR_M)
     crossings = measured([str(folder / "run")], read_site(folder / "site.toml")).tables["crossings"].to_pylist()
-    found = []
-    for event in rows_of(folder / "road_events.csv"):
-        if event["event"] != "crossing" or not SLOWEST <= float(event["speed_kmh"]) <= FASTEST:
-            continue
-        own = np.flatnonzero(near & (target == int(event["target_id"])))
-        if len(own) < 2 or np.linalg.norm(xy[own[-1]] - xy[own[0]]) < PATH_M:
-            continue
-        time = [float(states[k]["time_s"]) for k in (own[0], own[-1])]
-        if not time[0] <= float(event["time_s"]) <= time[1]:
-            continue
-        state = states[own[0]]
-        off = [
-            (abs(row["time_s"] - float(event["time_s"])), k)
-            for k, row in enumerate(crossings)
-            if row["direction"] == event["direction"]
+    events = [row for row in rows_of(folder / "road_events.csv") if row["event"] == "crossing"]
+    off = np.array(
+        [
+            [abs(row["time_s"] - float(event["time_s"])) if row["direction"] == event["direction"] else np.inf
+             for row in crossings]
+            for event in events
         ]
-        best = crossings.pop(min(off)[1]) if off and min(off)[0] < TOLERANCE_S else {}
+    ).reshape(len(events), len(crossings))  # fmt: skip
+    pairs = dict(zip(*linear_sum_assignment(np.where(off < TOLERANCE_S, off, FAR)), strict=True))
+    found = []
+    for k, event in enumerate(events):
+        own = np.flatnonzero(near & (target == int(event["target_id"])))
+        if not SLOWEST <= float(event["speed_kmh"]) <= FASTEST or len(own) < 2:
+            continue
+        time = [float(states[row]["time_s"]) for row in (own[0], own[-1])]
+        path = np.linalg.norm(xy[own[-1]] - xy[own[0]])
+        if path < PATH_M or not time[0] <= float(event["time_s"]) <= time[1]:
+            continue
+        state, best = states[own[0]], {}
+        if k in pairs and off[k, pairs[k]] < TOLERANCE_S:
+            best = crossings[pairs[k]]
         number = {name: np.nan if best.get(name) is None else best[name] for name in _NUMBERS}
         kind = "lorry or bus" if state["class"] in HEAVY else _NAMES.get(state["class"], state["class"])
         speed, sigma, shared, length = number.values()

@@ -38,11 +38,15 @@ _COARSE = (10.0, 3.0, 1.0, 1.0, 1.0)
 """Factors of the standard deviations in the rounds: what is far off loses its weight only when the path is known."""
 _HEADING_M = 4.0
 """m of path that a heading is taken from"""
+_DRIFT = 0.006
+"""Standard deviation of a speed, as a share, because shadows and corners that come into view move the edges along: the
+errors of the vehicles of one site lean to one side by as much"""
 _LEAST_MISFIT = 0.05
 """Of noise as it is stated above: it is not taken to be less, however well a short track fits."""
 _BAND = 4
 """Places beside the diagonal of the normal matrix, for two coordinates and two neighbours"""
-LEAST_KNOTS, LEAST_PATH_M = 3, 2.0
+_LEAST_KNOTS, _LEAST_PATH_M, _SPEED_KNOTS = 3, 2.0, 4
+"""For a size; a speed needs more."""
 
 
 @kernel(error_model="numpy")
@@ -71,7 +75,7 @@ def fit(
         speed[asked_of[i] : asked_of[i + 1]] = np.nan
         path[a:b] = start[a:b]
         driven = np.hypot(start[b - 1, 0] - start[a, 0], start[b - 1, 1] - start[a, 1]) if b > a else 0.0
-        if b - a < LEAST_KNOTS or not driven > LEAST_PATH_M:
+        if b - a < _LEAST_KNOTS or not driven > _LEAST_PATH_M:
             continue
         size[i] = MEAN
         n = 2 * (b - a)
@@ -96,6 +100,8 @@ def fit(
         quality[i] = max(misfit, _LEAST_MISFIT)
         if strange > _FAR_SHARE:
             size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
+            continue
+        if b - a < _SPEED_KNOTS:
             continue
         for w in range(asked_of[i], asked_of[i + 1]):
             _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], cov[i], quality[i], speed[w])
@@ -268,4 +274,4 @@ def _speed(
     for s in range(SIZE):
         for r in range(SIZE):
             variance += by_size[s] * cov[s, r] * by_size[r] * misfit
-    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance), ex, ey, i, j
+    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance + (_DRIFT * v) ** 2), ex, ey, i, j

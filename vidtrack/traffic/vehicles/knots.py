@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 
-STEP_S, STEP_M = 0.2, 1.0
+STEP_S, STEP_M = 0.2, 0.5
 """A knot ends when it has lasted so long and the vehicle has moved so far: one that stands makes no knots."""
 _BEGIN, _X, _Y, _TIME, _ROWS, _EDGE, _SEEN = 0, 1, 2, 3, 4, 5, 9
 COLUMNS = 13

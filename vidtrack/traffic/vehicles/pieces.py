@@ -10,6 +10,8 @@ from vidtrack.traffic.vehicles.knots import Knots
 
 _PX, _SIGMAS = 1.0, 4.0
 """px; standard deviation of the edges of knots, and how many of them are no jump"""
+_PAUSE_S = 0.8
+"""s; from knot to knot; longer ones are of a vehicle that stands or is hidden, or of two"""
 _BRAKING = 8.0
 """m/s2; hard braking"""
 _GROWTH = 0.2
@@ -23,7 +25,7 @@ def pieces(ground: Ground, knots: Knots, place: Floats) -> Ints:
     begins[knots.first[knots.first < count]] = True
     if count > 1:
         inside = ~begins[1:count]
-        begins[1:count] |= _grows(ground, knots)
+        begins[1:count] |= _grows(ground, knots) | (np.diff(knots.t) > _PAUSE_S)
         begins[2:count] |= _jumps(ground, knots.t, place) & inside[1:] & inside[:-1]
     begins[count] = True
     return np.flatnonzero(begins)
