@@ -13,8 +13,9 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 from vidtrack.traffic.vehicles.classes import KINDS, evidence
 
-LEAST_VEHICLES = 12
-_RANGE, _STEPS = 5.0, 321
+LEAST_VEHICLES, _MOST_VEHICLES = 12, 300
+"""More than that say nothing new: how fleets differ remains."""
+_RANGE, _STEPS = 5.0, 161
 """Factors from 1/5 to 5 are looked at."""
 _FLEET = 0.05
 """Standard deviation of the mean size of vehicles from one place to another, as a share"""
@@ -44,6 +45,8 @@ def scale_of(information: Floats, vector: Floats, speed: Floats) -> Scale | None
     """The scale by T vehicles as in `classes.classified`; None for too few."""
     if len(information) < LEAST_VEHICLES:
         return None
+    every = slice(None, None, -(-len(information) // _MOST_VEHICLES))
+    information, vector, speed = information[every], vector[every], speed[every]
     logs = np.linspace(-np.log(_RANGE), np.log(_RANGE), _STEPS)
     likelihood = np.array([_log_likelihood(information, vector, speed, np.exp(log)) for log in logs])
     weight = np.exp(likelihood - likelihood.max())
