@@ -152,8 +152,8 @@ class Reader:
         edge = (_edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         sides = length, column["length_sigma_m"], column["width_m"]
         spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
-        v, road = speed[:, None] * ahead, (*sigmas, *sides, ahead, spread, edge)
-        return Rows(track, t, seen, merged, xy, sigma, margin, v, *road)
+        state = xy, sigma, margin, speed[:, None] * ahead
+        return Rows(track, t, seen, merged, *state, *sigmas, *sides, ahead, spread, edge)
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
         """(N,) numbers over the whole day."""

@@ -254,10 +254,11 @@ def _speed(
     t: Floats, path: Floats, asked: float, band: Floats, right: Floats, cov: Floats, misfit: float, speed: Floats
 ) -> None:
     """Write the slope of the path at a time, and its error (6,)."""
-    last = len(t) - 1
-    if not t[0] <= asked <= t[last]:
+    if not t[0] <= asked <= t[-1]:
         return
-    j = max(np.searchsorted(t, asked), 1)
+    j = 1
+    while t[j] < asked:
+        j += 1
     i = j - 1
     h = t[j] - t[i]
     vx, vy = (path[j, 0] - path[i, 0]) / h, (path[j, 1] - path[i, 1]) / h
