@@ -60,9 +60,9 @@ class Problem:
         mixture of these, with moments zhat and cov.
         """
         if modes is None:
-            pairs = gate.pairs(zhat, cov, scan, run, angles)
+            pairs = gate.pairs(zhat, cov, scan, run, angles, detection, clutter)
         else:
-            pairs = mixture_pairs(gate, modes, scan, run, angles)
+            pairs = mixture_pairs(gate, modes, scan, run, angles, detection, clutter)
         if label is not None and scan.label is not None:
             mine, theirs = label[pairs.row], scan.label[pairs.measurement]
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from vidtrack.associate.gate import Gate
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
@@ -26,7 +25,7 @@ from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
-from vidtrack.tracking.methods import life, rule
+from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracks import Tracks
@@ -107,7 +106,7 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
         model=motion(radar, found.dim),
         estimator=estimator(radar, found, seed),
         associate=rule(common),
-        gate=Gate(common.gate_probability, common.distance, radar.euclidean_radius_m),
+        gate=gate(common, radar.euclidean_radius_m, adaptive=True),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         picture=NoPicture(),
         detection_probability=radar.detection_probability,

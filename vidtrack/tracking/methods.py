@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from vidtrack.associate import methods
+from vidtrack.associate.gate import PROBABILITY, Gate, LikelihoodGate
 from vidtrack.associate.hard import Associator
 from vidtrack.config.settings import TrackerSettings
 from vidtrack.tracking.deferred.forest import ForestRule
@@ -25,6 +26,17 @@ def rule(settings: TrackerSettings) -> Associator | ForestRule:
     if settings.method == "split":
         return Split(n_scan=settings.n_scan)
     return methods.METHODS[settings.method]()
+
+
+def gate(settings: TrackerSettings, radius: float, *, adaptive: bool = False) -> Gate:
+    """The gate of these settings; radius [px or m] of the euclidean distance.
+
+    adaptive  without a probability given, the gate follows P_D and clutter density
+    """
+    if settings.gate_probability is None and adaptive and settings.distance == "mahalanobis":
+        return LikelihoodGate(detection_probability=None, new_density=None)
+    probability = PROBABILITY if settings.gate_probability is None else settings.gate_probability
+    return Gate(probability, settings.distance, radius)
 
 
 def life(
