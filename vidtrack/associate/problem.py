@@ -108,6 +108,17 @@ class Problem:
         """The problem with the pairs of a mask (N,)."""
         return self.having(self.pairs.only(mask))
 
+    def apart(self, shared: Ints) -> Problem:
+        """The problem without the rows that share a measurement (T,), -1: none, and without these measurements.
+
+        These rows count neither as seen nor as missed.
+        """
+        own = shared < 0
+        if own.all():
+            return self
+        left = self.only(own[self.pairs.row] & ~np.isin(self.pairs.measurement, shared[~own]))
+        return replace(left, detection=np.where(own, self.detection, 0.0))
+
     def having(self, pairs: Pairs) -> Problem:
         """The problem with other pairs of the same rows."""
         if pairs is self.pairs:

@@ -53,6 +53,14 @@ class RadarSettings(Group):
     """share of a plot's errors that are five times as large, for the particle filter"""
     euclidean_radius_m: float = Field(2000.0, gt=0)
     """m; gate of the euclidean distance"""
+    unresolved: bool = True
+    """targets nearer than a resolution cell to each other give one plot, and stay separate tracks"""
+    cell_range_m: float | None = Field(None, gt=0)
+    """m; side of a resolution cell in range; None: learnt, in standard deviations of the plots"""
+    cell_azimuth_deg: float | None = Field(None, gt=0, le=90)
+    """degrees; the same in azimuth"""
+    cell_elevation_deg: float | None = Field(None, gt=0, le=90)
+    """degrees; the same in elevation"""
     life: Life = "llr"
     """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
     coast_scans: int = Field(5, ge=1, le=62)

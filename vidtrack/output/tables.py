@@ -83,10 +83,10 @@ _PAIRS = {"vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy":
 VIDEO = (*_VIDEO, *_of_velocity("px"))
 """Columns of video tracks. `group_id` is -1 without a shared blob; `nis` is empty without an update."""
 
-RADAR = (*_RADAR, *_of_velocity("m"))
-"""Columns of radar tracks in the plane: x east, y north."""
+RADAR = (*_RADAR, *_of_velocity("m"), _real("exchange", "1", 6))
+"""Columns of radar tracks in the plane: x east, y north; `exchange` is the probability of another track's target."""
 
-RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"))
+RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"), _real("exchange", "1", 6))
 """Columns of radar tracks in space: z up."""
 
 ROAD = (
@@ -145,6 +145,8 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
         "group_id": stacked(steps, "group"),
         "nis": stacked(steps, "nis"),
     }
+    if any(column.name == "exchange" for column in columns):
+        values["exchange"] = stacked(steps, "exchange")
     values["frame"] = values["scan"] = np.repeat([step.index for step in steps], counts)
     for unit in ("px", "m"):
         for k, axis in enumerate("xyz"[: len(position)]):
