@@ -99,7 +99,8 @@ class Rates:
     ) -> None:
         """Learn from a decision about `count` measurements, dt seconds after the last.
 
-        shared (K,) measurement that each row shares, -1: none; alone  (K,) rows of the register that count: those believed, on no shared blob; inside (K,) their P_G
+        shared (K,) measurement that each row shares, -1: none
+        alone  (K,) rows of the register that count: those believed, on no shared blob; inside (K,) their P_G
         """
         forget = float(np.exp(-dt / MEMORY_S))
         known = alone & (register.status != TENTATIVE)

@@ -22,12 +22,11 @@ class Register:
 
     id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest),
     start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
-    merged (number of the tracks on its measurement, -1 alone) and merged_since_s, exchange (probability that the target is
-    another's, by unresolved measurements), score (log-odds that it is a target), best
-    (highest score since it was confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s
-    (time seen on a blob of its own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and
-    when it last moved on by REST of its size). Where a smoother needs them also
-    prior_x, prior_P and gain (see Tracks), made anew in every scan.
+    merged (number of the tracks on its measurement, -1 alone) and merged_since_s, exchange (probability that the target
+    is another's, since they were not resolved), score (log-odds that it is a target), best (highest score since it was
+    confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its
+    own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by
+    REST of its size). Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",

@@ -92,7 +92,7 @@ class PolarCell:
         """The joint state given that its targets are in one cell."""
         middle = joint.middle
         sides = self.sides(middle, R, float(self.probability @ SIZES))
-        for i, j in combinations(range(joint.count), 2):
+        for i, j in combinations(range(joint.targets), 2):
             for axis, side in zip(self.axes(middle) @ joint.difference(i, j), sides, strict=True):
                 joint = joint.within(axis, float(side))
         return joint

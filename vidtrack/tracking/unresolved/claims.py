@@ -8,8 +8,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.associate.problem import Problem
+from vidtrack.associate.problem import VANISHING, Problem
 from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.sensor import POSITION, Sensor, still
 from vidtrack.tracking.unresolved.cell import SIZES, PolarCell
 from vidtrack.tracking.unresolved.correlations import Correlations
@@ -17,8 +18,7 @@ from vidtrack.tracking.unresolved.joint import Joint
 
 LEAST = 1e-3
 """Probability of being unresolved below which two tracks are left to the association."""
-import os
-SURE = float(os.environ.get("SURE","0.1"))
+SURE = 0.1
 """Probability of one measurement for two targets from which they share it: a wrong claim costs little accuracy for one
 scan, but a claim that is not made may cost a track."""
 REACH = 3.0
@@ -61,21 +61,17 @@ def claims(
     offers = []
     for i, j in close_pairs(rows, run, placed, cell) if problem.measurements else ():
         pair = np.array([i, j])
-        seen = np.union1d(_gated(problem, i)[0], _gated(problem, j)[0])
-        if not len(seen):
-            continue
         joint = correlations.joint(ids[pair], placed.x[pair], placed.P[pair])
-        R = placed.R[seen].mean(axis=0)
+        R = placed.R[np.linalg.norm(placed.z - joint.middle, axis=1).argmin()]
         p_by_size = cell.shared(joint, 0, 1, R, SIZES)
         p = float(cell.probability @ p_by_size)
         if p < LEAST:
             continue
-        within = cell.confined(joint, R)
-        one = [_one(problem, pair, a, placed, within) for a in seen]
+        one = _one(problem, i, placed, cell.confined(joint, R))
         log_odds = float(logsumexp(one)) - _two(problem, i, j)
         if not correlations.has(ids[pair]):  # of targets that were resolved just before, the distance is known
             cell.learn(p_by_size, log_odds)
-        offers.append((np.log(p) - np.log1p(-p) + log_odds, i, j, int(seen[np.argmax(one)])))
+        offers.append((np.log(p) - np.log1p(-p) + log_odds, i, j, int(one.argmax())))
     for log_odds, i, j, a in sorted(offers, reverse=True):
         if log_odds > np.log(SURE / (1 - SURE)) and shared[i] in (-1, a) and shared[j] in (-1, a):
             shared[[i, j]] = a
@@ -111,17 +107,14 @@ def _two(problem: Problem, i: int, j: int) -> float:
     return float(logsumexp(np.concatenate([[miss_i + miss_j], ratio_i + miss_j, ratio_j + miss_i, both.ravel()])))
 
 
-def _one(problem: Problem, pair: Ints, a: int, placed: Placed, joint: Joint) -> float:
-    """ln of the same for one measurement of both, `a`; two echoes are missed if each of them is.
+def _one(problem: Problem, row: int, placed: Placed, joint: Joint) -> Floats:
+    """(M,) ln of the same for each measurement as one of both targets; two echoes are missed if each of them is.
 
-    The ratio of the densities is that of the positions: other components, such as a range rate, count as they do for
-    the row that fits better.
+    The density of positions becomes that of the sensor's measurements by the ratio of the errors' volumes; other
+    components, such as a range rate, count as if they were off by no more than their error.
     """
-    best, row = -np.inf, int(pair[0])
-    for t in pair:
-        seen, ratio = _gated(problem, t)
-        if a in seen and ratio[seen == a][0] > best:
-            best, row = float(ratio[seen == a][0]), int(t)
-    p_d = problem.detection[row]
-    alone = Joint(placed.x[row], placed.P[row], joint.dim).updated(placed.z[a], placed.R[a])[1]
-    return best + np.log(2 - p_d) + joint.updated(placed.z[a], placed.R[a])[1] - alone
+    seen, more = problem.detection[row], problem.scan.z.shape[1] - joint.dim
+    volume = 0.5 * (np.linalg.slogdet(placed.R)[1] - np.linalg.slogdet(problem.scan.R)[1] - more * np.log(TURN))
+    with np.errstate(divide="ignore"):
+        log_ratio = np.log(seen * (2 - seen)) - np.maximum(np.log(problem.clutter[row]), -VANISHING)
+    return log_ratio + volume + joint.log_likelihood(placed.z, placed.R)

@@ -29,33 +29,33 @@ class Joint(NamedTuple):
     dim: int
 
     @property
-    def count(self) -> int:
+    def targets(self) -> int:
         """k."""
         return len(self.x) // (2 * self.dim)
 
     @property
     def middle(self) -> Floats:
         """(dim,) mean of the positions."""
-        return np.asarray(self.x.reshape(self.count, -1)[:, ::2].mean(axis=0))
+        return np.asarray(self.x.reshape(self.targets, -1)[:, ::2].mean(axis=0))
 
     def selection(self, weight: Floats) -> Floats:
         """(dim, k s) matrix of the weighted sum of the positions, weight (k,)."""
         axes = np.zeros((self.dim, 2 * self.dim))
         axes[np.arange(self.dim), 2 * np.arange(self.dim)] = 1.0
-        return np.kron(weight, axes)
+        return np.asarray(np.kron(weight, axes), dtype=float)
 
     def difference(self, i: int, j: int) -> Floats:
         """(dim, k s) matrix of the position of target i relative to target j."""
-        weight = np.zeros(self.count)
+        weight = np.zeros(self.targets)
         weight[[i, j]] = 1.0, -1.0
         return self.selection(weight)
 
     def within(self, h: Floats, limit: float) -> Joint:
         """The moments given that |h x| < limit, h (k s,).
 
-        Repeating the condition changes nothing once it is met: it is no measurement whose information adds up.
+        It is no measurement, whose information would add up: once it is met, repeating it changes little.
         """
-        mean, variance = h @ self.x, h @ self.P @ h
+        mean, variance = float(h @ self.x), float(h @ self.P @ h)
         low, high = (-limit - mean) / np.sqrt(variance), (limit - mean) / np.sqrt(variance)
         inside = ndtr(high) - ndtr(low)
         if inside < LEAST_INSIDE:
@@ -66,25 +66,35 @@ class Joint(NamedTuple):
         gain = self.P @ h / np.sqrt(variance)
         return self._replace(x=self.x + gain * shift, P=self.P - (1 - share) * np.outer(gain, gain))
 
-    def updated(self, z: Floats, R: Floats) -> tuple[Joint, float]:
-        """The moments after the shared measurement z (dim,), R (dim, dim), and ln of its likelihood.
+    def measured(self) -> tuple[Floats, Floats]:
+        """H (dim, k s) and the covariance (dim, dim) of a shared measurement of these targets without its error R.
 
         The measurement is at the centre of power of the echoes. Echoes of Swerling I targets of the same mean power
         have shares that are uniform over all shares with sum one: the mean is the middle of the targets, and the
         covariance is their scatter about the middle over k + 1.
         """
-        k = self.count
+        k = self.targets
         H = self.selection(np.full(k, 1 / k))
-        spread = np.zeros((self.dim, self.dim))
+        cov = H @ self.P @ H.T
         for i in range(k):
             off = self.selection(np.eye(k)[i]) - H
-            spread += (np.outer(off @ self.x, off @ self.x) + off @ self.P @ off.T) / (k * (k + 1))
-        S = H @ self.P @ H.T + R + spread
-        L = np.linalg.cholesky(S)
-        v = solve_triangular(L, z - H @ self.x, lower=True)
+            cov = cov + (np.outer(off @ self.x, off @ self.x) + off @ self.P @ off.T) / (k * (k + 1))
+        return H, cov
+
+    def log_likelihood(self, z: Floats, R: Floats) -> Floats:
+        """(M,) ln of the density of shared measurements z (M, dim), R (M, dim, dim)."""
+        H, cov = self.measured()
+        S, v = cov + R, z - H @ self.x
+        d2 = np.einsum("mi,mi->m", v, np.linalg.solve(S, v[..., None])[..., 0])
+        return np.asarray(-0.5 * (d2 + np.linalg.slogdet(S)[1] + self.dim * np.log(2 * np.pi)))
+
+    def updated(self, z: Floats, R: Floats) -> Joint:
+        """The moments after the shared measurement z (dim,), R (dim, dim)."""
+        H, cov = self.measured()
+        L = np.linalg.cholesky(cov + R)
         K = solve_triangular(L, H @ self.P, lower=True)
-        log_l = -0.5 * (v @ v + self.dim * np.log(2 * np.pi)) - np.log(np.diagonal(L)).sum()
-        return self._replace(x=self.x + K.T @ v, P=self.P - K.T @ K), float(log_l)
+        v = solve_triangular(L, z - H @ self.x, lower=True)
+        return self._replace(x=self.x + K.T @ v, P=self.P - K.T @ K)
 
 
 def equivalent(x: Floats, P: Floats, x1: Floats, P1: Floats) -> tuple[Floats, Floats]:

@@ -54,7 +54,8 @@ class Unresolved:
         self.correlations.predict(dt)
         rows = np.flatnonzero(shown & (register.status != TENTATIVE))
         self._placed = Placed.of(problem, bank)
-        self._predicted = dict(zip(register.id[rows].tolist(), rows.tolist(), strict=True))
+        self._predicted = {track: row for row, track in enumerate(register.id.tolist())}
+        self._predicted.update(zip(register.id[rows].tolist(), rows.tolist(), strict=True))
         shared = claims(problem, rows, register.id, register.run, self._placed, self.correlations, self.cell)
         for row in np.flatnonzero(shared >= 0):  # all possible histories of a track
             shared[register.id == register.id[row]] = shared[row]
@@ -85,7 +86,7 @@ class Unresolved:
             members = np.concatenate([[row], others])
             x, P = placed.x[parent[members]], placed.P[parent[members]]
             joint = self.correlations.joint(register.id[members], x, P)
-            joint, _ = self.cell.confined(joint, placed.R[j]).updated(placed.z[j], placed.R[j])
+            joint = self.cell.confined(joint, placed.R[j]).updated(placed.z[j], placed.R[j])
             z[k], R[k] = equivalent(x[0], P[0], joint.x[:s], joint.P[:s, :s])
             z[k] += bank.x[row, :s] - x[0]  # predicted for the scan's time, not the measurement's
             if row < others.min():
@@ -107,7 +108,8 @@ class Unresolved:
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """Unresolved tracks have a common number, which stays while any two of them stay together."""
-        self.correlations.drop(~np.isin(self.correlations.pair, register.id).all(axis=1))
+        there = np.isin(self.correlations.pair, register.id)
+        self.correlations.drop(~(there[:, 0] & there[:, 1]))
         merged = np.full(len(register), -1)
         for pair in self.correlations.pair:
             on_it = np.isin(register.id, pair)
@@ -140,8 +142,8 @@ class Unresolved:
             if not all(len(own) for own in rows):
                 continue
             seen = [found.measurement[own] for own in rows]
-            together = np.intersect1d(*(found.shared[own] for own in rows)).max(initial=-1) >= 0
-            parted[q] = not together and bool((np.concatenate(seen) >= 0).any())
+            shared, every = np.concatenate([found.shared[own] for own in rows]), np.concatenate(seen)
+            parted[q] = (shared < 0).all() and (every >= 0).any() and len(np.unique(every)) > 1
             if not parted[q]:
                 continue
             exchange = self._exchange(pair, seen)
@@ -160,9 +162,7 @@ class Unresolved:
         joint = self.correlations.joint(pair, placed.x[rows], placed.P[rows])
         found = []
         for a in np.unique(seen[0]):
-            for b in np.unique(seen[1]):
-                if a == b:
-                    continue
+            for b in np.unique(seen[1][seen[1] != a]):
                 at = np.array([a, b])
                 z = np.where(at[:, None] < 0, np.nan, placed.z[at])
                 found.append((np.count_nonzero(at >= 0), exchange_probability(joint, z, placed.R[at])))
