@@ -5,6 +5,7 @@ Two targets approach, go side by side and part again, with misses and clutter; t
 
 from __future__ import annotations
 
+import math
 import sys
 
 import numpy as np
@@ -24,8 +25,10 @@ def main(path: str) -> None:
     """Write the picture."""
     truth = paths()
     scans = plots(truth, np.random.default_rng(SEED))
-    drawing, panels = style.figure(3, 3, panel=(4.2, 2.9))
-    for ax, (name, method) in zip(panels, METHODS.items(), strict=True):
+    drawing, panels = style.figure(3, math.ceil(len(METHODS) / 3), panel=(4.2, 2.9))
+    for ax in panels[len(METHODS) :]:
+        ax.set_axis_off()
+    for ax, (name, method) in zip(panels, METHODS.items(), strict=False):
         for scan in scans:
             ax.plot(*scan.z.T, ".", color=style.FAINT, ms=3)
         for target in truth:

@@ -143,6 +143,7 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
     assert late["tracks"] == 1
     assert late["frames"] == 3
     assert late["media_s"] == 0.08
+    assert late["watched"] == [[0.0, 0.08]]
     assert late["counts"] == {"gate": {"left": 0, "right": 1}}
     assert late["stages"] == {"detect": 0.006, "track": 0.003}
     assert late["fps"] == 25.0

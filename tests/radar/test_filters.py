@@ -1,9 +1,12 @@
 """Motion models and estimators by name."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from vidtrack.config.load import load
+from vidtrack.config.names import Model
 from vidtrack.config.radar import RadarSettings
 from vidtrack.radar.filters import motion
 from vidtrack.run.radar import track_plots
@@ -12,7 +15,7 @@ from vidtrack.simulate.radar_write import write_radar
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("name", ["cv", "ca", "singer", "ct"])
+@pytest.mark.parametrize("name", get_args(Model))
 def test_a_model_is_in_metres_and_as_uncertain_as_the_settings_say(name, dim):
     model = motion(RadarSettings(model=name, max_speed=300.0), dim)
     x, P = model.birth(np.ones((1, dim)), np.eye(dim)[None], np.ones(1))

@@ -66,7 +66,7 @@ def test_a_client_that_takes_nothing_is_cut_off(monkeypatch):
 
 
 def test_who_connects_has_to_ask_soon(monkeypatch):
-    monkeypatch.setattr("vidtrack.serve.page._ASK_S", 0.2)
+    monkeypatch.setattr("vidtrack.serve.server._ASK_S", 0.2)
     with page_over({"gate": MadeUp()}) as url:
         client = connect(url)
         client.settimeout(HANG_S)
@@ -74,8 +74,8 @@ def test_who_connects_has_to_ask_soon(monkeypatch):
 
 
 def test_the_number_of_connections_is_bounded(monkeypatch):
-    monkeypatch.setattr("vidtrack.serve.page._MOST", 5)
-    monkeypatch.setattr("vidtrack.serve.page._ASK_S", 2 * HANG_S)
+    monkeypatch.setattr("vidtrack.serve.server._MOST", 5)
+    monkeypatch.setattr("vidtrack.serve.server._ASK_S", 2 * HANG_S)
     with Page("0") as page:
         page.show({"gate": MadeUp().camera()})
         silent = [connect(page.url, b"GET /") for _ in range(20)]
@@ -88,7 +88,7 @@ def test_the_number_of_connections_is_bounded(monkeypatch):
 
 
 def connections_of(page):
-    return len(page._server.server_state.connections)
+    return len(page._server._server.server_state.connections)
 
 
 def is_open(client):

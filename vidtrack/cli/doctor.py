@@ -34,7 +34,6 @@ class DoctorOptions(WithSettings):
 
 @click.command(
     name="doctor",
-    short_help="Look at a source, and say which setting will hurt.",
     epilog="""\b
 Examples:
   vidtrack doctor traffic.avi

@@ -82,7 +82,6 @@ class EvalOptions(Options):
 
 @click.command(
     name="eval",
-    short_help="Score tracks against truth.",
     epilog="""\b
 Examples:
   vidtrack eval runs/junction samples/junction.txt --iou 0.3

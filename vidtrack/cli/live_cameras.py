@@ -30,7 +30,7 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     """Track all cameras until a signal; the exit code is 0 unless every camera failed."""
     from vidtrack.cli.signals import stopping
     from vidtrack.output.folder import open_run, usable
-    from vidtrack.run.live.cameras import extras_of, listed, named, settings_of
+    from vidtrack.run.live.cameras import extras_of, listed, named, refuse_shared_site, settings_of
     from vidtrack.run.live.supervisors import Supervisors
     from vidtrack.run.live.worker import Job
 
@@ -40,6 +40,7 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     else:
         cameras = named(options.sources)
     wanted = [settings_of(camera, for_all, options.config_file, options.given()) for camera in cameras]
+    refuse_shared_site(cameras, wanted)
     own = [extras_of(camera, options.extras()) for camera in cameras]
     folder = open_run(None, "live", options.force) if options.output is None else usable(options.output)
     log = partial(start_log, options.verbose, options.quiet)

@@ -39,7 +39,6 @@ class PredictOptions(ProblemOptions):
 
 @click.command(
     name="predict",
-    short_help="Track error of a radar filter in clutter, before there is a plot.",
     epilog="""\b
 Examples:
   vidtrack predict --filter psn --snr-db 16 --pfa 1e-1

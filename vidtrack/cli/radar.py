@@ -25,7 +25,6 @@ class RadarOptions(TrackingOptions):
 
 @click.command(
     name="radar",
-    short_help="Tracks from a table of radar plots.",
     epilog="""\b
 Examples:
   vidtrack radar plots.csv

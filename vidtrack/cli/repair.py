@@ -19,7 +19,6 @@ class RepairOptions(Options):
 
 @click.command(
     name="repair",
-    short_help="Make the folder of a killed run whole.",
     epilog="""\b
 Examples:
   vidtrack repair runs/motorway

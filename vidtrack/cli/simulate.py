@@ -77,7 +77,6 @@ class SimulateOptions(Options):
 
 @click.command(
     name="simulate",
-    short_help="Draw a traffic video or radar plots with exact truth.",
     epilog="""\b
 Examples:
   vidtrack simulate junction -o junction

@@ -37,7 +37,6 @@ class ThresholdOptions(ProblemOptions):
 
 @click.command(
     name="threshold",
-    short_help="The detection threshold that suits a tracker best.",
     epilog="""\b
 Examples:
   vidtrack threshold --snr-db 10 --cells 100

@@ -21,7 +21,6 @@ class ViewOptions(Options):
 
 @click.command(
     name="view",
-    short_help="Show a finished run in rerun.",
     epilog="""\b
 Examples:
   vidtrack view runs/motorway

@@ -27,6 +27,8 @@ class DisturbanceSettings(Group):
     """pixels that equal the scene darkened by one factor, in luminance, colour and texture, are shadow"""
     amid: bool = False
     """shadow inside a vehicle counts as vehicle, such as dark paint; soft shadow then widens boxes"""
+    beams: bool = True
+    """by night, light of headlamps on the road is no vehicle: it is brighter than the scene and fades into it"""
     contrast: bool = True
     """luma_threshold decreases with the scene's contrast in haze or dusk, to half at least"""
     exposure: bool = True

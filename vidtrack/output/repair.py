@@ -14,6 +14,7 @@ import pyarrow.compute
 import pyarrow.csv
 
 from vidtrack.errors import FormatError
+from vidtrack.output.folder import LINE_FILES
 from vidtrack.output.linefile import drop_partial_line, replace_text, sort_rows
 from vidtrack.output.parquet import parts_folder, write_parquet
 from vidtrack.output.tables import layout, schema
@@ -27,7 +28,7 @@ def repair(folder: Path) -> int:
     summary.json stays marked as interrupted; its tracks and counts are taken from the tables.
     Raises FormatError if tracks.csv is missing or damaged.
     """
-    for name in ("tracks.csv", "mot.txt", "counts.csv", "decisions.csv"):
+    for name in LINE_FILES:
         if (folder / name).is_file():
             drop_partial_line(folder / name)
     table = read_tracks(folder / "tracks.csv")

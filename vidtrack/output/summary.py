@@ -15,6 +15,7 @@ from vidtrack.arrays import affine
 from vidtrack.config.settings import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
+from vidtrack.output.watched import Watched
 from vidtrack.tracks import TENTATIVE
 from vidtrack.traffic.lines import LineCounter
 
@@ -63,6 +64,7 @@ class Summary:
              reconnects, stalls, truncated
     counter  line counter; None without counting lines
     unit     of the steps: "frames" or "scans"
+    usual_s  nominal time between two frames
 
     `interrupted` is True until the run clears it before `close`, so the file of a killed or failed run has it True.
     """
@@ -75,6 +77,7 @@ class Summary:
         reading: Callable[[], Mapping[str, object]],
         counter: LineCounter | None = None,
         unit: str = "frames",
+        usual_s: float = 0.0,
     ) -> None:
         self.interrupted = True
         self._path = path
@@ -91,6 +94,7 @@ class Summary:
         self._alive: set[int] = set()
         self._stage_s: dict[str, float] = {}
         self._camera = CameraAccount()
+        self._watched = Watched(usual_s)
         self._warnings: list[dict[str, object]] = []
         self._due = Every(1.0)
         self._write(interrupted=True)
@@ -105,6 +109,7 @@ class Summary:
         for stage, seconds in step.stage_s.items():
             self._stage_s[stage] = self._stage_s.get(stage, 0.0) + seconds
         self._camera.step(step)
+        self._watched.add(step.time_s)
         self._warnings += ({"time_s": round(step.time_s, 3), "what": what} for what in step.warnings)
         if self._due():
             self._write(interrupted=True)
@@ -114,12 +119,17 @@ class Summary:
         self._write(self.interrupted)
 
     def as_dict(self, interrupted: bool) -> dict[str, object]:
-        """Content of the file. `seconds`: duration of the run; `media_s`: time of the last frame; stages in seconds."""
+        """Content of the file, times in seconds.
+
+        `seconds`: duration of the run; `media_s`: time of the last frame; `watched`: first and last frame of each span
+        without a pause.
+        """
         return {
             "source": self._source,
             **self._reading(),
             self._unit: self._frames,
             "media_s": round(self._media_s, 6),
+            **({"watched": self._watched.spans} if self._unit == "frames" else {}),
             "tracks": self._tracks,
             "counts": {} if self._counter is None else self._counter.totals(),
             "camera": self._camera.as_dict(),

@@ -18,6 +18,7 @@ from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.sink import Sink
+from vidtrack.output.site_copy import SiteCopy
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
@@ -26,7 +27,7 @@ from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
-from vidtrack.traffic.metres import footprints_of
+from vidtrack.traffic.metres import footprints_of, site_text
 from vidtrack.video.frame import Image
 from vidtrack.video.source import Source
 
@@ -46,6 +47,7 @@ class Subject:
     reading   returns the source's counters, see Summary
     counter   line counter; None without counting lines
     road      positions on the road; None without a calibrated site
+    site      text of the site's file; None without a site
     """
 
     source: str
@@ -56,6 +58,7 @@ class Subject:
     reading: Callable[[], Mapping[str, object]]
     counter: LineCounter | None
     road: Footprints | None
+    site: str | None = None
 
     @property
     def lines(self) -> Sequence[Line]:
@@ -64,7 +67,8 @@ class Subject:
 
     def summary(self, folder: Path) -> Summary:
         """Opens summary.json in a folder."""
-        return Summary(folder / "summary.json", self.source, self.settings, self.reading, self.counter)
+        path = folder / "summary.json"
+        return Summary(path, self.source, self.settings, self.reading, self.counter, usual_s=1 / self.fps)
 
 
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
@@ -99,7 +103,8 @@ def file_subject(
 
     counter = line_counter(settings, source.width, source.height)
     road = footprints_of(settings.output.site, source.width, source.height)
-    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road)
+    site = site_text(settings.output.site)
+    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road, site)
 
 
 def file_sinks(
@@ -112,6 +117,8 @@ def file_sinks(
     hold_s  longest time that rows wait for the confirmation of their track [s]
     """
     counter, output = subject.counter, subject.settings.output
+    if subject.site is not None:
+        yield SiteCopy(folder, subject.site)
     if counter is not None:
         yield CountsFile(folder / "counts.csv", counter)
     totals = counter.totals if counter else None

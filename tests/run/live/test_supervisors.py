@@ -22,7 +22,7 @@ from vidtrack.config.load import load
 from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.lock import exclusive
 from vidtrack.output.repair import read_tracks
-from vidtrack.run.live.cameras import Entry, extras_of, listed, named, settings_of
+from vidtrack.run.live.cameras import Entry, extras_of, listed, named, refuse_shared_site, settings_of
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.supervisor import _continued
 from vidtrack.run.live.supervisors import Supervisors
@@ -247,3 +247,19 @@ def test_each_camera_has_places_of_its_own():
     assert extras_of(camera, LiveExtras(rerun="a/all.rrd")).rerun == "a/all-north.rrd"
     with pytest.raises(ConfigError, match="one camera"):
         extras_of(camera, LiveExtras(rerun="serve"))
+
+
+def test_a_site_is_of_one_camera(tmp_path):
+    """Over --site for all of them, or by two tables of the list; a link to the same file is the same site."""
+    cameras = named(["rtsp://one/a", "rtsp://two/b"])
+    site = ("output.site", tmp_path / "site.toml")
+    (tmp_path / "site.toml").touch()
+    (tmp_path / "link.toml").symlink_to(tmp_path / "site.toml")
+    alone = settings_of(cameras[0], {}, None, [site])
+    linked = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "link.toml")])
+    for other in (alone, linked):
+        with pytest.raises(ConfigError, match=r'both one and two: a site is of one camera.*\[camera\."one"\]'):
+            refuse_shared_site(cameras, [alone, other])
+    own = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "other.toml")])
+    refuse_shared_site(cameras, [alone, own])
+    refuse_shared_site(cameras, [alone, settings_of(cameras[1], {}, None, [])])

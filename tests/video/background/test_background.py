@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import cv2
 import numpy as np
 import pytest
 
+from vidtrack.config.names import Detector
 from vidtrack.config.video import BlobSettings, DetectorSettings
 from vidtrack.errors import Error
 from vidtrack.video.background import create
@@ -270,7 +273,7 @@ def test_large_pictures_are_reduced_to_at_most_580_rows(rows, step):
     assert rows / step <= 580
 
 
-@pytest.mark.parametrize("kind", ["disturbance", "paper", "mog2", "knn"])
+@pytest.mark.parametrize("kind", get_args(Detector))
 @pytest.mark.parametrize(
     ("shape", "scale"), [((121, 163), None), ((97, 131), 0.5), ((241, 323), 0.34), ((2160, 3840), None)]
 )
@@ -285,7 +288,7 @@ def test_every_detector_takes_odd_and_large_pictures(kind, shape, scale):
     assert abs(detector.scene().mean() - street.road.mean()) < 5
 
 
-@pytest.mark.parametrize("kind", ["disturbance", "paper", "mog2", "knn"])
+@pytest.mark.parametrize("kind", get_args(Detector))
 def test_a_scene_before_the_first_frame_is_refused(kind):
     with pytest.raises(Error, match="first frame"):
         create(DetectorSettings(kind=kind)).scene()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import cv2
 import numpy as np
 import pytest
 
+from vidtrack.config.names import Detector
 from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
 from vidtrack.video.background.filters import LARGEST_STEP, area_average, smoothed
@@ -43,7 +46,7 @@ def test_smoothing_is_that_of_opencv(shape):
     assert (smoothed(plane) == cv2.GaussianBlur(plane, (3, 3), 0)).all()
 
 
-@pytest.mark.parametrize("kind", ["disturbance", "paper", "mog2"])
+@pytest.mark.parametrize("kind", get_args(Detector))
 @pytest.mark.parametrize("shape", [(2, 3), (5, 400), (9, 9)])
 def test_a_picture_smaller_than_the_step_is_reduced_as_far_as_it_goes(kind, shape):
     detector = create(DetectorSettings(kind=kind), scale=0.01)

@@ -6,7 +6,8 @@ import pytest
 from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
 from vidtrack.video.background.distance import contrast, haziness, veil
-from vidtrack.video.background.shadow import SHADOW, reclaim
+from vidtrack.video.background.scene import SHADOW
+from vidtrack.video.background.shadow import reclaim
 from vidtrack.video.frame import Frame
 
 VEHICLE = 1

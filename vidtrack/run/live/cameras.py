@@ -72,6 +72,21 @@ def settings_of(
         raise ConfigError(f"camera {camera.name}: {error}") from None
 
 
+def refuse_shared_site(cameras: Iterable[Entry], settings: Iterable[Settings]) -> None:
+    """Raise ConfigError where two cameras have one site: a site is what one camera sees."""
+    owners: dict[Path, str] = {}
+    for camera, wanted in zip(cameras, settings, strict=True):
+        site = wanted.output.site
+        if site is None:
+            continue
+        other = owners.setdefault(site.resolve(), camera.name)
+        if other != camera.name:
+            raise ConfigError(
+                f"{site} cannot be the site of both {other} and {camera.name}: a site is of one camera; list the "
+                f'cameras in a file, each with its own: [{_CAMERAS}."{other}"] with output.site = "{other}.toml"'
+            )
+
+
 def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:
     """Output places of one camera: sub-folders with its name, files with its name before the extension."""
     if extras.rerun in ("spawn", "serve"):

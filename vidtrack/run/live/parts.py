@@ -19,6 +19,7 @@ from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.repair import add_parquet, repair
 from vidtrack.output.sink import Step
+from vidtrack.output.site_copy import SiteCopy
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import ROAD, VIDEO, csv_text, track_rows
 from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
@@ -146,7 +147,9 @@ class Part:
             stack.callback(self._tracks.close)
             self._mot = MotFile(folder / "mot.txt")
             stack.callback(self._mot.close)
-            self._counts = self._decisions = None
+            self._counts = self._decisions = self._site = None
+            if subject.site is not None:
+                self._site = SiteCopy(folder, subject.site)
             if subject.counter is not None:
                 self._counts = LineFile(folder / "counts.csv", HEADER)
                 stack.callback(self._counts.close)
@@ -166,6 +169,8 @@ class Part:
         for step in steps:
             self._mot.step(step)
             self._plot.step(step)
+            if self._site is not None:
+                self._site.step(step)
             if self._decisions is not None:
                 self._decisions.step(step)
         self._mot.flush()

@@ -23,7 +23,7 @@ from vidtrack.run.run import recorded
 from vidtrack.run.sinks import Subject, line_counter
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.traffic.metres import footprints_of
+from vidtrack.traffic.metres import footprints_of, site_text
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection
@@ -86,7 +86,8 @@ class LiveRun:
             retention.roots.append(self.folder)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
             road = footprints_of(settings.output.site, source.width, source.height)
-            subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, road)
+            site, shape = site_text(settings.output.site), source.like.shape
+            subject = Subject(shown, settings, shape, source.fps, scene, self._reading, counter, road, site)
             self._outputs = Outputs(self.folder, subject, extras, roll_s, retention)
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 

@@ -11,24 +11,22 @@ import pyarrow as pa
 
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
-from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
+from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
+from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.journeys import journeys
 from vidtrack.traffic.measures.lives import Lives
-from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.tables import stamps, table
-from vidtrack.traffic.measures.trips import at_edge, trips_of
 from vidtrack.traffic.site import Site
-
-REACH_M, REACH_PX = 10.0, 100.0
-"""How far from a gate distances are looked at: many times what positions are off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,40 +53,41 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
     staying = Staying(outlines, metres=site.calibration is not None)
+    meeting = Meeting()
     for rows in reader:
-        for part in (passing, lives, staying):
+        for part in (passing, lives, staying, meeting):
             part.add(rows)
-    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
+    ground = grounds[sizes[0]]
+    return _Figures(day, site, gates, ground, reader, passing.passed(), lives, staying, meeting).measures()
 
 
 class _Figures:
     """All figures of a day, from what is left of its tracks."""
 
     def __init__(
-        self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives, staying: Staying
+        self,
+        day: Day,
+        site: Site,
+        gates: Gates,
+        ground: Ground | None,
+        reader: Reader,
+        passed: Passed,
+        lives: Lives,
+        staying: Staying,
+        meeting: Meeting,
     ) -> None:
-        self.day, self.site, self.gates, self.staying = day, site, gates, staying
-        self.metres = site.calibration is not None
+        self.day, self.site, self.gates, self.ground = day, site, gates, ground
+        self.staying, self.meeting = staying, meeting
+        self.metres = ground is not None
         self.spans = day.spans
         self.session, self.track_id = reader.names
         tracks = len(self.track_id)
-        self.head, self.tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
-        self.joins = self._joins(passed)
-        self.vehicle = self.joins.vehicles(tracks)
-        across = self._across()
-        self.probability = np.concatenate([confidence(passed), self.joins.probability[across.track]])
-        self.reason = [*reasons(passed), *(["joined"] * len(across))]
-        passed = passed.and_also(across.of(self.joins.before[across.track]))
-        order = np.argsort(passed.t, kind="stable")
-        self.passed, self.probability = passed.only(order), self.probability[order]
-        self.reason = [self.reason[k] for k in order.tolist()]
+        head, tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
+        driven = journeys(gates, passed, head, tail, self.length, self.spans, self.metres)
+        self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
+        self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
-        begin = np.full(tracks, np.inf)
-        end = -begin
-        np.fmin.at(begin, self.vehicle, self.head.t)
-        np.fmax.at(end, self.vehicle, self.tail.t)
-        self.trips = trips_of(self.passed, gates, self.vehicle[self.passed.track], begin, end, self.spans)
         zone = site.camera.start
         self.edges = edges_of(self.spans, site.report.interval_s, day.utc, None if zone is None else zone.tzinfo)
         self.watched = coverage(self.spans, self.edges)
@@ -106,6 +105,8 @@ class _Figures:
             "queues": self._queues(),
             "checks": self._checks(),
         }
+        if self.ground is not None:
+            tables["conflicts"] = self._conflicts(self.ground)
         report = {
             "site": self.site.camera.name,
             "metres": self.metres,
@@ -125,6 +126,7 @@ class _Figures:
             "trips": len(self.trips.vehicle),
             "complete_trips": int(self.trips.complete.sum()),
             "joins": len(self.joins.before),
+            "conflicts": len(tables["conflicts"]) if self.metres else None,
             "movements": [{"from": a, "to": b, "trips": count} for (a, b), count in sorted(moved.items())],
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
@@ -133,24 +135,6 @@ class _Figures:
             "vanished": int(self.trips.vanished.sum()),
         }
         return Measures(tables, report)
-
-    def _joins(self, passed: Passed) -> Joins:
-        """Joins of tracks that end before an exit, and of those that begin after an entry."""
-        tracks = len(self.track_id)
-        if not self.metres:
-            return Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
-        left, entered = np.zeros((2, tracks), bool)
-        left[passed.track[self.gates.role("exit", "both")[passed.gate]]] = True
-        entered[passed.track[self.gates.role("entry", "both")[passed.gate]]] = True
-        ends = ~left & np.isfinite(self.tail.t) & ~at_edge(self.tail.t, self.spans[:, 1])
-        begins = ~entered & np.isfinite(self.head.t) & ~at_edge(self.head.t, self.spans[:, 0])
-        return joined(self.tail, self.head, self.length, ends, begins, float(np.diff(self.spans).sum()))
-
-    def _across(self) -> Passed:
-        """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
-        passing = Passing(self.gates, REACH_M)
-        passing.add(gap_rows(self.tail, self.head, self.joins))
-        return passing.passed()
 
     def _sections(self) -> list[tuple[int, int, float]]:
         names = self.gates.names
@@ -287,6 +271,32 @@ class _Figures:
                 "length_m": ("m", found.length),
             }
         )
+
+    def _conflicts(self, ground: Ground) -> pa.Table:
+        found = self.meeting.conflicts(self.vehicle, self.spans)
+        columns: dict[str, tuple[str, Any]] = {
+            "time_s": ("s", found.t),
+            "utc": ("utc", stamps(self.day.utc, found.t)),
+            "kind": ("", found.kinds),
+            "angle_deg": ("deg", np.degrees(found.angle)),
+            "run": ("n", self.session[found.second]),
+        }
+        for name, who, speed in zip(("first", "second"), (found.first, found.second), found.speed.T, strict=True):
+            columns |= {
+                f"{name}_track_id": ("n", self.track_id[who]),
+                f"{name}_class": ("", class_of(self.length[who], self.site.classes)),
+                f"{name}_speed_kmh": ("km/h", 3.6 * speed),
+            }
+        for name, kind in (("ttc", TTC), ("pet", PET)):
+            (x, y), (x_px, y_px) = found.xy[kind].T, ground.pixels(found.xy[kind]).T
+            columns |= {
+                f"{name}_s": ("s", found.value[kind]),
+                f"{name}_sigma_s": ("s", found.sigma[kind]),
+                f"{name}_time_s": ("s", found.when[kind]),
+                **{f"{name}_x_m": ("m", x), f"{name}_y_m": ("m", y)},
+                **{f"{name}_x_px": ("px", x_px), f"{name}_y_px": ("px", y_px)},
+            }
+        return table(columns | {"reason": ("", ["merged" if one else "seen" for one in found.merged.tolist()])})
 
     def _checks(self) -> pa.Table:
         found = balance(self.trips, self.edges, self.watched)

@@ -23,8 +23,8 @@ BLOCK = 1 << 18
 _PICTURE = ("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "width_px", "height_px")
 _ALWAYS = ("time_s", "track_id", "status")
 _ROAD = (
-    *("x_m", "y_m", "sigma_x_m", "sigma_y_m", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"),
-    *("heading_deg", "length_m", "length_sigma_m"),
+    *("x_m", "y_m", "sigma_x_m", "sigma_y_m", "corr_xy_m", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"),
+    *("heading_deg", "length_m", "length_sigma_m", "width_m"),
 )
 _BOX = ("left_px", "top_px", "width_px", "height_px")
 _STATE = (
@@ -50,7 +50,9 @@ class Rows:
     margin   (N,) how far it must pass a gate by, in the unit of xy
     v        (N, 2) its velocity, in the unit of xy per second
     speed_sigma, speed_shared   (N,) m/s; standard deviations of the speed on the road, own and by the calibration
-    length, length_sigma   (N,) m
+    length, length_sigma, width   (N,) m
+    ahead    (N, 2) unit vectors along the vehicles on the road
+    spread   (N, 3) m2; variances of its own position error, in x and in y, and their covariance
     """
 
     track: Ints
@@ -65,6 +67,9 @@ class Rows:
     speed_shared: Floats
     length: Floats
     length_sigma: Floats
+    width: Floats
+    ahead: Floats
+    spread: Floats
 
     def __len__(self) -> int:
         return len(self.t)
@@ -72,6 +77,12 @@ class Rows:
     def only(self, chosen: Mask | Ints) -> Rows:
         """The rows of a mask or of indices."""
         return Rows(*(getattr(self, column.name)[chosen] for column in fields(self)))
+
+
+def off_road(count: int) -> tuple[Floats, ...]:
+    """The last seven columns of rows (count,) of which nothing is known on the road: NaN."""
+    nothing = np.full((count, 3), np.nan)
+    return *(nothing[:, 0] for _ in range(5)), nothing[:, :2], nothing
 
 
 _MARGIN = 0.15
@@ -118,22 +129,23 @@ class Reader:
         seen = np.array([word != _NOT_SEEN for word in words], bool)[code]
         merged = np.array([word == "merged" for word in words], bool)[code]
         t = column["time_s"] + recording.offset_s
-        nothing = np.full(len(t), np.nan)
         if ground is None:
             xy = np.column_stack([column["x_px"], column["y_px"]])
             sigma = np.hypot(column["sigma_x_px"], column["sigma_y_px"]) / np.sqrt(2)
             margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
-            return Rows(track, t, seen, merged, xy, sigma, margin, v, *(nothing for _ in range(4)))
+            return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
             column |= _stand(road, track, column)
         xy, sigma = _positions(ground, column)
         speed, heading = column["speed_kmh"] / 3.6, np.radians(column["heading_deg"])
-        v = speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading)])
-        length = column["length_m"]
+        ahead = np.column_stack([np.sin(heading), np.cos(heading)])
+        length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
         margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
         sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
-        return Rows(track, t, seen, merged, xy, sigma, margin, v, *sigmas, length, column["length_sigma_m"])
+        sides = length, column["length_sigma_m"], column["width_m"]
+        spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
+        return Rows(track, t, seen, merged, xy, sigma, margin, speed[:, None] * ahead, *sigmas, *sides, ahead, spread)
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
         """(N,) numbers over the whole day."""
@@ -206,12 +218,14 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str
         "y_m": stand.xy[:, 1],
         "sigma_x_m": own[:, 0],
         "sigma_y_m": own[:, 1],
+        "corr_xy_m": stand.xy_own[:, 0, 1] / own.prod(axis=1),
         "speed_kmh": 3.6 * stand.speed,
         "speed_sigma_kmh": 3.6 * stand.speed_own_sigma,
         "speed_shared_sigma_kmh": 3.6 * np.linalg.norm(stand.speed_by_shared, axis=1),
         "heading_deg": np.degrees(stand.heading),
         "length_m": stand.length,
         "length_sigma_m": stand.length_sigma,
+        "width_m": stand.width,
     }
 
 

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.video import DisturbanceSettings
+from vidtrack.video.background.beam import lamps_light, mark_beams
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, haziness, veil
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start
+from vidtrack.video.background.scene import BEAM, Scene, absorb, adopt, learn, no_scene, spare, start
 from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
 from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
@@ -156,7 +157,7 @@ class Disturbance:
         return self._time_s - self._start_s < _UNSURE_S
 
     def _disturbed(self, picture: Picture, scene: Scene, dt: float) -> tuple[NDArray[np.float32], Image, Image]:
-        """Strength, hits (1 disturbed, SHADOW, or 0), and hits above a lower threshold."""
+        """Strength, hits (1 disturbed, SHADOW, BEAM, or 0), and hits above a lower threshold."""
         s = self._settings
         strength = np.empty(picture.luma.shape, np.float32)
         weak = np.empty(picture.luma.shape, np.uint8)
@@ -167,7 +168,10 @@ class Disturbance:
         if s.shadow:
             count = mark_shadow(seen, scene, self._black, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
-        hit = np.where(strength > 1, weak, np.uint8(0))
+        black = np.float32(self._view.black)
+        if s.beams and lamps_light(seen.luma, scene.luma, black):
+            mark_beams(seen.luma, scene.luma, black, weak)
+        hit = np.where((strength > 1) | (weak == BEAM), weak, np.uint8(0))
         if s.shadow and s.amid:
             reclaim(hit)
         return strength, hit, weak

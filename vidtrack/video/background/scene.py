@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
-from vidtrack.video.background.shadow import SHADOW
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import Runs
 
 Levels = NDArray[np.float32]
 
 FRESH_NOISE = np.float32(1.5)  # grey levels assumed before any were measured
+SHADOW, BEAM = np.uint8(2), np.uint8(3)  # values of a hit where the scene is seen in less light, or more
+RELIT = np.uint8(2)  # the bit that both have
 NEVER = np.float32(-1000)  # unlike any luminance
 UNKNOWN = np.float32(1e4)  # noise of what was never in the picture
 UNSEEN = np.uint8(1)  # value of what is covered by nothing, but outside the picture
@@ -70,7 +71,7 @@ def learn(
     noise_weight: np.float32,
     dt: np.float32,
 ) -> None:  # fmt: skip
-    """Update the running averages where covered (h, w) uint8 is 0 and hit is not SHADOW; elsewhere count the seconds.
+    """Update the running averages where covered (h, w) uint8 is 0 and hit is not RELIT; elsewhere count the seconds.
 
     Where covered is UNSEEN nothing changes.
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
@@ -78,7 +79,7 @@ def learn(
     h, w = covered.shape
     for y in range(h):
         for x in range(w):
-            free = covered[y, x] | hit[y, x] & SHADOW == 0
+            free = covered[y, x] | hit[y, x] & RELIT == 0
             noise = scene.noise[y, x]
             d = np.float32(picture.luma[y, x]) - scene.luma[y, x]
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
@@ -86,7 +87,9 @@ def learn(
             scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
             passed = _NONE if covered[y, x] == UNSEEN else dt
             scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + passed
-            if not free and covered[y, x] != UNSEEN:
+            if free:
+                scene.steady_s[y, x] = _NONE
+            elif covered[y, x] != UNSEEN:
                 change = np.float32(picture.luma[y, x]) - scene.cover[y, x]
                 steady = abs(change) < max(_STEADY, _SURPRISE * noise)
                 scene.cover[y, x] += (weight if steady else np.float32(1)) * change
@@ -94,7 +97,7 @@ def learn(
         if len(picture.cb) > 0 and y % 2 == 0:
             for x in range((w + 1) // 2):
                 right = min(2 * x + 1, w - 1)  # the pixels that share one of chroma
-                taken = covered[y, 2 * x] | covered[y, right] | (hit[y, 2 * x] | hit[y, right]) & SHADOW
+                taken = covered[y, 2 * x] | covered[y, right] | (hit[y, 2 * x] | hit[y, right]) & RELIT
                 share = weight if taken == 0 else _NONE
                 scene.cb[y // 2, x] += share * (np.float32(picture.cb[y // 2, x]) - scene.cb[y // 2, x])
                 scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])

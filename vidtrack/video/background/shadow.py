@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
+from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import connect, find_runs
 
-if TYPE_CHECKING:  # the scene needs SHADOW
-    from vidtrack.video.background.picture import Picture
-    from vidtrack.video.background.scene import Levels, Scene
-
-SHADOW = np.uint8(2)  # value of a hit that is shadow
 _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
 _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor

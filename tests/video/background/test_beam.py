@@ -1,0 +1,86 @@
+"""Beams of headlamps on a dark road: known answers."""
+
+import numpy as np
+import pytest
+
+from vidtrack.config.video import DetectorSettings
+from vidtrack.video.background import create
+from vidtrack.video.background.beam import lamps_light, mark_beams
+from vidtrack.video.background.scene import BEAM
+from vidtrack.video.frame import Frame
+
+H, W, BLACK = 120, 240, np.float32(16)
+RATE = 25  # frames/s
+CAR = np.s_[20:40, 10:40]
+
+
+def road(level=20.0):
+    """A road with lane marks and a kerb of stones."""
+    scene = np.full((H, W), level, np.float32)
+    scene[29:31, ::2] = 2 * level
+    scene[90:110] += level * np.repeat(np.random.default_rng(0).random((5, W // 4)), 4, axis=0).repeat(4, axis=1)
+    return scene + BLACK
+
+
+def lit(scene, bend=0.0):
+    """The scene with a beam to the right of the car, three times as bright at its middle."""
+    y, x = np.mgrid[:H, :W]
+    light = 1 + 2 * np.exp(-(((x - 65) / 14) ** 2) - ((y - 30 - bend) / 7) ** 2)
+    return BLACK + light * (scene - BLACK)
+
+
+def hits(picture, scene):
+    hit = (np.abs(picture - scene) > 5).astype(np.uint8)
+    mark_beams(np.round(picture).astype(np.uint8), scene, BLACK, hit)
+    return hit
+
+
+def test_the_light_on_the_road_is_a_beam_and_the_car_is_not():
+    scene = road()
+    picture = lit(scene)
+    picture[CAR] = BLACK + 70
+    hit = hits(picture, scene)
+    assert (hit[CAR] == 1).mean() > 0.95
+    rest = np.ones((H, W), bool)
+    rest[18:42, 8:42] = False
+    assert (hit[rest] == BEAM).sum() > 500
+    assert (hit[rest] == 1).sum() < 0.1 * (hit[rest] == BEAM).sum()
+
+
+@pytest.mark.parametrize("level", [2.0, 60.0], ids=["unlit", "pale"])
+def test_a_body_of_any_brightness_ends_at_an_edge(level):
+    scene = road()
+    picture = scene.copy()
+    picture[CAR] = BLACK + level
+    assert not (hits(picture, scene) == BEAM).any()
+
+
+def test_only_a_dark_scene_is_lit_by_lamps():
+    dark, day = road(20), road(90)
+    lamp = dark.copy()
+    lamp[40, 60] = 200
+    assert lamps_light(lamp.astype(np.uint8), dark, BLACK)
+    assert not lamps_light(dark.astype(np.uint8), dark, BLACK)
+    assert not lamps_light(lamp.astype(np.uint8), day, BLACK)
+
+
+def played(beams, stands_s):
+    """Share of foreground on a noisy road while a beam stands there for stands_s, and for two seconds after."""
+    rng = np.random.default_rng(1)
+    detector = create(DetectorSettings.model_validate({"disturbance": {"beams": beams}}))
+    found = []
+    for k in range(int((3 + stands_s + 2) * RATE)):
+        on = 3 <= k / RATE < 3 + stands_s
+        clean = lit(road()) if on else road()
+        clean[56:64, 84:87] = 220  # lamps, seen all the time
+        y = np.clip(np.round(clean + rng.normal(0, 1.5, clean.shape)), 0, 255).astype(np.uint8)
+        frame = Frame(k, k / RATE, y)
+        found.append((detector.apply(frame, np.empty((0, 4))).mask > 0).mean())
+    return np.array(found[3 * RATE :])
+
+
+def test_a_beam_that_waits_is_no_foreground_and_leaves_no_mark():
+    share, off = played(True, 8), 8 * RATE
+    assert share[:off].max() < 0.001
+    assert share[off + RATE // 2 :].max() < 0.001
+    assert played(False, 8)[:RATE].min() > 0.015
