@@ -56,8 +56,8 @@ def command(options: ThresholdOptions) -> None:
     pda: P_FA that maximises the information reduction factor q2 for --cells resolution cells in the gate, in closed
     form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter; --q, --cell and --weibull play no part. The closed form
     is for a --gate of 4; with another gate only the exact optimum is given. Where the closed form does not hold (SNR
-    of 1.96 dB or less) or gives --pfa-max or more, p_fa is --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
-    strongest neighbour filter.
+    of 1.96 dB or less) or gives --pfa-max or more, p_fa is --pfa-max and clamped is true. psn: P_FA that minimises
+    the predicted steady-state error of a probabilistic strongest neighbour filter.
     """
     from vidtrack.errors import ConfigError
 
