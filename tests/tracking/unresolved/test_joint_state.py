@@ -152,6 +152,17 @@ def test_correlations_come_back_as_they_were_kept_and_move_with_the_states():
     assert not other.P[:4, 4:].any()
 
 
+@given(st.integers(0, 1000), st.floats(0.01, 1))
+def test_correlations_are_reduced_where_a_track_has_become_surer_alone(seed, share):
+    joint, ids = two(seed), np.array([1, 2])
+    kept = Correlations()
+    P = np.stack([joint.P[:4, :4], joint.P[4:, 4:]])
+    kept.keep(ids, joint, P)
+    found = kept.joint(ids, np.zeros((2, 4)), share * P).P
+    assert np.linalg.eigvalsh(found).min() > 0
+    np.testing.assert_allclose(found[:4, :4], share * P[0])
+
+
 @given(st.integers(0, 1000), st.floats(0.2, 3))
 def test_correlations_stay_possible_whatever_the_covariances_become(seed, scale):
     joint, ids = two(seed), np.array([1, 2])

@@ -12,6 +12,10 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.tracking.unresolved.joint import Joint
 
 
+STRONGEST = 0.999
+"""Largest magnitude of a correlation coefficient."""
+
+
 @dataclass(slots=True)
 class Correlations:
     """Covariances between the states of pairs of tracks; other pairs are independent.
@@ -31,14 +35,19 @@ class Correlations:
         self.cross = F @ self.cross @ F.T
 
     def joint(self, ids: Ints, x: Floats, P: Floats) -> Joint:
-        """The joint state of tracks (k,) with means x (k, s) and covariances P (k, s, s)."""
+        """The joint state of tracks (k,) with means x (k, s) and covariances P (k, s, s).
+
+        Correlations that P no longer admits, because a track was updated alone meanwhile, are reduced in proportion.
+        """
         s = x.shape[1]
-        whole = block_diag(*P)
+        across = np.zeros((x.size, x.size))
         for i, j in combinations(range(len(ids)), 2):
             block = self._of(ids[i], ids[j], s)
-            whole[i * s : (i + 1) * s, j * s : (j + 1) * s] = block
-            whole[j * s : (j + 1) * s, i * s : (i + 1) * s] = block.T
-        return Joint(x.ravel(), whole, s // 2)
+            across[i * s : (i + 1) * s, j * s : (j + 1) * s] = block
+            across[j * s : (j + 1) * s, i * s : (i + 1) * s] = block.T
+        white = block_diag(*(np.linalg.inv(np.linalg.cholesky(own)) for own in P))
+        least = float(np.linalg.eigvalsh(white @ across @ white.T)[0])
+        return Joint(x.ravel(), block_diag(*P) + across * min(1.0, STRONGEST / max(-least, STRONGEST)), s // 2)
 
     def keep(self, ids: Ints, joint: Joint, P: Floats) -> None:
         """Set the correlations of tracks (k,) to those of their joint state; P (k, s, s) are their covariances now.
