@@ -41,7 +41,7 @@ def test_one_plot_between_two_near_targets_is_of_both_and_two_plots_are_of_one_e
     assert decided(x, P, [FAR]) == [0, 0]
     assert decided(x, P, [x[0, ::2], x[1, ::2]]) == [-1, -1]
     assert decided(x, P, np.empty((0, 2))) == [-1, -1]
-    assert decided(x, P, [FAR, FAR + [30_000, 0]]) == [0, 0]
+    assert decided(x, P, [FAR, FAR + np.array([30_000, 0])]) == [0, 0]
 
 
 def test_targets_that_the_radar_resolves_share_nothing():

@@ -83,7 +83,7 @@ def test_the_shared_measurement_has_the_moments_of_the_centre_of_power(count):
     centre = power @ places / power.sum(axis=1, keepdims=True)
     R = np.eye(2)
     certain = Joint(state.ravel(), 1e-9 * np.eye(4 * count), 2)
-    at = certain.middle + [1.0, -2.0]
+    at = certain.middle + np.array([1.0, -2.0])
     expected = multivariate_normal(centre.mean(axis=0), np.cov(centre.T) + R).logpdf(at)
     assert certain.log_likelihood(at[None], R[None])[0] == pytest.approx(expected, abs=0.02)
 
@@ -100,7 +100,7 @@ def test_a_shared_measurement_says_nothing_of_the_difference():
 @given(st.integers(0, 10_000))
 def test_the_equivalent_measurement_makes_the_same_update(seed):
     joint = two(seed, scale=100.0)
-    found = joint.updated(joint.middle + [3.0, 1.0], 5 * np.eye(2))
+    found = joint.updated(joint.middle + np.array([3.0, 1.0]), 5 * np.eye(2))
     x, P, x1, P1 = joint.x[:4], joint.P[:4, :4], found.x[:4], found.P[:4, :4]
     z, R = equivalent(x, P, x1, P1)
     bank = KalmanBank(ConstantVelocity())

@@ -11,7 +11,6 @@ from scipy.linalg import block_diag, solve_triangular
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.tracking.unresolved.joint import Joint
 
-
 STRONGEST = 0.999
 """Largest magnitude of a correlation coefficient."""
 
