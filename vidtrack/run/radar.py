@@ -109,7 +109,7 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
     return Tracker(
         model=motion(radar, found.dim),
         estimator=estimator(radar, found, seed),
-        associate=rule(common),
+        associate=rule(common, unresolved=radar.unresolved),
         gate=gate(common, radar.euclidean_radius_m, adaptive=True),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         picture=NoPicture(),

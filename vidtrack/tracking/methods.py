@@ -8,6 +8,7 @@ from typing import Any
 from vidtrack.associate import methods
 from vidtrack.associate.gate import PROBABILITY, Gate, LikelihoodGate
 from vidtrack.associate.hard import Associator
+from vidtrack.associate.jpda import JPDA
 from vidtrack.config.settings import TrackerSettings
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.deferred.mht import MHT
@@ -19,8 +20,14 @@ METHODS: dict[str, Callable[[], Associator | ForestRule]] = {**methods.METHODS, 
 """Those that decide in one scan, and those that wait."""
 
 
-def rule(settings: TrackerSettings) -> Associator | ForestRule:
-    """The association method of these settings."""
+def rule(settings: TrackerSettings, *, unresolved: bool = False) -> Associator | ForestRule:
+    """The association method of these settings.
+
+    unresolved  targets may share measurements; when they part, both of a pair's orders are equally probable, and
+                jpda must be JPDA*, which takes one of them: with the mean of both the tracks would coalesce
+    """
+    if settings.method == "jpda" and unresolved:
+        return JPDA(star=True)
     if settings.method == "mht":
         return MHT(n_scan=settings.n_scan)
     if settings.method == "split":
