@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.console import Console
+from rich.table import Table
 
 from vidtrack.cli.options import start_log
 
@@ -69,7 +71,9 @@ def _show(page: Page, supervisors: Supervisors) -> None:
 
     page.show(
         {
-            name: Camera(supervisor.status, supervisor.picture, stale_s=2 * supervisor.job.settings.live.timeout_s)
+            name: Camera(
+                supervisor.status, supervisor.picture, supervisor.counts, 2 * supervisor.job.settings.live.timeout_s
+            )
             for name, supervisor in supervisors.by_camera.items()
         }
     )
@@ -90,9 +94,6 @@ def _line(supervisor: Supervisor) -> str:
 
 
 def _print_table(supervisors: Supervisors) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls", "restarts")
     summary = supervisors.summary()
     table = Table("camera", *(name.replace("frames_", "") for name in columns), "end")

@@ -17,7 +17,6 @@ from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
 from vidtrack.output.watched import Watched
 from vidtrack.tracks import TENTATIVE
-from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
 
@@ -62,7 +61,7 @@ class Summary:
     source   name of the input, without any password
     reading  returns the source's counters: fps, width, height, frames_read, frames_dropped, decode_errors,
              reconnects, stalls, truncated
-    counter  line counter; None without counting lines
+    counts   returns the counts by line and direction; None without counting lines
     unit     of the steps: "frames" or "scans"
     usual_s  nominal time between two frames
 
@@ -75,7 +74,7 @@ class Summary:
         source: str,
         settings: Settings,
         reading: Callable[[], Mapping[str, object]],
-        counter: LineCounter | None = None,
+        counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None,
         unit: str = "frames",
         usual_s: float = 0.0,
     ) -> None:
@@ -85,7 +84,7 @@ class Summary:
         self._settings = settings.model_dump(mode="json")
         self._versions = _versions()
         self._reading = reading
-        self._counter = counter
+        self._counts = counts
         self._unit = unit
         self._start = time.monotonic()
         self._frames = 0
@@ -131,7 +130,7 @@ class Summary:
             "media_s": round(self._media_s, 6),
             **({"watched": self._watched.spans} if self._unit == "frames" else {}),
             "tracks": self._tracks,
-            "counts": {} if self._counter is None else self._counter.totals(),
+            "counts": {} if self._counts is None else self._counts(),
             "camera": self._camera.as_dict(),
             "warnings": self._warnings,
             "seconds": round(time.monotonic() - self._start, 3),

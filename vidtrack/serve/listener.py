@@ -39,8 +39,10 @@ def listen(place: str, token: str | None, option: str = "--http") -> socket.sock
 
 
 def url_of(listener: socket.socket) -> str:
-    """The page's address."""
+    """The page's address; with the name of this machine if it listens on all its addresses."""
     host, port = listener.getsockname()[:2]
+    if ip_address(host.partition("%")[0]).is_unspecified:
+        host = socket.gethostname()
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 

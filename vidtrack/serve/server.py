@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
 import socket
 from threading import Thread
 
 import uvicorn
 from starlette.types import ASGIApp
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
-_MOST = 100  # connections at a time; leaves file handles for reopening cameras
-_ASK_S = 5.0  # time in which a client must send a request
+from vidtrack.serve.connection import Connection
+
 _END_S = 0.5
 
 
@@ -28,7 +26,7 @@ class Server:
             uvicorn.Config(
                 app,
                 loop="asyncio",
-                http=_Connection,
+                http=Connection,
                 ws="none",
                 lifespan="off",
                 log_config=None,
@@ -48,14 +46,3 @@ class Server:
             self._server.force_exit = self._server.should_exit = True
             self._thread.join(_END_S)
         self._listener.close()
-
-
-class _Connection(H11Protocol):
-    """A connection, refused beyond _MOST and closed without a request within _ASK_S."""
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        super().connection_made(transport)
-        if len(self.connections) > _MOST:
-            transport.abort()
-            return
-        self.timeout_keep_alive_task = self.loop.call_later(_ASK_S, self.timeout_keep_alive_handler)

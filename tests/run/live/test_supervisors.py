@@ -148,7 +148,14 @@ def test_a_crash_goes_on_in_the_same_parts(tmp_path):
     assert _continued(job("b", "0", tmp_path), 2).folder == tmp_path / "b-2"
     extras = LiveExtras("x.rrd", Path("x.mp4"), Path("masks"), state=Path("s"), record=Path("tape"))
     again = _continued(replace(before, extras=extras, force=True), 3)
-    assert again.extras == LiveExtras("x-3.rrd", Path("x-3.mp4"), Path("masks-3"), state=Path("s"), record=Path("tape"))
+    assert again.extras == LiveExtras(
+        "x-3.rrd",
+        Path("x-3.mp4"),
+        Path("masks-3"),
+        state=Path("s"),
+        record=Path("tape"),
+        counts=before.folder / "intervals",
+    )
     assert not again.force
 
 
@@ -183,6 +190,7 @@ def job(name, address, root):
 def test_cameras_that_all_fail_end_the_run(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     sets = [part for assignment in QUICK for part in ("--set", assignment)]
+    sets += ["--set", "live.retry_first=false"]
     arguments = ["live", NOBODY, "/dev/video77", "-o", "out", *sets]
     result = CliRunner().invoke(cli, arguments, standalone_mode=False)
     assert (result.exception, result.return_value) == (None, 3)

@@ -19,6 +19,8 @@ from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.video.live.address import redact
 
 _CAMERAS, _ADDRESS = "camera", "address"
+_OF_MANY = {"live": {"retry_first": True}}
+"""Settings of several cameras that differ from those of one: a camera may start later than this machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +69,7 @@ def settings_of(
     Raises ConfigError, naming the camera.
     """
     try:
-        return load(path, assignments, merged(base, camera.settings), Input.CAMERA)
+        return load(path, assignments, merged(merged(_OF_MANY, base), camera.settings), Input.CAMERA)
     except ConfigError as error:
         raise ConfigError(f"camera {camera.name}: {error}") from None
 
