@@ -86,10 +86,10 @@ VIDEO = (*_VIDEO, *_of_velocity("px"), *(_real(name, "px") for name in _SEEN))
 """Columns of video tracks. `group_id` is -1 without a shared blob; `nis` is empty without an update; `seen_` are edges
 of the track's own measurement, in the scene."""
 
-RADAR = (*_RADAR, *_of_velocity("m"))
-"""Columns of radar tracks in the plane: x east, y north."""
+RADAR = (*_RADAR, *_of_velocity("m"), _real("exchange", "1", 6))
+"""Columns of radar tracks in the plane: x east, y north; `exchange` is the probability of another track's target."""
 
-RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"))
+RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"), _real("exchange", "1", 6))
 """Columns of radar tracks in space: z up."""
 
 ROAD = (
@@ -149,6 +149,8 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
         "group_id": stacked(steps, "group"),
         "nis": stacked(steps, "nis"),
     }
+    if any(column.name == "exchange" for column in columns):
+        values["exchange"] = stacked(steps, "exchange")
     values["frame"] = values["scan"] = np.repeat([step.index for step in steps], counts)
     for unit in ("px", "m"):
         for k, axis in enumerate("xyz"[: len(position)]):

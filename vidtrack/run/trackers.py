@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
 from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
 from vidtrack.config.settings import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.tracking.deferred.forest import ForestRule
-from vidtrack.tracking.methods import life, rule
+from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.occlusion.sharing import Exclusive
 from vidtrack.tracking.picture.border import EXIT_S
@@ -46,7 +45,7 @@ def build_blob_tracker(
     return Tracker(
         model=_motion(settings, settings.accel),
         associate=associate,
-        gate=_gate(settings),
+        gate=gate(settings, settings.euclidean_radius_px),
         life=life(
             settings.life,
             settings,
@@ -92,7 +91,7 @@ def build_box_tracker(
     return Tracker(
         model=_motion(settings, settings.accel if detections.accel is None else detections.accel, pace),
         associate=rule(settings),
-        gate=_gate(settings),
+        gate=gate(settings, settings.euclidean_radius_px),
         life=life(
             settings.life,
             settings,
@@ -122,7 +121,3 @@ def _motion(settings: TrackerSettings, accel: float, pace: float = 1.0) -> Const
         hold_s=settings.hold_s * pace,
         per_size=True,
     )
-
-
-def _gate(settings: TrackerSettings) -> Gate:
-    return Gate(settings.gate_probability, settings.distance, settings.euclidean_radius_px)
