@@ -70,7 +70,7 @@ FPS, SPEED = 10.0, 45.0
 """of `write_run`; px/s: 8 s from the north gate to the south gate"""
 
 
-def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("north", "south"), **changed):
+def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("north", "south"), close=None, **changed):
     """Write a folder of measures and give it back.
 
     counts    (I, M) whole trips of M movements in intervals from 06:00 on
@@ -78,6 +78,7 @@ def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("nort
     coverage  (I,) 1: all
     speeds    km/h of crossings of the gate south_out; None: no speeds
     queues    rows leg, begin_s, end_s, vehicles, length_m
+    close     rows kind, ttc_s, pet_s; None: no table of conflicts
     changed   of measures.json; `name` of the site; `metres` False: a site without calibration
     """
     counts = np.asarray(counts, int).reshape(len(counts), -1)
@@ -147,6 +148,20 @@ def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("nort
             }
         ),
     }
+    if close is not None:
+        kind, ttc, pet = zip(*close, strict=True) if close else ([], [], [])
+        ones = np.ones(len(kind))
+        tables["conflicts"] = table(
+            {
+                "time_s": ("s", 60.0 * np.arange(len(kind))),
+                "kind": ("", list(kind)),
+                **dict.fromkeys(("angle_deg", "first_speed_kmh", "second_speed_kmh"), ("1", 30 * ones)),
+                **dict.fromkeys(("first_track_id", "second_track_id"), ("n", ones)),
+                **{"ttc_s": ("s", ttc), "ttc_sigma_s": ("s", 0.2 * ones)},
+                **{"pet_s": ("s", pet), "pet_sigma_s": ("s", 0.4 * ones)},
+                "reason": ("", ["seen"] * len(kind)),
+            }
+        )
     report = {
         "site": name,
         "metres": metres,

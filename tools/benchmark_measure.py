@@ -1,9 +1,11 @@
-"""Time and memory of `vidtrack measure` on a day of synthetic tracks, beside reading the same columns alone.
+"""Time and memory of `vidtrack measure` on a day of synthetic tracks, beside reading the same columns alone, and of its
+conflicts alone.
 
     python tools/benchmark_measure.py --vehicles 100000 -o DIR
 
-Vehicles drive straight on for 8 s at 25 frames/s through a picture of 10 px/m, over four gates and two zones. The run
-is written once (-o keeps it); reading and measuring are each done in a process of its own.
+Vehicles drive straight on for 8 s at 25 frames/s through a picture of 10 px/m: one half over four gates and two zones,
+the other half across their ways. The run is written once (-o keeps it); reading, conflicts and measuring are each done
+in a process of its own.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ def write_day(folder: Path, vehicles: int) -> None:
     """A run of one day in order of frames, as `vidtrack track --site` writes it."""
     rng = np.random.default_rng(0)
     start = np.sort(rng.uniform(0, DAY_S - LIFE_S, vehicles))
-    speed, lane = rng.uniform(11, 14, vehicles), rng.uniform(15, 55, vehicles)
+    north = np.arange(vehicles) % 2 == 1
+    speed = np.where(north, rng.uniform(6, 8, vehicles), rng.uniform(11, 14, vehicles))
+    lane = np.where(north, rng.uniform(20, 90, vehicles), rng.uniform(15, 55, vehicles))
     length = rng.uniform(3.5, 12, vehicles)
     steps = int(LIFE_S * FPS)
     folder.mkdir(parents=True, exist_ok=True)
@@ -71,7 +75,7 @@ def write_day(folder: Path, vehicles: int) -> None:
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
         last = len(rows) if first + block >= vehicles else np.searchsorted(rows[:, 0], start[who[-1]] * FPS)
         rows, waiting = rows[:last], rows[last:]
-        table = _rows(rows[:, 0], rows[:, 1], start, speed, lane, length, rng)
+        table = _rows(rows[:, 0], rows[:, 1], start, speed, lane, north, length, rng)
         writer = writer or pq.ParquetWriter(folder / "tracks.parquet", table.schema)
         writer.write_table(table, row_group_size=20_000)
     assert writer is not None
@@ -80,11 +84,12 @@ def write_day(folder: Path, vehicles: int) -> None:
     (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": 0}}}))
 
 
-def _rows(frame, who, start, speed, lane, length, rng) -> pa.Table:
-    t = frame / FPS
-    x = 2 + speed[who] * (t - start[who])
-    y = lane[who] + 0.02 * rng.standard_normal(len(x))
-    high, count = 20.0, len(x)
+def _rows(frame, who, start, speed, lane, north, length, rng) -> pa.Table:
+    t, up, count = frame / FPS, north[who], len(frame)
+    along, beside = 2 + speed[who] * (t - start[who]), lane[who] + 0.02 * rng.standard_normal(count)
+    x, y = np.where(up, beside, along), np.where(up, along, beside)
+    wide, high = np.where(up, 20, SCALE * length[who]), np.where(up, SCALE * length[who], 20)
+    v = SCALE * speed[who]
 
     def noisy(value: float) -> np.ndarray:
         return np.round(value * (1 + 0.1 * rng.standard_normal(count)), 3)
@@ -96,35 +101,57 @@ def _rows(frame, who, start, speed, lane, length, rng) -> pa.Table:
         "status": pa.array(np.full(count, "confirmed")),
         "x_px": np.round(SCALE * x, 3),
         "y_px": np.round(720 - SCALE * y - 2, 3),
-        "vx_px_s": np.round(SCALE * speed[who], 3),
-        "vy_px_s": noisy(1.0),
+        "vx_px_s": np.round(np.where(up, 0, v), 3) + noisy(1.0),
+        "vy_px_s": np.round(np.where(up, -v, 0), 3) + noisy(1.0),
         "sigma_x_px": noisy(0.7),
         "sigma_y_px": noisy(0.7),
-        "left_px": np.round(SCALE * (x - length[who] / 2), 3),
+        "left_px": np.round(SCALE * x - wide / 2, 3),
         "top_px": np.round(720 - SCALE * y - high / 2, 3),
-        "width_px": np.round(SCALE * length[who], 3),
-        "height_px": np.full(count, high),
+        "width_px": wide,
+        "height_px": high,
         "x_m": np.round(x, 3),
         "y_m": np.round(y, 3),
         "sigma_x_m": noisy(0.2),
         "sigma_y_m": noisy(0.2),
+        "corr_xy_m": noisy(0.1),
         "speed_kmh": np.round(3.6 * speed[who] + 0.2 * rng.standard_normal(count), 3),
         "speed_sigma_kmh": noisy(1.5),
         "speed_shared_sigma_kmh": noisy(0.3),
-        "heading_deg": np.round(90 + rng.standard_normal(count), 2),
+        "heading_deg": np.round(np.where(up, 0, 90) + rng.standard_normal(count), 2),
         "length_m": np.round(length[who], 3),
         "length_sigma_m": noisy(0.4),
+        "seen_left_px": np.round(SCALE * (x - length[who] / 2), 3),
+        "seen_top_px": np.round(720 - SCALE * y - high / 2, 3),
+        "seen_right_px": np.round(SCALE * (x + length[who] / 2), 3),
+        "seen_bottom_px": np.round(720 - SCALE * y + high / 2, 3),
+        "width_m": np.round(np.minimum(0.4 * length[who], 2.55), 3),
     }
     return pa.table(columns)
 
 
 def read(folder: Path) -> None:
     """Read the columns that figures need, and nothing else."""
-    from vidtrack.traffic.measures.rows import ROAD_COLUMNS, blocks
+    from vidtrack.traffic.measures.rows import EDGE_COLUMNS, ROAD_COLUMNS, blocks
 
-    for table in blocks(folder, ROAD_COLUMNS):
+    for table in blocks(folder, (*ROAD_COLUMNS, *EDGE_COLUMNS)):
         for name in table.column_names:
             table[name].combine_chunks()
+
+
+def conflicts(folder: Path) -> None:
+    """Read, and find all conflicts."""
+    from vidtrack.traffic.calibration.calibrate import calibrated
+    from vidtrack.traffic.measures.conflicts import Meeting
+    from vidtrack.traffic.measures.rows import Reader
+    from vidtrack.traffic.measures.runs import open_day
+    from vidtrack.traffic.site import read_site
+
+    site = read_site(folder / "site.toml")
+    day = open_day([str(folder)], site.camera.start)
+    reader, meeting = Reader(day, {one.size: calibrated(site) for one in day.recordings}), Meeting()
+    for rows in reader:
+        meeting.add(rows)
+    print(len(meeting.conflicts(np.arange(len(reader.names[0])), day.spans)), "conflicts")
 
 
 def measure(folder: Path) -> None:
@@ -136,21 +163,24 @@ def measure(folder: Path) -> None:
     print({name: len(table) for name, table in found.tables.items()})
 
 
+PARTS = {"read": read, "conflicts": conflicts, "measure": measure}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--vehicles", type=int, default=100_000)
     parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--only", choices=("read", "measure"))
+    parser.add_argument("--only", choices=PARTS)
     options = parser.parse_args()
     if options.only:
         begin = time.perf_counter()
-        (read if options.only == "read" else measure)(options.output)
+        PARTS[options.only](options.output)
         seconds, peak = time.perf_counter() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(f"{options.only}: {seconds:.1f} s, {time.process_time():.1f} s of CPU, at most {peak:.0f} MB")
         return
     if not (options.output / "summary.json").exists():
         write_day(options.output, options.vehicles)
-    for only in ("read", "measure", "read", "measure"):
+    for only in (*PARTS, *PARTS):
         subprocess.run([sys.executable, __file__, "-o", options.output, "--only", only], check=True)
 
 

@@ -7,28 +7,28 @@ track CLIP/video.avi --site CLIP/site.toml -o CLIP/run`) these are scored as wel
 as if they were tracks: what is missed then is missed by the geometry.
 
 A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
-same legs whose two times are within 1 s.
+same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
+Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
-import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
+from exact_run import write_exact_run
 from scipy.optimize import linear_sum_assignment
 
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.site import read_site
 
-TOLERANCE_S = 1.0
+TOLERANCE_S, TOLERANCE_M = 1.0, 15.0
 FPS = 25.0
-SIGMA = 0.01  # of exact states, in the units of their columns
+SIZE = (1280, 720)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -41,24 +41,10 @@ def exact_run(clip: Path, folder: Path) -> None:
     states = rows_of(clip / "road_truth.csv")
     column = {name: np.array([float(row[name]) for row in states]) for name in states[0] if name != "class"}
     boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)[:, 2:6]
-    count = len(states)
-    small, none = np.full(count, SIGMA), np.zeros(count)
-    table = {
-        "time_s": column["time_s"],
-        "track_id": column["target_id"].astype(np.int64),
-        "status": np.full(count, "confirmed"),
-        **{name: column[name] for name in ("x_m", "y_m", "speed_kmh", "length_m")},
-        **dict.fromkeys(("sigma_x_m", "sigma_y_m", "speed_sigma_kmh", "length_sigma_m"), small),
-        "speed_shared_sigma_kmh": none,
-        "heading_deg": 90 - column["heading_deg"],
-        **dict.fromkeys(("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px"), none),
-        **dict(zip(("left_px", "top_px", "width_px", "height_px"), boxes.T, strict=True)),
-    }
-    folder.mkdir()
-    pq.write_table(pa.table(table), folder / "tracks.parquet")
-    frames = int(column["frame"].max())
-    summary = {"frames": frames, "media_s": float(column["time_s"].max()), "fps": FPS, "width": 1280, "height": 720}
-    (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": 0.0}}}))
+    names = ("time_s", "x_m", "y_m", "speed_kmh", "length_m", "width_m")
+    exact = {name: column[name] for name in names}
+    exact |= {"track_id": column["target_id"], "heading_deg": 90 - column["heading_deg"]}
+    write_exact_run(folder, exact, boxes, FPS, SIZE, float(column["time_s"].max()))
 
 
 def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:
@@ -71,6 +57,27 @@ def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:
                 cost[i, j] = off
     rows, columns = linear_sum_assignment(cost)
     return [(i, j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1e3]
+
+
+def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dict[str, object]:
+    """Conflicts: how many there were, were found, and were right; errors of the post-encroachment times [s]."""
+    true = [event for event in events if event["event"] == "conflict"]
+    states = {(int(row["target_id"]), int(row["frame"])): row for row in rows_of(clip / "road_truth.csv")}
+    cost = np.full((len(true), len(rows)), 1e3)
+    for i, event in enumerate(true):
+        at = states.get((int(event["target_id"]), round(float(event["time_s"]) * FPS) + 1))
+        for j, row in enumerate(rows):
+            kind = "ttc" if row["pet_s"] is None else "pet"
+            late = abs(float(event["time_s"]) - row["time_s"])
+            if at is None or late > TOLERANCE_S:
+                continue
+            far = np.hypot(float(at["x_m"]) - row[f"{kind}_x_m"], float(at["y_m"]) - row[f"{kind}_y_m"])
+            cost[i, j] = late if far < TOLERANCE_M else 1e3
+    pairs = [(i, j) for i, j in zip(*linear_sum_assignment(cost), strict=True) if cost[i, j] < 1e3]
+    both = [(i, j) for i, j in pairs if true[i]["pet_s"] and rows[j]["pet_s"] is not None]
+    pet = np.array([rows[j]["pet_s"] - float(true[i]["pet_s"]) for i, j in both])
+    sigma = np.array([rows[j]["pet_sigma_s"] for _, j in both])
+    return {"close": len(true), "said": len(rows), "met": len(pairs), "pet": pet, "pet_sigma": sigma}
 
 
 def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
@@ -122,19 +129,28 @@ def score(clip: Path, run: Path) -> dict[str, float]:
         "untracked": sum(not tracked(clip, run, true[i]) for i in set(range(len(true))) - {i for i, _ in pairs}),
         "off": np.array(off),
         "sigma": np.array(sigma),
+        **conflicts(clip, events, found["conflicts"].to_pylist()),
     }
 
 
 def told(name: str, results: list[dict[str, float]]) -> str:
-    counts = ("true", "found", "hit", "movements", "trips", "right", "untracked")
+    counts = ("true", "found", "hit", "movements", "trips", "right", "untracked", "close", "said", "met")
     total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
-    off, sigma = (np.concatenate([result[key] for result in results]) for key in ("off", "sigma"))
+    off, sigma, pet, pet_sigma = (
+        np.concatenate([result[key] for result in results]) for key in ("off", "sigma", "pet", "pet_sigma")
+    )
+    late = "|"
+    if len(pet):
+        covered = np.mean(np.abs(pet) <= 1.96 * pet_sigma)
+        late = f"{np.median(pet):+.2f}, {np.median(np.abs(pet)):.2f} | {covered:.2f}"
     inside = np.mean(np.abs(off) <= 1.96 * sigma)
     return (
         f"| {name} | {total['true']:.0f} | {total['hit'] / total['true']:.3f} | {total['hit'] / total['found']:.3f} "
         f"| {total['movements']:.0f} | {total['right'] / total['movements']:.3f} "
         f"| {total['right'] / total['trips']:.3f} | {np.median(off):+.2f}, {np.median(np.abs(off)):.2f} "
-        f"| {inside:.2f} | {len(off) / total['hit']:.2f} | {total['untracked']:.0f} |"
+        f"| {inside:.2f} | {len(off) / total['hit']:.2f} | {total['untracked']:.0f} "
+        f"| {total['close']:.0f} | {total['met'] / total['close']:.3f} | {total['met'] / total['said']:.3f} "
+        f"| {late} |"
     )
 
 
@@ -143,7 +159,10 @@ def main() -> None:
     parser.add_argument("clips", nargs="+", type=Path)
     clips = parser.parse_args().clips
     of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"
-    print(f"| clip | crossings | {of} | movements | {of} | {speed} | missed without a track |")
+    pet = "PET error: median, median absolute | in 95 %"
+    print(
+        f"| clip | crossings | {of} | movements | {of} | {speed} | missed without a track | conflicts | {of} | {pet} |"
+    )
     exact, real = [], []
     with tempfile.TemporaryDirectory() as folder:
         for number, clip in enumerate(clips):

@@ -130,7 +130,7 @@ def test_a_folder_that_vanishes_stops_the_run(tmp_path):
 
 def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not(tmp_path):
     counter = LineCounter([parse_line("gate:100,0,100,200")])
-    summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING, counter)
+    summary = Summary(tmp_path / "summary.json", "a.avi", Settings(), lambda: READING, counter.totals)
     early = json.loads((tmp_path / "summary.json").read_text())
     for index, x in enumerate([80, 95, 115]):
         step = make_step(index, [(1, "c", x, 50), (2, "t", 5, 5)])
@@ -143,6 +143,7 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
     assert late["tracks"] == 1
     assert late["frames"] == 3
     assert late["media_s"] == 0.08
+    assert late["watched"] == [[0.0, 0.08]]
     assert late["counts"] == {"gate": {"left": 0, "right": 1}}
     assert late["stages"] == {"detect": 0.006, "track": 0.003}
     assert late["fps"] == 25.0
@@ -173,7 +174,7 @@ def killed_run(folder):
     counter = LineCounter([parse_line("gate:100,0,100,200")])
     sinks = (
         CountsFile(folder / "counts.csv", counter),
-        Summary(folder / "summary.json", "a.avi", Settings(), lambda: READING, counter),
+        Summary(folder / "summary.json", "a.avi", Settings(), lambda: READING, counter.totals),
         Confirmed(TrackTable(folder), MotFile(folder / "mot.txt")),
     )
     index = 0

@@ -6,7 +6,8 @@ from datetime import datetime
 
 import pytest
 
-from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
+from vidtrack.errors import ConfigError
+from vidtrack.recording.retention import Limits, Retention, new_part, parts_of, size_of
 
 
 def make_parts(root, sizes, ages_s=None):
@@ -27,8 +28,8 @@ def left(root):
 
 def test_by_size(tmp_path):
     make_parts(tmp_path, [1000] * 10)
-    retention = Retention(None, 5000)
-    retention.roots.append(tmp_path)
+    retention = Retention(Limits(None, 5000))
+    retention.results.append(tmp_path)
     retention.prune()
     assert left(tmp_path) == [6, 7, 8, 9]
     assert size_of(tmp_path) <= 5000
@@ -36,16 +37,16 @@ def test_by_size(tmp_path):
 
 def test_by_age(tmp_path):
     make_parts(tmp_path, [10] * 4, ages_s=[400, 300, 100, 50])
-    retention = Retention(200, None)
-    retention.roots.append(tmp_path)
+    retention = Retention(Limits(200, None))
+    retention.results.append(tmp_path)
     retention.prune()
     assert left(tmp_path) == [2, 3]
 
 
 def test_the_newest_part_stays_however_large(tmp_path):
     make_parts(tmp_path, [1000, 100_000])
-    retention = Retention(None, 5000)
-    retention.roots.append(tmp_path)
+    retention = Retention(Limits(None, 5000))
+    retention.results.append(tmp_path)
     retention.prune()
     assert left(tmp_path) == [1]
 
@@ -53,8 +54,9 @@ def test_the_newest_part_stays_however_large(tmp_path):
 def test_results_and_recordings_share_the_bound(tmp_path):
     make_parts(tmp_path / "out", [1000] * 5)
     make_parts(tmp_path / "tape", [4000] * 5)
-    retention = Retention(None, 12_000)
-    retention.roots.extend([tmp_path / "out", tmp_path / "tape"])
+    retention = Retention(Limits(None, 12_000))
+    retention.results.append(tmp_path / "out")
+    retention.recorded.append(tmp_path / "tape")
     retention.prune()
     assert left(tmp_path / "out") == left(tmp_path / "tape") == [3, 4]
 
@@ -63,8 +65,8 @@ def test_what_is_no_part_is_nobodys_business(tmp_path):
     (tmp_path / "holiday").mkdir()
     (tmp_path / "holiday" / "film").write_bytes(bytes(9000))
     make_parts(tmp_path, [1000] * 3)
-    retention = Retention(None, 5000)
-    retention.roots.append(tmp_path)
+    retention = Retention(Limits(None, 5000))
+    retention.results.append(tmp_path)
     retention.prune()
     assert (tmp_path / "holiday" / "film").exists()
 
@@ -72,8 +74,8 @@ def test_what_is_no_part_is_nobodys_business(tmp_path):
 @pytest.mark.parametrize("bounds", [(None, None), (1e9, 1e12)])
 def test_within_the_bounds_nothing_happens(tmp_path, bounds):
     make_parts(tmp_path, [1000] * 3)
-    retention = Retention(*bounds)
-    retention.roots.append(tmp_path)
+    retention = Retention(Limits(*bounds))
+    retention.results.append(tmp_path)
     retention.prune()
     assert left(tmp_path) == [0, 1, 2]
 
@@ -99,7 +101,88 @@ def test_names_stay_in_order_when_the_clock_is_set_back(tmp_path, monkeypatch):
     Clock.hour_now = 13
     made += [new_part(tmp_path)]
     assert parts_of(tmp_path) == made
-    retention = Retention(1e9, None)
-    retention.roots.append(tmp_path)
+    retention = Retention(Limits(1e9, None))
+    retention.results.append(tmp_path)
     retention.prune()
     assert parts_of(tmp_path)[-1] == made[-1]
+
+
+def counted_parts(root, number, ages_s=None):
+    parts = make_parts(root, [1000] * number)
+    for k, part in enumerate(parts):
+        (part / "counts.csv").write_text("time_s,frame,line,direction,track_id\n1.0,25,gate,left,7\n")
+        (part / "summary.json").write_text("{}")
+        (part / "tracks.parquet.parts").mkdir()
+        if ages_s:
+            os.utime(part / "counts.csv", (time.time() - ages_s[k],) * 2)
+            os.utime(part, (time.time() - ages_s[k],) * 2)
+    return parts
+
+
+def files_of(part):
+    return sorted(path.name for path in part.iterdir())
+
+
+def test_counts_outlive_their_tracks(tmp_path):
+    parts = counted_parts(tmp_path, 4, [400, 300, 100, 50])
+    retention = Retention(Limits(200))
+    retention.results.append(tmp_path)
+    retention.prune()
+    assert [files_of(part) for part in parts[:2]] == [["counts.csv", "summary.json"]] * 2
+    assert all("tracks.csv" in files_of(part) for part in parts[2:])
+
+
+def test_parts_left_with_counts_only_do_not_stop_a_later_run(tmp_path):
+    """Their folders were changed just now, and those after them are older."""
+    parts = counted_parts(tmp_path, 4, [400, 300, 100, 50])
+    for limit_s in (350, 200):
+        retention = Retention(Limits(limit_s))
+        retention.results.append(tmp_path)
+        retention.prune()
+    assert ["tracks.csv" in files_of(part) for part in parts] == [False, False, True, True]
+
+
+def test_counts_go_when_they_are_told_to(tmp_path):
+    counted_parts(tmp_path, 4, [400, 300, 100, 50])
+    retention = Retention(Limits(200), counts_s=350)
+    retention.results.append(tmp_path)
+    retention.prune()
+    assert left(tmp_path) == [1, 2, 3]
+
+
+def test_a_size_limit_counts_what_it_may_delete(tmp_path):
+    parts = counted_parts(tmp_path, 10)
+    for part in parts:
+        (part / "counts.csv").write_bytes(bytes(9000))
+    retention = Retention(Limits(None, 5000))
+    retention.results.append(tmp_path)
+    retention.prune()
+    assert [("tracks.csv" in files_of(part)) for part in parts] == [False] * 6 + [True] * 4
+
+
+def test_each_kind_has_a_limit_of_its_own(tmp_path):
+    ages_s = [400, 300, 100, 50]
+    make_parts(tmp_path / "out", [10] * 4, ages_s)
+    make_parts(tmp_path / "tape", [1000] * 4, ages_s)
+    retention = Retention(Limits(350), tracks=Limits(1e9), recordings=Limits(None, 2500))
+    retention.results.append(tmp_path / "out")
+    retention.recorded.append(tmp_path / "tape")
+    retention.prune()
+    assert left(tmp_path / "out") == [0, 1, 2, 3]
+    assert left(tmp_path / "tape") == [2, 3]
+    assert (retention.tracks_part, retention.recordings_part) == (None, 2500 / 8)
+
+
+@pytest.mark.parametrize(
+    ("limits", "kind"),
+    [
+        ({"both": Limits(None, 1e6)}, "live.keep_bytes = 1 MB"),
+        ({"both": Limits(), "tracks": Limits(None, 3e6)}, "live.keep_tracks_bytes = 3 MB"),
+        ({"both": Limits(), "recordings": Limits(None, 50e6)}, "live.keep_recordings_bytes = 50 MB"),
+    ],
+)
+def test_limits_that_cannot_be_held_are_refused(limits, kind):
+    """A part of the recording holds a state of 4 MB, one of the results a picture of 230 kB."""
+    with pytest.raises(ConfigError, match=f"{kind} cannot be held.*give at least"):
+        Retention(**limits).refuse_small(230e3, 4e6)
+    Retention(Limits(None, 64e6), Limits(None, 4e6), Limits(None, 64e6)).refuse_small(230e3, 4e6)

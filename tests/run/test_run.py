@@ -103,7 +103,9 @@ def test_every_step_is_seen_and_written(tmp_path):
         "mot.txt",
         "summary.json",
         "tracks.png",
+        "scene.jpg",
     }
+    assert cv2.imread(str(run.folder / "scene.jpg")).shape == (240, 320, 3)
 
 
 def test_a_run_left_by_an_error_is_complete_up_to_there(tmp_path):

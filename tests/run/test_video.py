@@ -154,3 +154,23 @@ def test_a_mirrored_video_gives_mirrored_tracks():
         assert len(seen) == len(other)
         x = np.sort(seen.xy[:, 0])
         assert np.abs(x - np.sort(width - 1 - other.xy[:, 0])).max(initial=0) < 0.5
+
+
+def test_a_site_says_where_tracks_stand(tmp_path):
+    """Seen from straight above, 10 px a metre: speeds are those in the picture."""
+    corners = [[0, 0], [319, 0], [319, 239], [0, 239]]
+    ground = [[x / 10, -y / 10] for x, y in corners]
+    text = f'[site]\nname = "a"\nwidth = 320\nheight = 240\n[calibration]\npicture = {corners}\nground = {ground}\n'
+    (tmp_path / "site.toml").write_text(text)
+    known = 0
+    for frame, tracks, stand in track(CROSSING, site=tmp_path / "site.toml"):
+        assert len(stand.xy) == len(tracks)
+        moving = np.isfinite(stand.xy[:, 0]) & (np.linalg.norm(tracks.v, axis=1) > 20)
+        assert stand.speed[moving] == pytest.approx(np.linalg.norm(tracks.v[moving], axis=1) / 10, rel=0.01)
+        known += int(moving.sum())
+        if frame.time_s > 3:
+            break
+    assert known > 20
+    (tmp_path / "bare.toml").write_text(text.partition("[calibration]")[0])
+    with pytest.raises(ConfigError, match="no section"):
+        next(track(CROSSING, site=tmp_path / "bare.toml"))

@@ -46,6 +46,7 @@ class MadeUp:
         self.encode_s = encode_s
         self.changes = changes
         self.looks = self.pictures = self.at_once = self.most_at_once = 0
+        self.counts = None
         self._lock = Lock()
 
     def status(self):
@@ -82,7 +83,7 @@ class MadeUp:
         return cv2.imencode(".jpg", picture)[1].tobytes()
 
     def camera(self):
-        return Camera(self.status, self.picture)
+        return Camera(self.status, self.picture, lambda: self.counts)
 
 
 @contextmanager

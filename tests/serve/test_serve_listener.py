@@ -21,6 +21,9 @@ def test_other_machines_need_a_token(token):
         listen("0.0.0.0:0", token)
     with listen("0.0.0.0:0", "secret") as listener:
         assert listener.getsockname()[0] == "0.0.0.0"
+        assert (
+            url_of(listener) == f"http://{socket.gethostname()}:{listener.getsockname()[1]}/"
+        )  # one that can be typed
 
 
 @pytest.mark.skipif(not socket.has_ipv6, reason="needs IPv6")

@@ -1,5 +1,6 @@
 """Many, slow and dead clients cost little, and the tracker nothing."""
 
+import contextlib
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -7,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from page_client import HANG_S, MadeUp, connect, get, page_over, wait_for
 
+from vidtrack.serve import connection
 from vidtrack.serve.page import Page
 
 ASK = b"GET /%s HTTP/1.1\r\nHost: localhost\r\n\r\n"
@@ -66,7 +68,7 @@ def test_a_client_that_takes_nothing_is_cut_off(monkeypatch):
 
 
 def test_who_connects_has_to_ask_soon(monkeypatch):
-    monkeypatch.setattr("vidtrack.serve.page._ASK_S", 0.2)
+    monkeypatch.setattr("vidtrack.serve.connection.ASK_S", 0.2)
     with page_over({"gate": MadeUp()}) as url:
         client = connect(url)
         client.settimeout(HANG_S)
@@ -74,8 +76,8 @@ def test_who_connects_has_to_ask_soon(monkeypatch):
 
 
 def test_the_number_of_connections_is_bounded(monkeypatch):
-    monkeypatch.setattr("vidtrack.serve.page._MOST", 5)
-    monkeypatch.setattr("vidtrack.serve.page._ASK_S", 2 * HANG_S)
+    monkeypatch.setattr("vidtrack.serve.connection.MOST", 5)
+    monkeypatch.setattr("vidtrack.serve.connection.ASK_S", 2 * HANG_S)
     with Page("0") as page:
         page.show({"gate": MadeUp().camera()})
         silent = [connect(page.url, b"GET /") for _ in range(20)]
@@ -88,7 +90,7 @@ def test_the_number_of_connections_is_bounded(monkeypatch):
 
 
 def connections_of(page):
-    return len(page._server.server_state.connections)
+    return len(page._server._server.server_state.connections)
 
 
 def is_open(client):
@@ -117,3 +119,34 @@ def test_nonsense_is_refused_in_silence(capfd):
         assert b" 400 " in client.recv(1000)
         assert answers(url)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_request_that_drips_is_not_waited_for(monkeypatch):
+    """Each byte comes in time, and the whole does not."""
+    monkeypatch.setattr("vidtrack.serve.connection.ASK_S", 0.3)
+    with Page("0") as page:
+        page.show({"gate": MadeUp().camera()})
+        client = connect(page.url, b"GET / HTTP/1.1\r\n")
+        until_s = time.monotonic() + HANG_S
+        with contextlib.suppress(ConnectionError):
+            while is_open(client):
+                assert time.monotonic() < until_s
+                client.sendall(b"X-a: b\r\n")
+                time.sleep(0.02)
+        wait_for(lambda: connections_of(page) == 0)
+
+
+def test_health_is_answered_whoever_holds_connections_open(monkeypatch):
+    monkeypatch.setattr("vidtrack.serve.connection.ASK_S", 2 * HANG_S)
+    with Page("0") as page:
+        page.show({"gate": MadeUp().camera()})
+        held = [connect(page.url, b"GET / HTTP/1.1\r\n") for _ in range(120)]
+        wait_for(lambda: connections_of(page) == sum(map(is_open, held)) == connection.MOST_EACH)
+        for _ in range(15):
+            held.append(connect(page.url, b"GET / HTTP/1.1\r\n"))
+            assert get(page.url + "healthz")[0] == 200
+        assert connections_of(page) <= connection.MOST_EACH
+        streams = [connect(page.url, ASK % b"tracks") for _ in range(60)]
+        assert get(page.url + "healthz")[0] == 200
+        for client in [*held, *streams]:
+            client.close()

@@ -152,3 +152,11 @@ def test_a_failure_is_told_and_the_page_goes_on(caplog):
             assert get(url + "status")[0] == 500
         assert "the page failed at /status" in caplog.text
         assert get(url + "healthz")[0] == 200
+
+
+def test_results_that_are_not_written_are_no_health():
+    full = MadeUp(failing={"results": "No space left on device"})
+    with page_over({"gate": full}) as url:
+        code, _, body = get(url + "healthz")
+        assert (code, body) == (503, b"gate: results: No space left on device\n")
+        assert get_json(url + "status")[0]["up"] is False

@@ -157,3 +157,15 @@ def test_a_line_outside_the_picture_is_warned_of(caplog):
     with caplog.at_level(logging.WARNING):
         parse_lines(["in:0,5,9,5", "out:0,50,9,50"], 320, 40)
     assert [record.args[0] for record in caplog.records] == ["out"]
+
+
+@pytest.mark.parametrize("name", ["=cmd|' /C calc'!A0", "+1", "-a", "@SUM(A1)", "\tx"])
+def test_a_name_is_no_formula_to_a_spreadsheet(name):
+    with pytest.raises(ConfigError, match="formula to spreadsheets"):
+        parse_line(f"{name}:0,0,10,10")
+
+
+def test_counts_go_on_from_earlier_ones():
+    counter = LineCounter([parse_line(GATE)])
+    counter.resume({"gate": {"left": 3, "right": 4}, "gone": {"up": 9}})
+    assert counter.totals() == {"gate": {"left": 3, "right": 4}}

@@ -15,10 +15,12 @@ from synthetic_steps import make_step
 
 from vidtrack.arrays.affine import shift
 from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError
 from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
 from vidtrack.run.live.parts import Part
 from vidtrack.run.sinks import Subject
+from vidtrack.traffic.measures.runs import site_of
 from vidtrack.traffic.metres import footprints_of
 
 CAMERA = Pinhole()
@@ -88,6 +90,7 @@ def test_a_run_at_a_site_writes_metres_and_speeds(road):
 
 def test_a_run_at_a_site_can_be_exported(road):
     assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)[0] == 0
+    (road / "site.toml").unlink()  # the run has a copy
     code, out, err = vidtrack("export", "out", "--as", "sumo", "-o", "fcd", cwd=road)
     assert (code, out) == (0, "fcd\n")
     assert err.startswith("site road; 1 track; ")
@@ -138,7 +141,8 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     folder = road / "part"
     folder.mkdir()
     blank = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints)
+    text = (road / "site.toml").read_text()
+    subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints, text)
     part = Part(folder, subject, decisions=False)
     part.write([make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])], "")
     part.finish()
@@ -146,6 +150,35 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     assert list(rows[0]) == [column.name for column in (*VIDEO, *ROAD)]
     assert all(float(row["y_m"]) > 10 for row in rows)
     assert pq.read_table(folder / "tracks.parquet").column_names == list(rows[0])
+    assert (folder / "site.toml").read_text() == text
+
+
+GATE = "[gates.near]\nline = [[1, 360], [1279, 360]]\n"
+
+
+def test_a_run_is_measured_at_the_site_as_it_was(road):
+    """The site's file moved its gate away since."""
+    drawn = (road / "site.toml").read_text()
+    (road / "site.toml").write_text(drawn + GATE)
+    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)[0] == 0
+    assert (road / "out" / "site.toml").read_text() == drawn + GATE
+    (road / "site.toml").write_text(drawn + GATE.replace("360", "3"))
+    code, out, err = vidtrack("measure", "out", cwd=road)
+    assert (code, out) == (0, "runs/out-measures\n")
+    assert "1 crossings" in err
+
+
+def test_without_a_site_that_all_runs_have_one_must_be_given(tmp_path):
+    folders = [tmp_path / name for name in ("a", "b", "c")]
+    for folder, text in zip(folders, (GATE, GATE, GATE.replace("360", "3")), strict=True):
+        folder.mkdir()
+        (folder / "site.toml").write_text(text)
+    a, b, c = map(str, folders)
+    assert site_of([f"{a}@2026-06-01T07:00:00Z", b]) == folders[0] / "site.toml"
+    with pytest.raises(ConfigError, match=r"a/site.toml and .*c/site.toml are not the same site; give --site"):
+        site_of([a, b, c])
+    with pytest.raises(ConfigError, match=r"has no site.toml: it was tracked without a site; give --site"):
+        site_of([a, str(tmp_path)])
 
 
 def test_calibrate_draws_and_reports(road):

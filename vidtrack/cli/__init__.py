@@ -15,9 +15,11 @@ from vidtrack.errors import Error
 COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
     "live": "Tracks from a camera or a stream, until stopped.",
+    "site": "Draw a site's gates, zones and points over the tracks of a run.",
     "calibrate": "Check what a site's calibration is worth.",
     "measure": "Traffic figures of a site from finished runs.",
     "report": "A site's report as a page, pictures and spreadsheets.",
+    "review": "Look at counted crossings, and correct them.",
     "doctor": "Look at a source, and say which setting will hurt.",
     "radar": "Tracks from a table of radar plots.",
     "simulate": "Draw a traffic video or radar plots with exact truth.",

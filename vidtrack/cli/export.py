@@ -22,7 +22,8 @@ class ExportOptions(Options):
 
 _HELP = f"""Write the tracks of the folder RUN, made with `vidtrack track --site`, in a format of other programs.
 
-Rows outside the calibrated part of the picture have no position and are left out.
+Rows outside the calibrated part of the picture have no position and are left out. For utdf, RUN is a folder that
+`vidtrack measure` wrote.
 
 \b
 {chr(10).join(f"{name:10}  {form.writes}" for name, form in FORMATS.items())}
@@ -36,7 +37,8 @@ Rows outside the calibrated part of the picture have no position and are left ou
 Examples:
   vidtrack export runs/motorway --as geojson
   vidtrack export runs/motorway --as sumo -o fcd
-  vidtrack export runs/motorway --as ssam --site site.toml""",
+  vidtrack export runs/motorway --as ssam --site site.toml
+  vidtrack export monday --as utdf""",
 )
 @click.argument("run", type=click.Path(path_type=Path))
 @common("Folder to write.  [default: runs/RUN-FORMAT]")
@@ -47,22 +49,30 @@ def command(options: ExportOptions) -> None:
     """Export a run."""
     from contextlib import suppress
 
-    from vidtrack.errors import Error
+    from vidtrack.errors import ConfigError, Error
     from vidtrack.output.export.registry import export
-    from vidtrack.output.export.road_run import open_road_run
+    from vidtrack.output.export.road_run import RoadRun, open_road_run
     from vidtrack.output.folder import open_folder
+    from vidtrack.traffic.report.findings import Findings, read_findings
 
     start_log(options.verbose, options.quiet)
-    run = open_road_run(options.run, options.site)
+    run: RoadRun | Findings
+    if FORMATS[options.form].measures:
+        if options.site is not None:
+            raise ConfigError(f"{options.form} takes the site that was measured at; measure again with another --site")
+        run = read_findings(options.run)
+    else:
+        run = open_road_run(options.run, options.site)
     folder = open_folder(options.output, f"{options.run.resolve().name}-{options.form}", options.force)
     try:
-        export(run, options.form, folder)
+        said = export(run, options.form, folder)
     except Error:
         with suppress(OSError):
             folder.rmdir()  # if nothing else is in it
         raise
     if not options.quiet:
-        tracks = f"{len(run.vehicles.track)} track{'s' if len(run.vehicles.track) > 1 else ''}"
-        positions = f"{run.positions} of {run.rows} rows have a position in metres"
-        click.echo(f"site {run.site.camera.name}; {tracks}; {positions}", err=True)
+        if isinstance(run, RoadRun):
+            tracks = f"{len(run.vehicles.track)} track{'s' if len(run.vehicles.track) > 1 else ''}"
+            said = f"{tracks}; {run.positions} of {run.rows} rows have a position in metres"
+        click.echo(f"site {run.site.camera.name}; {said}", err=True)
     click.echo(folder)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from vidtrack.serve.page import Page
 
 _REPORT_S = 60.0
+_KINDS = ("", "tracks", "recordings", "counts")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
 
@@ -44,14 +45,24 @@ class LiveOptions(PictureOptions):
         given = super().given()
         if self.roll is not None:
             given.append(amount("--roll", self.roll, {"live.roll_s": _SECONDS}))
-        units = {"live.keep_s": _SECONDS, "live.keep_bytes": _BYTES}
-        return [*given, *(amount("--keep", text, units) for text in self.keeps)]
+        return [*given, *map(kept, self.keeps)]
 
     def extras(self) -> LiveExtras:
         """The optional outputs."""
         from vidtrack.run.live.outputs import LiveExtras
 
         return LiveExtras(self.rerun, self.video, self.save_masks, self.decisions, self.state, self.record)
+
+
+def kept(text: str) -> tuple[str, float]:
+    """The setting and its value of --keep [KIND:]TIME|SIZE. Raises click.BadParameter."""
+    kind, colon, value = text.rpartition(":")
+    if kind not in _KINDS or (colon and not kind):
+        raise click.BadParameter(f"{text!r}: {kind!r} is not one of tracks, recordings, counts", param_hint="--keep")
+    units = {f"live.keep_{kind and f'{kind}_'}s": _SECONDS}
+    if kind != "counts":  # they take next to nothing
+        units[f"live.keep_{kind and f'{kind}_'}bytes"] = _BYTES
+    return amount("--keep", value, units)
 
 
 def amount(option: str, text: str, units: Mapping[str, Mapping[str, float]]) -> tuple[str, float]:
@@ -80,7 +91,13 @@ Examples:
     "--every-frame", is_flag=True, default=None, help="Track every frame, and fall behind rather than drop one."
 )
 @click.option("--roll", metavar="TIME", help="Results go on in a new sub-folder after 10m, 1h, 1d, ...")
-@click.option("--keep", "keeps", multiple=True, metavar="TIME|SIZE", help="Delete the oldest: 7d or 10GB, or both.")
+@click.option(
+    "--keep",
+    "keeps",
+    multiple=True,
+    metavar="[KIND:]TIME|SIZE",
+    help="Delete the oldest tracks and recordings: 7d or 10GB, or both; or of one KIND: tracks, recordings, counts.",
+)
 @click.option("--state", type=click.Path(path_type=Path), metavar="FILE", help="Go on from this file, and save to it.")
 @click.option("--record", type=click.Path(path_type=Path), metavar="DIR", help="Keep what the camera sends, to replay.")
 @click.option("--http", metavar="[HOST:]PORT", help="Serve a live page; without HOST for this machine only.")
@@ -131,14 +148,22 @@ def command(options: LiveOptions) -> int:
 def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> None:
     from vidtrack.cli.signals import stopping
     from vidtrack.run.live.run import LiveRun
+    from vidtrack.run.live.view import View
     from vidtrack.serve.camera import Camera
+    from vidtrack.video.live.address import parse_address
 
+    stale_s = 2 * settings.live.timeout_s
+    address = parse_address(options.sources[0], settings.live.timeout_s)
+    view = View(address.shown)
+    if page is not None:
+        page.show({address.name: Camera(view.status, view.picture, lambda: view.counts, stale_s)})
     with (
-        LiveRun(options.sources[0], settings, options.output, options.extras(), force=options.force) as run,
+        LiveRun(
+            options.sources[0], settings, options.output, options.extras(), force=options.force, stats=view.stats
+        ) as run,
         stopping(run.stop),
     ):
-        if page is not None:
-            page.show({run.name: Camera.of(run.board, stale_s=2 * settings.live.timeout_s)})
+        view.board, view.counts = run.board, run.counts
         reported_s = time.monotonic()
         for _ in run:
             if not options.quiet and time.monotonic() - reported_s > _REPORT_S:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from rich.console import Console
+from rich.table import Table
 
 from vidtrack.cli.options import start_log
 
@@ -30,7 +32,7 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     """Track all cameras until a signal; the exit code is 0 unless every camera failed."""
     from vidtrack.cli.signals import stopping
     from vidtrack.output.folder import open_run, usable
-    from vidtrack.run.live.cameras import extras_of, listed, named, settings_of
+    from vidtrack.run.live.cameras import extras_of, listed, named, refuse_shared_site, settings_of
     from vidtrack.run.live.supervisors import Supervisors
     from vidtrack.run.live.worker import Job
 
@@ -40,6 +42,7 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     else:
         cameras = named(options.sources)
     wanted = [settings_of(camera, for_all, options.config_file, options.given()) for camera in cameras]
+    refuse_shared_site(cameras, wanted)
     own = [extras_of(camera, options.extras()) for camera in cameras]
     folder = open_run(None, "live", options.force) if options.output is None else usable(options.output)
     log = partial(start_log, options.verbose, options.quiet)
@@ -68,7 +71,9 @@ def _show(page: Page, supervisors: Supervisors) -> None:
 
     page.show(
         {
-            name: Camera(supervisor.status, supervisor.picture, stale_s=2 * supervisor.job.settings.live.timeout_s)
+            name: Camera(
+                supervisor.status, supervisor.picture, supervisor.counts, 2 * supervisor.job.settings.live.timeout_s
+            )
             for name, supervisor in supervisors.by_camera.items()
         }
     )
@@ -89,9 +94,6 @@ def _line(supervisor: Supervisor) -> str:
 
 
 def _print_table(supervisors: Supervisors) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     columns = ("frames", "tracks", "frames_dropped", "reconnects", "stalls", "restarts")
     summary = supervisors.summary()
     table = Table("camera", *(name.replace("frames_", "") for name in columns), "end")

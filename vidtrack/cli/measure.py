@@ -17,7 +17,7 @@ class MeasureOptions(Options):
     """What `vidtrack measure` is told."""
 
     runs: tuple[str, ...]
-    site: Path
+    site: Path | None
     json_to: str | None
 
 
@@ -25,19 +25,23 @@ class MeasureOptions(Options):
     name="measure",
     epilog="""\b
 Examples:
-  vidtrack measure runs/traffic --site site.toml
+  vidtrack measure runs/traffic
+  vidtrack measure runs/traffic --site moved-gates.toml
   vidtrack measure hour-07 hour-08 hour-09 --site site.toml -o monday
   vidtrack measure cam1@2026-06-01T07:00:00+02:00 --site site.toml --json -""",
 )
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True)
 @click.option(
-    "--site", required=True, type=click.Path(path_type=Path), metavar="SITE.toml", help="Gates and calibration."
+    "--site",
+    type=click.Path(path_type=Path),
+    metavar="SITE.toml",
+    help="Gates and calibration.  [default: the site that the runs were tracked with, as it was then]",
 )
-@common("Folder for the tables.  [default: runs/SITE]")
+@common("Folder for the tables.  [default: runs/SITE, or runs/RUN-measures without --site]")
 @json_option
 @receives(MeasureOptions)
 def command(options: MeasureOptions) -> None:
-    """Crossings, trips, intervals, stays, queues and checks from finished runs, without tracking again.
+    """Crossings, trips, intervals, stays, queues, conflicts and checks from finished runs, without tracking again.
 
     All RUNs are of one site and one day: files of hours, or a live run with its parts. RUN@TIME gives the time of a
     run's first picture; without it a live run knows its own, and a file goes on where the one before it ended.
@@ -47,20 +51,29 @@ def command(options: MeasureOptions) -> None:
     from vidtrack.output.folder import open_folder, replacing
     from vidtrack.recording.retention import parts_of
     from vidtrack.traffic.measures.measure import measured
+    from vidtrack.traffic.measures.runs import site_of
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)
-    site = read_site(options.site)
     runs = [part for run in options.runs for part in ([str(part) for part in parts_of(Path(run))] or [run])]
+    source = site_of(runs) if options.site is None else options.site
+    site, text = read_site(source), source.read_bytes()
     found = measured(runs, site)
-    folder = open_folder(options.output, options.site.stem, options.force)
+    first = Path(options.runs[0].partition("@")[0]).resolve()
+    name = f"{first.name}-measures" if options.site is None else options.site.stem
+    folder = open_folder(options.output, name, options.force)
     write_figures(folder, found.tables, found.report)
+    if found.report["conflicts"] is None:
+        for name in ("conflicts.csv", "conflicts.parquet"):  # of an earlier measurement, with a calibration
+            (folder / name).unlink(missing_ok=True)
     with replacing(folder / "site.toml") as new:  # the report draws its gates
-        new.write_bytes(options.site.read_bytes())
+        new.write_bytes(text)
     if options.json_to is not None:
         write_json(found.report, options.json_to)
     if not options.quiet:
         click.echo(_told(found.report), err=True)
+        if found.report["scale"] and found.report["scale"]["off"]:
+            click.echo(_doubt(found.report["scale"]), err=True)
     if options.json_to != "-":
         click.echo(folder)
 
@@ -68,9 +81,20 @@ def command(options: MeasureOptions) -> None:
 def _told(report: dict[str, Any]) -> str:
     """One line: what was found."""
     wrong = sum(movement["trips"] for movement in report["impossible_movements"])
+    conflicts = report["conflicts"]
+    close = "no conflicts without a calibration" if conflicts is None else f"{conflicts} conflicts"
     return (
         f"vidtrack: watched {report['watched_s']:.0f} s: {report['crossings']} crossings, "
         f"{report['complete_trips']} whole trips of {report['trips']}, {report['joins']} broken tracks joined; "
         f"{wrong} trips over impossible movements, {report['appeared']} vehicles appeared between the gates, "
-        f"{report['vanished']} vanished"
+        f"{report['vanished']} vanished; {close}"
+    )
+
+
+def _doubt(scale: dict[str, Any]) -> str:
+    """One line: the sizes of the vehicles contradict the calibration."""
+    return (
+        f"vidtrack: vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
+        f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the calibration: "
+        "speeds are off by as much"
     )

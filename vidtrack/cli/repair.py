@@ -38,7 +38,7 @@ def command(options: RepairOptions) -> None:
 
     from vidtrack.errors import StoppedEarly
     from vidtrack.output.folder import open_run, refuse_overwriting
-    from vidtrack.output.repair import repair
+    from vidtrack.output.repair import has_tracks, repair
     from vidtrack.recording.retention import parts_of
 
     start_log(options.verbose, options.quiet)
@@ -51,7 +51,8 @@ def command(options: RepairOptions) -> None:
         except Error as error:  # lists all files that could not be copied
             raise StoppedEarly(f"cannot copy {folder} to {copy}: {error.args[0][0][-1]}") from None
         folder = copy
-    for part in parts_of(folder) or [folder]:
+    parts = parts_of(folder) or [folder]
+    for part in [part for part in parts if part == folder or has_tracks(part)]:  # others have only counts left
         rows = repair(part)
         if not options.quiet:
-            click.echo(f"{part}: {rows} rows in tracks.csv and tracks.parquet", err=True)
+            click.echo(f"{part}: {rows} rows of tracks", err=True)

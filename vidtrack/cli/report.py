@@ -36,16 +36,17 @@ def command(options: ReportOptions) -> None:
     Writes report.html, one file that needs nothing else, and its pictures and tables as PNG and CSV.
     """
     from vidtrack.cli.calibrate import first_picture
+    from vidtrack.output.corrections import reviewed
     from vidtrack.output.folder import open_folder, refuse_overwriting
     from vidtrack.output.report.report import write_report
     from vidtrack.traffic.report.findings import read_findings
 
     start_log(options.verbose, options.quiet)
-    found = read_findings(options.measures)
+    found, by_hand = read_findings(options.measures), reviewed(options.measures)
     refuse_overwriting(options.measures, options.output)
     scene = None if options.picture is None else first_picture(options.picture)
     if scene is not None:
         found.site.scaled(scene.shape[1], scene.shape[0])  # refuses a picture of another shape
     folder = open_folder(options.output, f"{options.measures.resolve().name}-report", options.force)
-    write_report(folder, found, scene)
+    write_report(folder, found, scene, by_hand)
     click.echo(folder)

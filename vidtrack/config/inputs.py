@@ -43,7 +43,16 @@ _UNREAD = {
         *_OF_PICTURES,
         *("tracker.accel", "tracker.cross", "tracker.hold_s", "tracker.speed"),
         *("tracker.life", "tracker.coast_s", "tracker.clutter_density", "tracker.euclidean_radius_px"),
-        *("output.lines", "output.site", "output.link", "output.link_s", "output.trail_s", "output.rerun_picture_s"),
+        *(
+            "output.level",
+            "output.every_s",
+            "output.lines",
+            "output.site",
+            "output.link",
+            "output.link_s",
+            "output.trail_s",
+            "output.rerun_picture_s",
+        ),
     ),
 }
 """Groups and settings without effect on an input."""
@@ -75,6 +84,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.quiet_accel": ("radar.estimator", ("imm",)),
     "radar.quiet_s": ("radar.estimator", ("imm",)),
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
+    "output.every_s": ("output.level", ("tracks", "all")),
     "output.smooth_lag_s": ("output.smooth", (True,)),
 }
 """Groups and settings that have an effect only if another setting has one of these values."""

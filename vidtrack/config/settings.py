@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from vidtrack.config.group import Group
 from vidtrack.config.live import LiveSettings
-from vidtrack.config.names import Distance, Life, Method
+from vidtrack.config.names import Distance, Level, Life, Method
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.video import BlobSettings, DetectorSettings
 
@@ -126,6 +126,10 @@ class TrackerSettings(Group):
 
 
 class OutputSettings(Group):
+    level: Level = "all"
+    """how much is written: counts, also tracks (tracks.parquet alone), or all (also CSV, MOT and picture)"""
+    every_s: float = Field(0.0, ge=0)
+    """s; least time between two frames in the files of tracks, so that they are smaller; 0: every frame"""
     smooth: bool = False
     """tracks are smoothed: each row uses the measurements after it too; not in live runs"""
     smooth_lag_s: float | None = Field(None, gt=0)

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
 
 from vidtrack.decision import Choices, Event
+from vidtrack.errors import FormatError
 from vidtrack.output.linefile import LineFile
 from vidtrack.output.sink import Step
 
@@ -73,3 +79,23 @@ def _index(value: int) -> str:
 
 def _real(value: float) -> str:
     return "" if value != value else f"{value:.4g}"
+
+
+def read_decisions(path: Path, track_id: int, begin_s: float, end_s: float) -> list[dict[str, Any]]:
+    """Rows of decisions.csv of one track: those of a span of time, and its changes of status before.
+
+    Raises FormatError for a damaged file.
+    """
+    kinds = {"time_s": pa.float64(), "track_id": pa.int64(), "event": pa.string(), "reason": pa.string()}
+    rows: list[dict[str, Any]] = []
+    try:
+        with pyarrow.csv.open_csv(path, convert_options=pyarrow.csv.ConvertOptions(column_types=kinds)) as reader:
+            for batch in reader:
+                times = batch.column("time_s")
+                ours = pc.and_(pc.equal(batch.column("track_id"), track_id), pc.less_equal(times, end_s))
+                rows += batch.filter(ours).to_pylist()
+                if len(times) and times[-1].as_py() > end_s:
+                    break
+    except (pa.ArrowInvalid, pa.ArrowKeyError, KeyError) as error:
+        raise FormatError(f"{path} is damaged: {error}") from None
+    return [row for row in rows if row["time_s"] >= begin_s or row["event"] not in ("update", "miss")]

@@ -110,7 +110,12 @@ def moved_lines(lines: Sequence[Line], motion: Floats | None) -> list[Line]:
     return [Line(k.name, *end) for k, end in zip(lines, ends, strict=True)]
 
 
-def draw_clock(pen: Pen, time_s: float, facts: Iterable[str] = ()) -> None:
+def draw_clock(pen: Pen, clock: str, facts: Iterable[str] = ()) -> None:
     """Time and other text in the lower left corner."""
+    pen.label("  ".join([clock, *facts]), 0, pen.picture.shape[0], GREY)
+
+
+def media_clock(time_s: float) -> str:
+    """A media time as minutes and seconds."""
     minutes, seconds = divmod(time_s, 60)
-    pen.label("  ".join([f"{int(minutes)}:{seconds:06.3f}", *facts]), 0, pen.picture.shape[0], GREY)
+    return f"{int(minutes)}:{seconds:06.3f}"

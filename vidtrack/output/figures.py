@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,15 @@ def write_figures(folder: Path, tables: Mapping[str, pa.Table], report: Mapping[
     for name, table in tables.items():
         with replacing(folder / f"{name}.parquet") as new:
             pq.write_table(table, new)
-        with replacing(folder / f"{name}.csv") as new, new.open("wb") as file:
-            file.write((",".join(table.column_names) + "\n").encode())
-            pyarrow.csv.write_csv(table, file, _PLAIN)
+        with replacing(folder / f"{name}.csv") as new:
+            new.write_bytes(csv_of(table))
     with replacing(folder / "measures.json") as new:
         new.write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+
+
+def csv_of(table: pa.Table) -> bytes:
+    """A table of figures as CSV."""
+    content = BytesIO()
+    content.write((",".join(table.column_names) + "\n").encode())
+    pyarrow.csv.write_csv(table, content, _PLAIN)
+    return content.getvalue()

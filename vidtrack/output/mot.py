@@ -22,6 +22,8 @@ class MotFile:
     The rows of a gap wait until the track is measured again; they are dropped if the track ends first. Rows of later
     frames wait too, so that the file is always sorted and memory is bounded by the longest gap. `conf` is the track's
     probability of existence.
+
+    waits  whether rows of an open gap wait
     """
 
     def __init__(self, path: Path) -> None:
@@ -29,6 +31,17 @@ class MotFile:
         self._steps: list[Step] = []
         self._waiting = np.empty((0, 8))
         self._due = Every(1.0)
+        self._last: float = np.inf  # number of the last frame
+
+    @property
+    def waits(self) -> bool:
+        """Whether rows of a gap wait for later frames."""
+        return bool((self._waiting[:, _FRAME] <= self._last).any())
+
+    def end(self) -> None:
+        """The frames so far are all; later steps only tell whether tracks in a gap are found again."""
+        self.flush()
+        self._last = self._waiting[:, _FRAME].max(initial=-np.inf)
 
     def step(self, step: Step) -> None:
         """Receive one frame's confirmed tracks."""
@@ -51,6 +64,7 @@ class MotFile:
     def _write(self, alive: Ints) -> None:
         rows = np.concatenate([self._waiting, _rows(self._steps)]) if self._steps else self._waiting
         decided, self._waiting = settle_gaps(rows, alive)
+        decided = decided[decided[:, _FRAME] <= self._last]
         self._steps.clear()
         self._file.add(_lines(decided))
         self._file.flush()

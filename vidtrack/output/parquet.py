@@ -10,6 +10,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from vidtrack.errors import FormatError
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 
@@ -72,6 +73,24 @@ def _grouped(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
 def parts_folder(path: Path) -> Path:
     """Folder of the parts of an unfinished Parquet file."""
     return path.with_name(path.name + ".parts")
+
+
+def read_parquet(path: Path) -> pa.Table:
+    """The rows of a Parquet file. Raises FormatError."""
+    try:
+        return pq.read_table(path)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} is damaged: {error}") from None
+
+
+def join_parts(path: Path) -> pa.Table:
+    """Write a Parquet file from the parts that a killed run left; returns its rows. Raises FormatError."""
+    tables = [read_parquet(part) for part in sorted(parts_folder(path).glob("*.parquet"))]
+    if not tables:
+        raise FormatError(f"{path.parent} is not a run: it was killed before its tracks were written")
+    table = pa.concat_tables(tables)
+    write_parquet(path, table.schema, [table])
+    return table
 
 
 def write_parquet(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:

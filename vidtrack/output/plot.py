@@ -1,4 +1,4 @@
-"""tracks.png: the paths of all tracks over the background."""
+"""tracks.png: the paths of all tracks over the background; scene.jpg: the background alone."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from vidtrack.compiled import kernel
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Patch, Pen, draw_lines
 from vidtrack.output.folder import replacing
+from vidtrack.output.scene import SCENE, jpeg
 from vidtrack.output.sink import Step
 from vidtrack.tracks import Tracks
 from vidtrack.traffic.lines import Line
@@ -32,7 +33,7 @@ class TrajectoryPlot:
     """Sink that draws the confirmed tracks during the run, so that memory does not grow.
 
     shape   (H, W) of the source
-    scene   returns the (H, W, 3) background at the end of the run; None: plain grey
+    scene   returns the (H, W, 3) background at the end of the run, for scene.jpg beside the plot; None: plain grey
     totals  returns the counts by line and direction at the end of the run; None: lines show names only
     """
 
@@ -85,10 +86,14 @@ class TrajectoryPlot:
         self._waiting.clear()
 
     def close(self) -> None:
-        """Write the picture."""
+        """Write the pictures."""
         self._draw()
         size = (self._layer.shape[1], self._layer.shape[0])
-        scene = self._scene() if self._scene and self._stepped else np.full((*self._shape, 3), 60, np.uint8)
+        scene = np.full((*self._shape, 3), 60, np.uint8)
+        if self._scene and self._stepped:
+            scene = self._scene()
+            with replacing(self._path.with_name(SCENE)) as new:
+                new.write_bytes(jpeg(scene))
         picture = np.asarray(cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
         _lay_over(self._layer, picture)
         pen = Pen(picture)

@@ -16,23 +16,39 @@ import pyarrow.csv
 from vidtrack.errors import FormatError
 from vidtrack.output.folder import LINE_FILES
 from vidtrack.output.linefile import drop_partial_line, replace_text, sort_rows
-from vidtrack.output.parquet import parts_folder, write_parquet
+from vidtrack.output.parquet import join_parts, parts_folder, read_parquet, write_parquet
 from vidtrack.output.tables import layout, schema
 
 _BLOCK = 1 << 20  # bytes of text read at a time
 
 
-def repair(folder: Path) -> int:
-    """Rebuild tracks.parquet from tracks.csv, remove incomplete lines; returns the number of rows.
+def is_unfinished(folder: Path) -> bool:
+    """Whether a killed run has left tracks here without a whole tracks.parquet."""
+    path = folder / "tracks.parquet"
+    return not path.exists() and ((folder / "tracks.csv").exists() or parts_folder(path).exists())
 
-    summary.json stays marked as interrupted; its tracks and counts are taken from the tables.
-    Raises FormatError if tracks.csv is missing or damaged.
+
+def has_tracks(folder: Path) -> bool:
+    """Whether there are tracks in a folder, whole or in parts."""
+    path = folder / "tracks.parquet"
+    return any(each.exists() for each in (folder / "tracks.csv", path, parts_folder(path)))
+
+
+def repair(folder: Path) -> int:
+    """Rebuild tracks.parquet from tracks.csv, or without it from its parts; remove incomplete lines.
+
+    Returns the number of rows. summary.json stays marked as interrupted; its tracks and counts are taken from the
+    tables. Raises FormatError if there are no tracks, or if they are damaged.
     """
     for name in LINE_FILES:
         if (folder / name).is_file():
             drop_partial_line(folder / name)
-    table = read_tracks(folder / "tracks.csv")
-    add_parquet(folder)
+    parquet = folder / "tracks.parquet"
+    if (folder / "tracks.csv").exists() or not has_tracks(folder):
+        table = read_tracks(folder / "tracks.csv")
+        add_parquet(folder)
+    else:
+        table = read_parquet(parquet) if parquet.exists() else join_parts(parquet)
     shutil.rmtree(parts_folder(folder / "tracks.parquet"), ignore_errors=True)
     if (folder / "counts.csv").is_file():
         sort_rows(folder / "counts.csv", columns=1, header=True)

@@ -15,6 +15,7 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.load import parse
 from vidtrack.config.settings import Settings
 from vidtrack.errors import FormatError
+from vidtrack.output.parquet import read_parquet
 from vidtrack.output.repair import read_tracks
 from vidtrack.output.sink import Step
 from vidtrack.scan import Scan
@@ -30,7 +31,7 @@ class FinishedRun:
 
     source    name of the input
     shape     (H, W) of the pictures; None for a radar run
-    table     tracks.csv
+    table     tracks.csv, or tracks.parquet where that is the only one
     """
 
     folder: Path
@@ -41,8 +42,10 @@ class FinishedRun:
 
 
 def read_run(folder: Path) -> FinishedRun:
-    """Read a run folder. Raises FormatError if tracks.csv or summary.json is missing or damaged."""
-    table = read_tracks(folder / "tracks.csv")
+    """Read a run folder. Raises FormatError if its tracks or summary.json are missing or damaged."""
+    parquet = folder / "tracks.parquet"
+    alone = parquet.is_file() and not (folder / "tracks.csv").exists()
+    table = read_parquet(parquet) if alone else read_tracks(folder / "tracks.csv")
     path = folder / "summary.json"
     try:
         summary = json.loads(path.read_text())

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import datetime, tzinfo
 from threading import Condition
 from typing import Any
 
@@ -19,7 +20,7 @@ from vidtrack.tracks import Status, Tracks
 from vidtrack.traffic.lines import LineCounter
 
 _LATENCIES = 500  # latest frames in the percentiles
-_RATE_S = 5.0  # time over which fps_out is counted
+_RATE_S = 5.0  # time over which fps_out is counted, and after which tracks are no more those of now
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +30,13 @@ class Account:
     state     "connecting", "running", "waiting" (before the next attempt) or "ended"
     reading   counters as in summary.json: width, height, fps_in, frames_dropped, reconnects, stalls, lost, ...
     problems  (Unix time [s], message) of the last problems
+    failing   outputs that cannot be written now, and why
     """
 
     state: str
     reading: Mapping[str, Any]
     problems: list[tuple[float, str]]
+    failing: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +48,7 @@ class LiveStatus(Account):
     frame, time_s   of the last frame, -1 and 0.0 before it
     frame_age_s     seconds since the last frame was tracked; None before it
     fps_out     recent rate of tracked frames [1/s]
-    tracks      of the last frame, see `as_rows`
+    tracks      of the last frame, see `as_rows`; none after 5 s without frames
     counts      by line and direction
     """
 
@@ -67,6 +70,7 @@ class StatusBoard:
     account    returns the source's account
     latency_s  returns the time [s] since a frame's capture time
     counter    None without lines
+    zone       of the clock on the pictures; None: this machine's
     """
 
     def __init__(
@@ -76,7 +80,9 @@ class StatusBoard:
         latency_s: Callable[[float], float],
         settings: OutputSettings,
         counter: LineCounter | None = None,
+        zone: tzinfo | None = None,
     ) -> None:
+        self._zone = zone
         self._source = source
         self._account = account
         self._latency_s = latency_s
@@ -109,7 +115,7 @@ class StatusBoard:
         return newest if newest is not None and newest.index > frame else None
 
     def picture(self) -> bytes | None:
-        """The newest picture with tracks and lines, as JPEG; None before the first frame."""
+        """The newest picture with tracks, lines and the time of day, as JPEG; None before the first frame."""
         step = self._newest
         if step is None or step.frame is None:
             return None
@@ -118,7 +124,8 @@ class StatusBoard:
         if self._counter is not None:
             draw_lines(pen, moved_lines(self._counter.lines, step.motion), self._counter.totals())
         draw_tracks(pen, step.shown)
-        draw_clock(pen, step.time_s, [])
+        wall = datetime.fromtimestamp(time.time() - self._latency_s(step.time_s), self._zone)
+        draw_clock(pen, f"{wall:%Y-%m-%d %H:%M:%S}")
         return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, self._quality])[1].tobytes()
 
     def latency_ms(self) -> dict[str, float]:
@@ -135,18 +142,21 @@ class StatusBoard:
         account = self._account()
         now_s = time.monotonic()
         done = list(self._done)
+        age_s = now_s - done[-1] if done else None
+        fresh = age_s is not None and age_s < _RATE_S
         return LiveStatus(
             state=account.state,
             reading=account.reading,
             problems=account.problems,
+            failing=account.failing,
             source=self._source,
             started_unix_s=self._started,
             now_unix_s=time.time(),
             frame=-1 if step is None else step.index,
             time_s=0.0 if step is None else step.time_s,
-            frame_age_s=now_s - done[-1] if done else None,
+            frame_age_s=age_s,
             fps_out=sum(now_s - t < _RATE_S for t in done) / _RATE_S,
-            tracks=[] if step is None else as_rows(step.shown),
+            tracks=[] if step is None or not fresh else as_rows(step.shown),
             counts={} if self._counter is None else self._counter.totals(),
         )
 

@@ -15,8 +15,8 @@ from vidtrack.arrays import affine
 from vidtrack.config.settings import Settings
 from vidtrack.output.linefile import Every, replace_text
 from vidtrack.output.sink import Step
+from vidtrack.output.watched import Watched
 from vidtrack.tracks import TENTATIVE
-from vidtrack.traffic.lines import LineCounter
 
 _PACKAGES = ("vidtrack", "numpy", "scipy", "opencv-python-headless", "av", "numba", "pyarrow", "rerun-sdk")
 
@@ -61,8 +61,9 @@ class Summary:
     source   name of the input, without any password
     reading  returns the source's counters: fps, width, height, frames_read, frames_dropped, decode_errors,
              reconnects, stalls, truncated
-    counter  line counter; None without counting lines
+    counts   returns the counts by line and direction; None without counting lines
     unit     of the steps: "frames" or "scans"
+    usual_s  nominal time between two frames
 
     `interrupted` is True until the run clears it before `close`, so the file of a killed or failed run has it True.
     """
@@ -73,8 +74,9 @@ class Summary:
         source: str,
         settings: Settings,
         reading: Callable[[], Mapping[str, object]],
-        counter: LineCounter | None = None,
+        counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None,
         unit: str = "frames",
+        usual_s: float = 0.0,
     ) -> None:
         self.interrupted = True
         self._path = path
@@ -82,7 +84,7 @@ class Summary:
         self._settings = settings.model_dump(mode="json")
         self._versions = _versions()
         self._reading = reading
-        self._counter = counter
+        self._counts = counts
         self._unit = unit
         self._start = time.monotonic()
         self._frames = 0
@@ -91,6 +93,7 @@ class Summary:
         self._alive: set[int] = set()
         self._stage_s: dict[str, float] = {}
         self._camera = CameraAccount()
+        self._watched = Watched(usual_s)
         self._warnings: list[dict[str, object]] = []
         self._due = Every(1.0)
         self._write(interrupted=True)
@@ -105,6 +108,7 @@ class Summary:
         for stage, seconds in step.stage_s.items():
             self._stage_s[stage] = self._stage_s.get(stage, 0.0) + seconds
         self._camera.step(step)
+        self._watched.add(step.time_s)
         self._warnings += ({"time_s": round(step.time_s, 3), "what": what} for what in step.warnings)
         if self._due():
             self._write(interrupted=True)
@@ -114,14 +118,19 @@ class Summary:
         self._write(self.interrupted)
 
     def as_dict(self, interrupted: bool) -> dict[str, object]:
-        """Content of the file. `seconds`: duration of the run; `media_s`: time of the last frame; stages in seconds."""
+        """Content of the file, times in seconds.
+
+        `seconds`: duration of the run; `media_s`: time of the last frame; `watched`: first and last frame of each span
+        without a pause.
+        """
         return {
             "source": self._source,
             **self._reading(),
             self._unit: self._frames,
             "media_s": round(self._media_s, 6),
+            **({"watched": self._watched.spans} if self._unit == "frames" else {}),
             "tracks": self._tracks,
-            "counts": {} if self._counter is None else self._counter.totals(),
+            "counts": {} if self._counts is None else self._counts(),
             "camera": self._camera.as_dict(),
             "warnings": self._warnings,
             "seconds": round(time.monotonic() - self._start, 3),

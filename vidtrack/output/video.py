@@ -13,7 +13,7 @@ from av.video.stream import VideoStream
 
 from vidtrack.config.settings import OutputSettings
 from vidtrack.errors import ConfigError, OutputError
-from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails, moved_lines
+from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, draw_trails, media_clock, moved_lines
 from vidtrack.output.ffmpeg_file import FFmpegFile
 from vidtrack.output.folder import writing
 from vidtrack.output.sink import Step
@@ -81,7 +81,7 @@ class AnnotatedVideo:
         draw_trails(pen, self._trails.paths(step.motion))
         draw_tracks(pen, step.shown)
         vehicles = int(np.count_nonzero(step.tracks.status != Status.TENTATIVE))
-        draw_clock(pen, step.time_s, [f"{vehicles} tracks"])
+        draw_clock(pen, media_clock(step.time_s), [f"{vehicles} tracks"])
         return picture
 
     def _encode(self, picture: Image, time_s: float) -> None:

@@ -6,6 +6,7 @@ import logging
 import shutil
 import time
 from collections import deque
+from collections.abc import Callable
 from math import inf
 from pathlib import Path
 from threading import RLock
@@ -18,6 +19,7 @@ from vidtrack.errors import StoppedEarly
 from vidtrack.output.folder import usable, writing
 from vidtrack.output.linefile import LineFile
 from vidtrack.recording.muxer import Muxer
+from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, new_part
 from vidtrack.recording.source import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VIDEO
 from vidtrack.state import State, write_state
@@ -37,6 +39,7 @@ class NoRecorder(NoPacketSink):
     """Records nothing: a run without --record."""
 
     lost = 0
+    failing: str | None = None
 
     def begins(self, place: Place) -> bool:
         """False."""
@@ -55,16 +58,32 @@ class Recorder:
     A new part begins with each connection, and at a key picture when `roll_s` of the clock has passed or the part is
     large. After a write error, recording pauses and resumes in a new part.
 
-    lost  packets that could not be written
+    reserve  of the disk, which is left to results
+    tell     called with what goes wrong
+
+    lost     packets that could not be written
+    failing  why nothing can be recorded now; None: it can
 
     The tracker's thread calls `log_frame`; the reader's thread calls the other methods and writes all files.
     Raises OutputError if nothing can be written into `root`.
     """
 
-    def __init__(self, root: Path, settings: Settings, roll_s: float | None, retention: Retention) -> None:
+    def __init__(
+        self,
+        root: Path,
+        settings: Settings,
+        roll_s: float | None,
+        retention: Retention,
+        reserve: Reserve,
+        tell: Callable[[str], None] = log.warning,
+    ) -> None:
         self.lost = 0
+        self.failing: str | None = None
         self._root = usable(root)
-        retention.roots.append(root)
+        self._reserve = reserve
+        self._tell = tell
+        self._state_bytes = 0  # of the last state written, which every part has
+        retention.recorded.append(root)
         self._settings = settings.model_dump_json(indent=2)
         self._roll_s = roll_s
         self._retention = retention
@@ -88,7 +107,10 @@ class Recorder:
                 return False
             self.end_part()
             try:
+                self._reserve.check_recordings(self._root)
                 self._begin(connection)
+            except StoppedEarly as error:
+                self._pause(str(error))
             except (OSError, av.FFmpegError) as error:
                 self._pause(error.strerror or str(error))
             return True
@@ -105,6 +127,7 @@ class Recorder:
                 self.lost += 1
                 return
             try:
+                self._reserve.check_recordings(self._root)
                 self._muxer.take(packet, pictures, arrived_s)
                 self._write_log()
             except (StoppedEarly, av.FFmpegError) as error:
@@ -112,6 +135,8 @@ class Recorder:
                 return
             if self._muxer.error is not None:
                 self._pause(self._muxer.error.strerror or str(self._muxer.error))
+            else:
+                self.failing = None
 
     def end_part(self) -> None:
         """End the part."""
@@ -154,7 +179,8 @@ class Recorder:
             self._writing.release()
 
     def _due(self, muxer: Muxer) -> bool:
-        large = self._retention.part_size is not None and muxer.size > self._retention.part_size
+        limit = self._retention.recordings_part
+        large = limit is not None and muxer.size + self._state_bytes > limit
         return large or self._period != self._now()
 
     def _now(self) -> int:
@@ -172,6 +198,7 @@ class Recorder:
 
     def _pause(self, why: str) -> None:
         self.lost += 1
+        self.failing = why
         self._retry_s = monotonic() + _RETRY_S
         self.end_part()
         folder = self._folders.get(self._part)
@@ -180,7 +207,7 @@ class Recorder:
             shutil.rmtree(folder, ignore_errors=True)
         if monotonic() - self._warned_s > _WARN_S:
             self._warned_s = monotonic()
-            log.warning("recording pauses: %s; tracking goes on", why)
+            self._tell(f"recording pauses: {why}; tracking goes on")
 
     def _end_list(self) -> None:
         ended, self._list = self._list, None
@@ -203,5 +230,6 @@ class Recorder:
             return
         with writing(folder):
             write_state(folder / STATE, state)
+            self._state_bytes = (folder / STATE).stat().st_size
         self._list = LineFile(folder / FRAMES, FRAMES_HEADER)
         self._listed = part

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Callable, Iterator
+from itertools import pairwise
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -119,11 +120,16 @@ def _row_count(part: Path) -> int:
 def _rows(part: Path) -> dict[int, tuple[int, float]]:
     """Number and time of each tracked frame, by the number of its packet."""
     try:
-        lines = (part / FRAMES).read_text().splitlines(keepends=True)
+        lines = (part / FRAMES).read_text(encoding="ascii").split("\n")
+        rows = [line.split(",") for line in lines[1:-1]]  # a kill may have cut the last line
+        found = {int(packet): (int(frame), float(time_s)) for frame, time_s, packet in rows}
     except FileNotFoundError:
         return {}
-    rows = csv.reader(line for line in lines[1:] if line.endswith("\n"))  # a kill may have cut the last line
-    try:
-        return {int(packet): (int(frame), float(time_s)) for frame, time_s, packet in rows}
+    except OSError as error:
+        raise FormatError(f"cannot read {part / FRAMES}: {error.strerror}") from None
     except ValueError as error:
         raise FormatError(f"{part / FRAMES} is damaged: {error}") from None
+    times = [time_s for _, time_s in found.values()]
+    if not all(isfinite(time_s) for time_s in times) or any(b <= a for a, b in pairwise(times)):
+        raise FormatError(f"{part / FRAMES} is damaged: its times do not increase")
+    return found

@@ -18,15 +18,17 @@ from vidtrack.output.masks import MaskFolder
 from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.sink import Sink
+from vidtrack.output.site_copy import SiteCopy
 from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
+from vidtrack.output.thinned import Thinned
 from vidtrack.output.threaded import Threaded
 from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
-from vidtrack.traffic.metres import footprints_of
+from vidtrack.traffic.metres import footprints_of, site_text
 from vidtrack.video.frame import Image
 from vidtrack.video.source import Source
 
@@ -46,6 +48,7 @@ class Subject:
     reading   returns the source's counters, see Summary
     counter   line counter; None without counting lines
     road      positions on the road; None without a calibrated site
+    site      text of the site's file; None without a site
     """
 
     source: str
@@ -56,15 +59,17 @@ class Subject:
     reading: Callable[[], Mapping[str, object]]
     counter: LineCounter | None
     road: Footprints | None
+    site: str | None = None
 
     @property
     def lines(self) -> Sequence[Line]:
         """The counted lines."""
         return self.counter.lines if self.counter else ()
 
-    def summary(self, folder: Path) -> Summary:
-        """Opens summary.json in a folder."""
-        return Summary(folder / "summary.json", self.source, self.settings, self.reading, self.counter)
+    def summary(self, folder: Path, counts: Callable[[], Mapping[str, Mapping[str, int]]] | None = None) -> Summary:
+        """Opens summary.json in a folder, with these counts instead of those of the whole run."""
+        path, counts = folder / "summary.json", counts or (self.counter.totals if self.counter else None)
+        return Summary(path, self.source, self.settings, self.reading, counts, usual_s=1 / self.fps)
 
 
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
@@ -99,7 +104,8 @@ def file_subject(
 
     counter = line_counter(settings, source.width, source.height)
     road = footprints_of(settings.output.site, source.width, source.height)
-    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road)
+    site = site_text(settings.output.site)
+    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road, site)
 
 
 def file_sinks(
@@ -112,18 +118,34 @@ def file_sinks(
     hold_s  longest time that rows wait for the confirmation of their track [s]
     """
     counter, output = subject.counter, subject.settings.output
+    if subject.site is not None:
+        yield SiteCopy(folder, subject.site)
     if counter is not None:
         yield CountsFile(folder / "counts.csv", counter)
-    totals = counter.totals if counter else None
-    plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines, totals)
-    tables: tuple[Sink, ...] = (TrackTable(folder, road=subject.road), MotFile(folder / "mot.txt"), plot)
-    if link_s is not None:
+    tables = _tables(subject, folder)
+    if tables and output.every_s:
+        tables = (Thinned(*tables, every_s=output.every_s),)
+    if tables and link_s is not None:
         tables = (Linked(*tables, motion=motion, longest_s=link_s),)
-    yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)
+    if tables:
+        yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv")
     for _, sink in picture_sinks(subject, extras):
         yield Threaded(sink)
+
+
+def _tables(subject: Subject, folder: Path) -> tuple[Sink, ...]:
+    """The files of tracks that output.level asks for."""
+    level, counter = subject.settings.output.level, subject.counter
+    if level == "counts":
+        return ()
+    table = TrackTable(folder, road=subject.road, text=level == "all")
+    if level == "tracks":
+        return (table,)
+    totals = counter.totals if counter else None
+    plot = TrajectoryPlot(folder / "tracks.png", subject.shape, subject.scene, subject.lines, totals)
+    return (table, MotFile(folder / "mot.txt"), plot)
 
 
 def picture_sinks(subject: Subject, extras: Extras) -> Iterator[tuple[str, Sink]]:

@@ -9,9 +9,11 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
+from typing import TYPE_CHECKING, Any, overload
 
 from vidtrack.arrays.types import Mask
 from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S
 from vidtrack.output.folder import refuse_overwriting
 from vidtrack.output.sink import Step
@@ -22,6 +24,7 @@ from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracks import TENTATIVE, Tracks
+from vidtrack.traffic.metres import footprints_of
 from vidtrack.video import background
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.blobs.limits import LimitChecks
@@ -31,23 +34,56 @@ from vidtrack.video.mask import read_mask
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import open_source
 
+if TYPE_CHECKING:
+    from vidtrack.traffic.footprint import Footprints, Stand
+
 log = logging.getLogger(__name__)
 
 
-def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]:
+@overload
+def track(path: str | Path, settings: Settings | None = None) -> Iterator[tuple[Frame, Tracks]]: ...
+
+
+@overload
+def track(
+    path: str | Path, settings: Settings | None = None, *, site: str | Path
+) -> Iterator[tuple[Frame, Tracks, Stand]]: ...
+
+
+def track(
+    path: str | Path, settings: Settings | None = None, *, site: str | Path | None = None
+) -> Iterator[tuple[Frame, Tracks]] | Iterator[tuple[Frame, Tracks, Stand]]:
     """Yields each frame of a video (file, image folder or glob) with its tracks, lazily.
 
     settings  for example load_settings(assignments=["tracker.coast_s=2"]); None: the defaults
+    site      site.toml with a calibration; each frame then comes with the `Stand` of its tracks too, row by row:
+              xy [m], v and speed [m/s], heading [rad], length [m], with their errors
 
-    Raises SourceError if the input is missing or yields no frame.
+    Raises SourceError if the input is missing or yields no frame, ConfigError for a site that does not fit.
     """
-    settings = settings or Settings()
-    with open_source(str(path), settings.source) as source:
+    steps = _file_steps(str(path), settings or Settings(), None if site is None else Path(site))
+    if site is None:
+        return ((frame, tracks) for frame, tracks, _ in steps)
+    return steps
+
+
+def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tuple[Frame, Tracks, Any]]:
+    """Each frame with its tracks and their Stand; None without a site."""
+    with open_source(path, settings.source) as source:
+        road = footprints_of(site, source.width, source.height)
+        if site is not None and road is None:
+            raise ConfigError(f"{site} has no section [calibration], so nobody knows the metres; track without a site")
         detector = build_detector(settings)
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
-            yield step.frame, step.shown
+            yield step.frame, step.shown, None if road is None else _stand(road, step.tracks)
+
+
+def _stand(road: Footprints, tracks: Tracks) -> Stand:
+    """Where the tracks, in pixels of the scene, stand on the road."""
+    plane = [*tracks.position, *tracks.velocity]
+    return road.place(tracks.id, tracks.xy, tracks.v, tracks.P[:, plane][:, :, plane], tracks.box)
 
 
 @contextmanager

@@ -1,1 +1,1 @@
-"""The live page: pictures, tracks and status of the cameras over HTTP, for browsers and programs."""
+"""Pages over HTTP: the live page, for browsers and programs, and the one on which counts are looked at."""

@@ -1,4 +1,4 @@
-"""Access control of the page, and security headers of its responses."""
+"""Access control of the pages, and security headers of its responses."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _OWN_NAMES = ("localhost", "127.0.0.1", "::1", "[::1]")
 _ASK = {"WWW-Authenticate": 'Basic realm="vidtrack", charset="UTF-8"'}
+TOKEN = "X-Vidtrack-Token"
+"""Header of the token of a page that writes. Browsers send it for no other site's page."""
 _ON_EVERY_ANSWER = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'",
@@ -28,6 +30,45 @@ def protected(app: ASGIApp, token: str | None) -> ASGIApp:
     """
     inner = _TokenAuthentication(app, token) if token else TrustedHostMiddleware(app, [*_OWN_NAMES], www_redirect=False)
     return _Headers(inner)
+
+
+def private(app: ASGIApp, token: str) -> ASGIApp:
+    """The application of a page that writes, on this machine, for the browser that was given `token` with its address.
+
+    Every request must name this machine and the page's own port in its Host header. All but the page itself and its
+    static parts need the token in the header `TOKEN`. Other requests than GET and HEAD must come from the page's own
+    Origin too: no other site's page can send them, even one that has learnt the token.
+    """
+    return _Headers(_OwnPage(app, token))
+
+
+class _OwnPage:
+    """Middleware that refuses requests of other sites and those without the token."""
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self._app = app
+        self._token = token.encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        refusal = self._refusal(scope)
+        app = self._app if refusal is None else PlainTextResponse(refusal[1] + "\n", refusal[0])
+        await app(scope, receive, send)
+
+    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+        """Status code and words for a request that is refused."""
+        headers = Headers(scope=scope)
+        port = scope["server"][1]
+        host = headers.get("host", "")
+        if host not in {f"{name}:{port}" for name in _OWN_NAMES} | (set(_OWN_NAMES) if port == 80 else set()):
+            return 400, "this is not the address of the page"
+        reads = scope["method"] in ("GET", "HEAD")
+        if not reads and headers.get("origin") != f"http://{host}":
+            return 403, "only the page itself may send this"
+        if reads and (scope["path"] == "/" or scope["path"].startswith("/static/")):
+            return None
+        if not hmac.compare_digest(headers.get(TOKEN, "").encode("latin-1"), self._token):
+            return 401, "the token is missing or wrong; open the address that vidtrack printed"
+        return None
 
 
 class _TokenAuthentication:

@@ -16,6 +16,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from vidtrack.serve.camera import Camera, Shared, Status
+from vidtrack.serve.counts import Counts
 from vidtrack.serve.metrics import CONTENT_TYPE, metrics
 
 log = logging.getLogger(__name__)
@@ -34,6 +35,7 @@ class Answers:
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
         self._cameras = dict(cameras)
         self._statuses = {name: Shared(camera.status, _STATUS_S) for name, camera in cameras.items()}
+        self._counts = Counts(cameras)
         self._pictures = [Shared(camera.picture, _PICTURE_S) for camera in cameras.values()]
 
     def app(self) -> Starlette:
@@ -46,6 +48,7 @@ class Answers:
                 Route("/tracks", self.tracks),
                 Route("/metrics", self.metrics),
                 Route("/healthz", self.healthz),
+                *self._counts.routes(),
                 Mount("/static", StaticFiles(directory=_STATIC)),
             ],
             exception_handlers={Exception: _failed},
@@ -57,7 +60,9 @@ class Answers:
 
     async def status(self, request: Request) -> Response:
         """Name, health and status of each camera."""
-        return JSONResponse([{"name": name, "up": up, **status} for name, status, up in await self._looks()])
+        return JSONResponse(
+            [{"name": name, "up": trouble is None, **status} for name, status, trouble in await self._looks()]
+        )
 
     async def picture(self, request: Request) -> Response:
         """The newest annotated picture of a camera, by its number on the page."""
@@ -75,17 +80,19 @@ class Answers:
 
     async def metrics(self, request: Request) -> Response:
         """The metrics for Prometheus."""
-        return Response(metrics(await self._looks()), media_type=CONTENT_TYPE)
+        looks = [(name, status, trouble is None) for name, status, trouble in await self._looks()]
+        return Response(metrics(looks), media_type=CONTENT_TYPE)
 
     async def healthz(self, request: Request) -> Response:
         """200 if all cameras deliver, else 503 with a line for each that does not."""
-        down = [f"{name}: {status['state']}" for name, status, up in await self._looks() if not up]
+        down = [f"{name}: {trouble}" for name, _, trouble in await self._looks() if trouble is not None]
         return PlainTextResponse("\n".join(down or ["ok"]) + "\n", 503 if down else 200)
 
-    async def _looks(self) -> list[tuple[str, Status, bool]]:
+    async def _looks(self) -> list[tuple[str, Status, str | None]]:
+        """Name, status and trouble of each camera."""
         statuses = await asyncio.gather(*(shared.get() for shared in self._statuses.values()))
         return [
-            (name, status, camera.delivers(status))
+            (name, status, camera.trouble(status))
             for (name, camera), status in zip(self._cameras.items(), statuses, strict=True)
         ]
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from pathlib import Path
 from time import monotonic
 from typing import Any, Generic, TypeVar
-
-from vidtrack.output.status import StatusBoard
 
 Status = Mapping[str, Any]
 Value = TypeVar("Value")
@@ -21,27 +20,24 @@ class Camera:
     status   returns the fields of `vidtrack.output.status.LiveStatus` as plain data; only `source`, `state` and
              `problems` are required
     picture  returns the newest annotated picture as JPEG; None before the first one
+    counts   returns the folder of its counts by interval; None without counting lines
     stale_s  a camera whose last frame is older than this does not deliver [s]
     """
 
     status: Callable[[], Status]
     picture: Callable[[], bytes | None]
+    counts: Callable[[], Path | None] = lambda: None
     stale_s: float = 10.0
 
-    @classmethod
-    def of(cls, board: StatusBoard, stale_s: float) -> Camera:
-        """A camera of this process."""
-
-        def status() -> Status:
-            now = board.now()
-            return {field.name: getattr(now, field.name) for field in fields(now)}
-
-        return cls(status, board.picture, stale_s)
-
-    def delivers(self, status: Status) -> bool:
-        """Whether the camera runs and its frames are tracked."""
+    def trouble(self, status: Status) -> str | None:
+        """Why the camera does not deliver; None if it runs, its frames are tracked, and the results are written."""
         age_s = status.get("frame_age_s")
-        return status["state"] == "running" and age_s is not None and age_s <= self.stale_s
+        if status["state"] != "running":
+            return str(status["state"])
+        if age_s is None or age_s > self.stale_s:
+            return "no frames"
+        failing = [f"{output}: {why}" for output, why in status.get("failing", {}).items()]
+        return "; ".join(failing) or None
 
 
 class Shared(Generic[Value]):

@@ -17,7 +17,10 @@ _QUANTILES = {"p50": "0.5", "p95": "0.95", "p99": "0.99", "max": "1"}
 def metrics(cameras: Iterable[tuple[str, Status, bool]]) -> str:
     """The metrics of cameras, each given as name, status, and whether it delivers. Unknown values are left out."""
     cameras = list(cameras)
-    lines = ["# HELP vidtrack_up Whether the camera delivers and its frames are tracked.", "# TYPE vidtrack_up gauge"]
+    lines = [
+        "# HELP vidtrack_up Whether the camera delivers, its frames are tracked and the results written.",
+        "# TYPE vidtrack_up gauge",
+    ]
     lines += [_line("vidtrack_up", {"camera": name}, up) for name, _, up in cameras]
     for name, (kind, meaning, samples) in _METRICS.items():
         found = [(camera, *sample) for camera, status, _ in cameras for sample in samples(status)]

@@ -1,23 +1,15 @@
-"""Serves the live page in a thread."""
+"""The live page."""
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
-from threading import Thread
 from types import TracebackType
-
-import uvicorn
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from vidtrack.serve.access import protected
 from vidtrack.serve.app import Answers
 from vidtrack.serve.camera import Camera
 from vidtrack.serve.listener import listen, url_of
-
-_MOST = 100  # connections at a time; leaves file handles for reopening cameras
-_ASK_S = 5.0  # time in which a client must send a request
-_END_S = 0.5
+from vidtrack.serve.server import Server
 
 
 class Page:
@@ -28,42 +20,22 @@ class Page:
 
     url    of the page
 
-    The tracker never waits for the page: cameras are read on request, and a slow client delays only its own
-    connection. Raises ConfigError if the port cannot be used.
+    The tracker never waits for the page: cameras are read on request. Raises ConfigError if the port cannot be used.
     """
 
     def __init__(self, place: str, token: str | None = None) -> None:
-        self._listener = listen(place, token)
+        listener = listen(place, token)
+        self._server = Server(listener)
         self._token = token
-        self._server: uvicorn.Server | None = None
-        self.url = url_of(self._listener)
+        self.url = url_of(listener)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
         """Start to respond; until then clients wait."""
-        self._server = uvicorn.Server(
-            uvicorn.Config(
-                protected(Answers(cameras).app(), self._token),
-                loop="asyncio",
-                http=_Connection,
-                ws="none",
-                lifespan="off",
-                log_config=None,
-                log_level="critical",  # clients' errors are not logged; the application logs its own
-                access_log=False,
-                server_header=False,
-                proxy_headers=False,
-                timeout_graceful_shutdown=0,
-            )
-        )
-        self._thread = Thread(target=self._server.run, args=([self._listener],), name="page", daemon=True)
-        self._thread.start()
+        self._server.start(protected(Answers(cameras).app(), self._token))
 
     def close(self) -> None:
         """Close all connections and the port."""
-        if self._server is not None:
-            self._server.force_exit = self._server.should_exit = True
-            self._thread.join(_END_S)
-        self._listener.close()
+        self._server.close()
 
     def __enter__(self) -> Page:
         return self
@@ -72,14 +44,3 @@ class Page:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-class _Connection(H11Protocol):
-    """A connection, refused beyond _MOST and closed without a request within _ASK_S."""
-
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        super().connection_made(transport)
-        if len(self.connections) > _MOST:
-            transport.abort()
-            return
-        self.timeout_keep_alive_task = self.loop.call_later(_ASK_S, self.timeout_keep_alive_handler)

@@ -15,6 +15,7 @@ from vidtrack.tracks import Status, Tracks
 
 _log = logging.getLogger(__name__)
 
+_FORMULA = tuple("=+-@\t\r")
 _MARGIN = 0.15
 """Share of the vehicle's extent across the line that its position must pass the line by."""
 
@@ -50,6 +51,10 @@ def parse_line(text: str) -> Line:
         x1, y1, x2, y2 = (float(number) for number in numbers.split(","))
     except ValueError:
         raise ConfigError(usage) from None
+    if name[:1] in _FORMULA:
+        raise ConfigError(
+            f"line {text!r}: a name that begins with {name[0]} is a formula to spreadsheets; choose another"
+        )
     if not name or set(name) & set(',"\n') or not np.isfinite([x1, y1, x2, y2]).all():
         raise ConfigError(usage)
     if (x1, y1) == (x2, y2):
@@ -128,6 +133,10 @@ class LineCounter:
     def totals(self) -> dict[str, dict[str, int]]:
         """Counts so far, by line and direction."""
         return {line.name: {d: self._totals[line.name, d] for d in sorted(line.directions)} for line in self.lines}
+
+    def resume(self, totals: Mapping[str, Mapping[str, int]]) -> None:
+        """Go on from earlier counts, by line and direction."""
+        self._totals.update({(line, way): count for line, ways in totals.items() for way, count in ways.items()})
 
     def step(self, frame: int, tracks: Tracks) -> list[Crossing]:
         """Crossings that this scan decided, in order of time."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -282,7 +283,20 @@ def read_site(path: str | Path) -> Site:
     try:
         return Site.model_validate(tree)
     except ValidationError as error:
-        raise ConfigError("\n".join(f"{path}: {_complaint(detail)}" for detail in error.errors())) from None
+        raise ConfigError("\n".join(f"{path}: {fault.words}" for fault in faults_of(error))) from None
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A mistake in a site: the key that it is at, which is empty for what several parts do not agree on, and words."""
+
+    key: tuple[str, ...]
+    words: str
+
+
+def faults_of(error: ValidationError) -> list[Fault]:
+    """The mistakes in a tree that is no site."""
+    return [Fault(_key(detail), _complaint(detail)) for detail in error.errors()]
 
 
 def _picture_points(parts: dict[str, Gate | Zone] | Calibration) -> Iterator[tuple[str, Point]]:
@@ -314,7 +328,7 @@ def _moved(site: Site, move: Callable[[Point], Point]) -> dict[str, Any]:
 
 def _complaint(detail: Any) -> str:
     """One line for one mistake: the key, what was given, what is allowed."""
-    path = [str(part) for part in detail["loc"] if part != "[key]"]
+    path = _key(detail)
     key = ".".join(path)
     if detail["type"] == "extra_forbidden":
         return f"unknown key {key}{_near(path[-1], _keys(path[:-1]))}"
@@ -328,7 +342,11 @@ def _complaint(detail: Any) -> str:
     return f"{key} = {detail['input']!r}: {message[0].lower()}{message[1:]}"
 
 
-def _keys(path: list[str]) -> list[str]:
+def _key(detail: Any) -> tuple[str, ...]:
+    return tuple(str(part) for part in detail["loc"] if part != "[key]")
+
+
+def _keys(path: tuple[str, ...]) -> list[str]:
     """The keys that may stand at a place of the file."""
     group: type[BaseModel] = Site
     if path[1:]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from itertools import chain
 from os import cpu_count
 from pathlib import Path
@@ -29,6 +30,7 @@ class VideoFile:
 
     def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats) -> None:
         self._path = self.place = path
+        self._settings = settings
         self._stats = stats
         self._container = _open(path)
         self._stream = _video_stream(self._container, path)
@@ -49,6 +51,43 @@ class VideoFile:
         times = increasing_times(stamped, self._ticks_per_s / self.fps)
         for index, (ticks, picture) in enumerate(times):
             yield index, ticks / self._ticks_per_s, picture
+
+    def between(self, begin_s: float, end_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
+        """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
+
+        Where pictures have no stamps, or the place in the file is not found, the file is read from its beginning.
+        Iterate over the whole file or over spans, not both.
+        """
+        near = self._after_key_frame(begin_s)
+        first = next(near, None)
+        if first is None or first[0] > begin_s + 1 / self.fps:
+            again = VideoFile(self._path, self._settings, SourceStats())
+            near = ((time_s, picture) for _, time_s, picture in again)
+        else:
+            near = chain([first], near)
+        for time_s, picture in near:
+            if time_s > end_s:
+                break
+            if time_s >= begin_s:
+                yield time_s, picture
+
+    def _after_key_frame(self, begin_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
+        """Pictures from the key frame before a time on; it ends at one without a stamp."""
+        try:
+            self._container.seek(int(self._origin + begin_s * self._ticks_per_s), stream=self._stream)
+            for packet in self._container.demux(self._stream):
+                for picture in self._stream.codec_context.decode(packet):
+                    stamp = self._stamp(picture)
+                    if stamp is None:
+                        return
+                    yield (stamp - self._origin) / self._ticks_per_s, picture
+        except av.FFmpegError:  # damaged here, or without an index
+            return
+
+    @cached_property
+    def _origin(self) -> int:
+        """The stamp of time 0."""
+        return next((self._stamp(picture) for picture in self._decoded()), None) or 0
 
     def close(self) -> None:
         """Close the file; not while another thread iterates."""

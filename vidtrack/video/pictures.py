@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import re
 from collections.abc import Iterable, Iterator
+from math import ceil, floor
 from pathlib import Path
 from typing import cast
 
@@ -53,6 +54,15 @@ class ImageSequence:
                 self._stats.count_error(str(error))
                 continue
             yield index, index / self.fps, picture
+
+    def between(self, begin_s: float, end_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
+        """(time, picture) of a span of time."""
+        first, last = ceil(begin_s * self.fps - 1e-6), floor(end_s * self.fps + 1e-6)
+        for index in range(max(first, 0), min(last + 1, len(self._paths))):
+            try:
+                yield index / self.fps, _read(self._paths[index])
+            except SourceError as error:
+                self._stats.count_error(str(error))
 
     def close(self) -> None:
         """Do nothing: no file stays open between images."""

@@ -34,6 +34,27 @@ def open_source(path: str, settings: SourceSettings) -> Source:
         raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
 
+class Excerpts:
+    """Frames of spans of time out of an input, with the times that `open_source` gives them; for one thread.
+
+    Raises SourceError as `open_source`.
+    """
+
+    def __init__(self, path: str, settings: SourceSettings) -> None:
+        try:
+            self._pictures = _pictures(path, settings, SourceStats())
+        except OSError as error:
+            raise SourceError(f"cannot read {path}: {error.strerror}") from None
+
+    def between(self, begin_s: float, end_s: float) -> Iterator[Frame]:
+        """The frames from begin to end; their numbers are not known, and are 0."""
+        return (to_frame(0, *picture) for picture in self._pictures.between(begin_s, end_s))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._pictures.close()
+
+
 class Source:
     """The frames of an input from `start_s` to `end_s`, read in a thread of their own; iterate once.
 

@@ -12,8 +12,10 @@ from made_up_day import SITE, busy_day, write_day, write_run
 
 from vidtrack.cli import cli
 from vidtrack.errors import ConfigError, OutputError, SourceError
+from vidtrack.output.corrections import CorrectionsFile
 from vidtrack.output.report.report import write_report
 from vidtrack.traffic.report.findings import read_findings
+from vidtrack.traffic.validation.audit import Correction
 
 
 def report(folder, scene=None):
@@ -61,6 +63,41 @@ def test_the_page_needs_nothing_from_elsewhere(made):
     sources = re.findall(r'(?:src|href)="([^"]{22})', page)
     assert len(sources) == 5
     assert set(sources) == {"data:image/png;base64,"}
+
+
+def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made):
+    assert "Conflicts" not in words(made[1])
+    assert not (made[1] / "conflicts.csv").exists()
+    nothing = np.nan
+    close = [
+        ("crossing", nothing, 2.5),
+        ("rear-end", 1.2, nothing),
+        ("crossing", 0.75, 0.5),
+        ("crossing", nothing, 4.0),
+    ]
+    out = report(write_day(tmp_path / "day", [4], close=close))
+    rows = [{name: cell for name, cell in row.items() if cell} for row in table(out / "conflicts.csv")]
+    assert rows == [
+        {
+            "kind": "crossing",
+            "conflicts": "3",
+            "with_ttc": "1",
+            "with_pet": "3",
+            "least_ttc_s": "0.75",
+            "least_pet_s": "0.5",
+        },
+        {"kind": "rear-end", "conflicts": "1", "with_ttc": "1", "with_pet": "0", "least_ttc_s": "1.2"},
+    ]
+    text = words(out)
+    times = [
+        text.index(one)
+        for one in ("06:02 crossing 0.8 ± 0.2 0.5 ± 0.4", "06:01 rear-end 1.2 ± 0.2 –", "06:00 crossing –")
+    ]
+    assert times == sorted(times)  # the closest first
+
+
+def test_no_conflicts_is_said(tmp_path):
+    assert "No two vehicles came so close" in words(report(write_day(tmp_path / "day", [4], close=[])))
 
 
 def test_nobody_watched_is_said_and_not_zero(made):
@@ -164,13 +201,22 @@ def test_what_the_command_refuses(tmp_path):
 
 
 def test_from_a_run_to_its_report(tmp_path, monkeypatch):
-    """Two vehicles: one drives from the north to the south, one stands aside."""
+    """Two vehicles: one drives from the north to the south, one stands aside. Somebody looked at one crossing."""
     monkeypatch.chdir(tmp_path)
     write_run(tmp_path / "run", 20.0)
     (tmp_path / "site.toml").write_text(SITE.format(name="cross", calibration=""))
     cli.main(["measure", "run", "--site", "site.toml", "-o", "measures", "-q"], standalone_mode=False)
+    CorrectionsFile(tmp_path / "measures").replace(
+        [Correction("double", 28.0, "south_out", "down", 0, 1), Correction("missed", 5.0, "north_in", "down")]
+    )
     command("measures", "-o", "out")
     (movement,) = [row for row in table(tmp_path / "out" / "origin_destination.csv") if row["trips"] != "0"]
     assert movement == {"from": "north", "to": "south", "turn": "through", "trips": "1"}
     assert (tmp_path / "out" / "time_space.png").is_file()
     assert "Whole trips 1" in words(tmp_path / "out")
+    assert "Somebody looked at 1 of 2 crossings" in words(tmp_path / "out")
+    looked_at = {row["gate"]: row for row in table(tmp_path / "out" / "looked_at.csv")}
+    found = {
+        gate: (looked_at[gate]["counted"], looked_at[gate]["corrected"]) for gate in ("north_in", "south_out", "all")
+    }
+    assert found == {"north_in": ("1", "2"), "south_out": ("1", "0"), "all": ("2", "2")}

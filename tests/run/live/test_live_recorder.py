@@ -7,7 +7,8 @@ from cameras import Picture, Script, grey
 
 from vidtrack.config.settings import Settings
 from vidtrack.recording import recorder
-from vidtrack.recording.retention import Retention, parts_of
+from vidtrack.recording.reserve import Reserve
+from vidtrack.recording.retention import Limits, Retention, parts_of
 from vidtrack.video.frame import Frame
 
 
@@ -34,7 +35,7 @@ class Muxer:
 def tape(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "Muxer", Muxer)
     monkeypatch.setattr(recorder, "_RETRY_S", 0.0)
-    return recorder.Recorder(tmp_path / "tape", Settings(), None, Retention(None, None))
+    return recorder.Recorder(tmp_path / "tape", Settings(), None, Retention(Limits()), Reserve(0))
 
 
 def receive(tape, full=False):
@@ -97,3 +98,16 @@ def test_a_packet_that_comes_after_the_end_begins_no_part(tape, tmp_path):
     tape.close()
     receive(tape)
     assert len(parts_of(tmp_path / "tape")) == 1
+
+
+def test_a_recording_leaves_the_end_of_the_disk_to_results(tape, tmp_path, monkeypatch):
+    for index in range(2):
+        track(tape, index, receive(tape))
+    monkeypatch.setattr(tape, "_reserve", Reserve(1e18))
+    track(tape, 2, receive(tape))
+    assert (tape.lost, "kept for results" in tape.failing) == (1, True)
+    monkeypatch.setattr(tape, "_reserve", Reserve(0))
+    track(tape, 3, receive(tape))
+    tape.close()
+    assert tape.failing is None
+    assert len(parts_of(tmp_path / "tape")) == 2

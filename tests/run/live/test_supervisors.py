@@ -22,7 +22,7 @@ from vidtrack.config.load import load
 from vidtrack.errors import ConfigError, OutputError
 from vidtrack.output.lock import exclusive
 from vidtrack.output.repair import read_tracks
-from vidtrack.run.live.cameras import Entry, extras_of, listed, named, settings_of
+from vidtrack.run.live.cameras import Entry, extras_of, listed, named, refuse_shared_site, settings_of
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.supervisor import _continued
 from vidtrack.run.live.supervisors import Supervisors
@@ -148,7 +148,14 @@ def test_a_crash_goes_on_in_the_same_parts(tmp_path):
     assert _continued(job("b", "0", tmp_path), 2).folder == tmp_path / "b-2"
     extras = LiveExtras("x.rrd", Path("x.mp4"), Path("masks"), state=Path("s"), record=Path("tape"))
     again = _continued(replace(before, extras=extras, force=True), 3)
-    assert again.extras == LiveExtras("x-3.rrd", Path("x-3.mp4"), Path("masks-3"), state=Path("s"), record=Path("tape"))
+    assert again.extras == LiveExtras(
+        "x-3.rrd",
+        Path("x-3.mp4"),
+        Path("masks-3"),
+        state=Path("s"),
+        record=Path("tape"),
+        counts=before.folder / "intervals",
+    )
     assert not again.force
 
 
@@ -183,6 +190,7 @@ def job(name, address, root):
 def test_cameras_that_all_fail_end_the_run(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     sets = [part for assignment in QUICK for part in ("--set", assignment)]
+    sets += ["--set", "live.retry_first=false"]
     arguments = ["live", NOBODY, "/dev/video77", "-o", "out", *sets]
     result = CliRunner().invoke(cli, arguments, standalone_mode=False)
     assert (result.exception, result.return_value) == (None, 3)
@@ -247,3 +255,19 @@ def test_each_camera_has_places_of_its_own():
     assert extras_of(camera, LiveExtras(rerun="a/all.rrd")).rerun == "a/all-north.rrd"
     with pytest.raises(ConfigError, match="one camera"):
         extras_of(camera, LiveExtras(rerun="serve"))
+
+
+def test_a_site_is_of_one_camera(tmp_path):
+    """Over --site for all of them, or by two tables of the list; a link to the same file is the same site."""
+    cameras = named(["rtsp://one/a", "rtsp://two/b"])
+    site = ("output.site", tmp_path / "site.toml")
+    (tmp_path / "site.toml").touch()
+    (tmp_path / "link.toml").symlink_to(tmp_path / "site.toml")
+    alone = settings_of(cameras[0], {}, None, [site])
+    linked = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "link.toml")])
+    for other in (alone, linked):
+        with pytest.raises(ConfigError, match=r'both one and two: a site is of one camera.*\[camera\."one"\]'):
+            refuse_shared_site(cameras, [alone, other])
+    own = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "other.toml")])
+    refuse_shared_site(cameras, [alone, own])
+    refuse_shared_site(cameras, [alone, settings_of(cameras[1], {}, None, [])])

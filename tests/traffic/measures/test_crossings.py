@@ -10,7 +10,7 @@ from vidtrack.traffic.measures.crossings import confidence, following
 from vidtrack.traffic.measures.gates import gates_of
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed, Passing
-from vidtrack.traffic.measures.rows import Rows
+from vidtrack.traffic.measures.rows import Rows, off_road
 
 
 def crossings(run, place=None):
@@ -101,7 +101,7 @@ POINT = st.tuples(st.floats(0, 640), st.floats(0, 480))
 @given(st.lists(st.lists(POINT, min_size=2, max_size=8), min_size=1, max_size=4), st.integers(1, 7))
 def test_passings_are_those_of_brute_force(paths, size):
     """Steps that meet the middle gate, pairs of opposite ones within the margin taken away, then the first of each."""
-    gates = gates_of(site(gates={"bend": {"line": [[300, 0], [340, 200], [300, 479]]}}), None)
+    gates = gates_of(site(gates={"bend": {"line": [[300.3, 0.37], [340.1, 200.7], [300.9, 478.3]]}}), None)
     rows = sorted((k, track) for track, path in enumerate(paths) for k in range(len(path)))
     xy = np.array([paths[track][k] for k, track in rows])
     count, margin = len(rows), 8.0
@@ -109,7 +109,8 @@ def test_passings_are_those_of_brute_force(paths, size):
     yes = np.ones(count, bool)
     t = np.array([float(k) for k, _ in rows])
     number = np.array([track for _, track in rows])
-    whole = Rows(number, t, yes, ~yes, xy, unknown, np.full(count, margin), np.zeros((count, 2)), *(unknown,) * 4)
+    state = xy, unknown, np.full(count, margin), np.zeros((count, 2))
+    whole = Rows(number, t, yes, ~yes, *state, *off_road(count))
     passing = Passing(gates, 50.0)
     for first in range(0, count, size):  # blocks of any size give the same
         passing.add(whole.only(np.arange(first, min(first + size, count))))

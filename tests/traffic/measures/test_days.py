@@ -18,7 +18,7 @@ from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
 
 BEGAN = "2026-06-01T05:00:00.000+00:00"
-TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks"}
+TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks", "conflicts"}
 ZONES = {"zones": {"box": {"polygon": [[200, 100], [400, 100], [400, 400], [200, 400]]}}}
 
 
@@ -207,6 +207,30 @@ def test_an_empty_road_is_counted_as_zero(tmp_path, csv):
     assert all(len(tables[name]) == 0 for name in ("crossings", "trips", "stays", "queues"))
 
 
+@pytest.mark.parametrize("began", [BEGAN, None], ids=["live", "file"])
+def test_an_outage_within_a_run_was_not_watched(tmp_path, began):
+    """The camera is gone from 12 s to 31 s; the track of the one vehicle ends there, and nobody saw it vanish."""
+    last = 60 - 1 / FPS
+    tracks = [straight(1, 9.0, 50, 240, 60, 3 - 1 / FPS), straight(2, 40.0, 50, 240, 100, 5)]
+    run = write_run(tmp_path / "run", tracks, began=began, watched=[[0.0, 12 - 1 / FPS], [31.0, last]])
+    found = measured([run], site())
+    rows = [
+        row for row in found.tables["intervals"].to_pylist() if (row["gate"], row["direction"]) == ("west", "right")
+    ]
+    assert [row["coverage"] for row in rows] == pytest.approx([1, 0.2, 0, 0.9, 1, 1])
+    assert [row["count"] for row in rows] == [1, 0, None, 0, 1, 0]
+    assert found.report["watched_s"] == pytest.approx(41)
+    assert found.report["vanished"] == 0
+
+
+def test_a_part_begins_with_its_first_picture(tmp_path):
+    """Frames were dropped: fewer of them than the nominal rate has."""
+    run = Path(write_run(tmp_path / "run", [], seconds=20, began=BEGAN, watched=[[2.0, 20 - 1 / FPS]]))
+    summary = json.loads((run / "summary.json").read_text())
+    (run / "summary.json").write_text(json.dumps(summary | {"frames": 7}))
+    assert measured([str(run)], site()).report["watched_s"] == pytest.approx(18)
+
+
 def test_a_run_of_radar_is_refused(tmp_path):
     run = Path(write_run(tmp_path / "run", []))
     (run / "summary.json").write_text('{"source": "plots.csv", "scans": 5, "media_s": 1.0}')
@@ -265,10 +289,12 @@ def test_the_command_writes_each_table_twice(tmp_path):
     assert process.returncode == 0, err
     assert out == "out\n"
     assert "1 crossings" in err
-    for name in TABLES:
+    assert "no conflicts without a calibration" in err
+    for name in TABLES - {"conflicts"}:
         table = pq.read_table(tmp_path / "out" / f"{name}.parquet")
         lines = (tmp_path / "out" / f"{name}.csv").read_text().splitlines()
         assert lines[0] == ",".join(table.column_names)
         assert len(lines) == len(table) + 1
+    assert not (tmp_path / "out" / "conflicts.csv").exists()
     assert pq.read_schema(tmp_path / "out" / "crossings.parquet").field("speed_kmh").metadata == {b"unit": b"km/h"}
     assert json.loads((tmp_path / "report.json").read_text())["crossings"] == 1

@@ -5,7 +5,7 @@ import pytest
 
 from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
-from vidtrack.video.background.beam import is_dark, mark_beams
+from vidtrack.video.background.beam import lamps_light, mark_beams
 from vidtrack.video.background.scene import BEAM
 from vidtrack.video.frame import Frame
 
@@ -56,8 +56,12 @@ def test_a_body_of_any_brightness_ends_at_an_edge(level):
 
 
 def test_only_a_dark_scene_is_lit_by_lamps():
-    assert is_dark(road(20), BLACK)
-    assert not is_dark(road(90), BLACK)
+    dark, day = road(20), road(90)
+    lamp = dark.copy()
+    lamp[40, 60] = 200
+    assert lamps_light(lamp.astype(np.uint8), dark, BLACK)
+    assert not lamps_light(dark.astype(np.uint8), dark, BLACK)
+    assert not lamps_light(lamp.astype(np.uint8), day, BLACK)
 
 
 def played(beams, stands_s):
@@ -68,6 +72,7 @@ def played(beams, stands_s):
     for k in range(int((3 + stands_s + 2) * RATE)):
         on = 3 <= k / RATE < 3 + stands_s
         clean = lit(road()) if on else road()
+        clean[56:64, 84:87] = 220  # lamps, seen all the time
         y = np.clip(np.round(clean + rng.normal(0, 1.5, clean.shape)), 0, 255).astype(np.uint8)
         frame = Frame(k, k / RATE, y)
         found.append((detector.apply(frame, np.empty((0, 4))).mask > 0).mean())

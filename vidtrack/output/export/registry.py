@@ -9,14 +9,19 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vidtrack.output.export.road_run import RoadRun
+    from vidtrack.traffic.report.findings import Findings
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A module of this package whose `write(run, folder)` writes the format, and what it writes."""
+    """A module of this package whose `write(run, folder)` writes the format, and what it writes.
+
+    measures  it takes what `vidtrack measure` found instead of a run, and returns what it left out
+    """
 
     module: str
     writes: str
+    measures: bool = False
 
 
 FORMATS = {
@@ -26,9 +31,14 @@ FORMATS = {
     "level-x": Format("level_x", "00_tracks.csv and two tables of meta data, as inD has them"),
     "sumo": Format("sumo", "fcd.xml: floating car data"),
     "ssam": Format("ssam", "tracks.trj: trajectories to find conflicts in, version 1.04"),
+    "utdf": Format("utdf", "Volume.csv: turning counts of 15 minutes, from what was measured", measures=True),
 }
 
 
-def export(run: RoadRun, name: str, folder: Path) -> None:
-    """Write the run in the format of that name. Raises ConfigError for what the format needs and the site lacks."""
-    import_module(f"vidtrack.output.export.{FORMATS[name].module}").write(run, folder)
+def export(run: RoadRun | Findings, name: str, folder: Path) -> str | None:
+    """Write the run in the format of that name, or the measures in one of theirs, which says what it left out.
+
+    Raises ConfigError for what the format needs and the site lacks.
+    """
+    said: str | None = import_module(f"vidtrack.output.export.{FORMATS[name].module}").write(run, folder)
+    return said

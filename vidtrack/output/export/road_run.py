@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.lengths import class_of, length_sums, mean_length
+from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
 
 _BATCH = 1 << 16
@@ -151,7 +152,7 @@ class RoadRun:
 def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
     """A run folder whose tracks have metres.
 
-    site  its site.toml; None: where the run found it
+    site  its site.toml; None: as it was when the run began
 
     Raises ConfigError for a run without metres or a site that is not there, FormatError for a folder that is no
     finished run, and SourceError where no vehicle was inside the calibration.
@@ -251,8 +252,11 @@ def _check_columns(folder: Path) -> None:
 
 
 def _site_of(summary: dict[str, Any], folder: Path) -> Path:
-    """The site that the run was given. Raises ConfigError where it is not there any more."""
-    named = summary["settings"]["output"].get("site")
+    """The site that the run was given: its copy, else its file. Raises ConfigError where neither is there any more."""
+    copy = folder / SITE_COPY
+    if copy.is_file():
+        return copy
+    named = summary["settings"]["output"].get("site")  # runs of earlier versions have no copy
     if named is None or not Path(named).is_file():
         raise ConfigError(
             f"the site of {folder}, {named}, is not there from this folder; give it with --site SITE.toml"

@@ -7,15 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from vidtrack.traffic.report.findings import Findings
+from vidtrack.traffic.report.close import Close
+from vidtrack.traffic.report.findings import CONFLICTS, Findings
 from vidtrack.traffic.report.legs import LegDay
 from vidtrack.traffic.report.paths import Paths
 from vidtrack.traffic.report.sheet import PeakHour, Sheet, peak_hour_factor
 from vidtrack.traffic.report.speeds import Speeds
+from vidtrack.traffic.validation.audit import Reviewed
 
 NOT_KNOWN = "–"
 CHECKS = {
@@ -29,7 +32,10 @@ CHECKS = {
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """All that the page says. `why_no_peak`: in words, where `peak` is None; `scene`: a picture is under the arrows."""
+    """All that the page says. `why_no_peak`: in words, where `peak` is None; `scene`: a picture is under the arrows.
+
+    reviewed  what somebody found who looked at the crossings; None: nobody did
+    """
 
     found: Findings
     sheet: Sheet
@@ -38,7 +44,9 @@ class Page:
     legs: Sequence[LegDay]
     speeds: Sequence[Speeds]
     paths: Paths | None
+    close: Close | None
     scene: bool
+    reviewed: Reviewed | None = None
 
     @property
     def times(self) -> list[str]:
@@ -62,6 +70,14 @@ class Page:
         for movement, trips in zip(self.sheet.movements, self.sheet.sums.tolist(), strict=True):
             matrix.setdefault(movement.start, {})[movement.end] = trips
         return matrix
+
+    @property
+    def closest(self) -> list[dict[str, Any]]:
+        """The closest conflicts, by column; what is not known is NaN or None."""
+        if self.close is None:
+            return []
+        table = self.found.tables["conflicts"].take(self.close.closest)
+        return [{name: row[name] for name in CONFLICTS} for row in table.to_pylist()]
 
     @property
     def checks(self) -> list[tuple[str, str, float]]:
@@ -101,7 +117,7 @@ def rendered(page: Page, drawn: Mapping[str, bytes], missing: Mapping[str, str])
     )
 
 
-def _number(value: float, digits: int = 0) -> str:
+def _number(value: float | None, digits: int = 0) -> str:
     return NOT_KNOWN if value is None or not np.isfinite(value) else f"{value:.{digits}f}"
 
 

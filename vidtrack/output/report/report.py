@@ -11,19 +11,22 @@ from vidtrack.output.folder import replacing
 from vidtrack.output.report import charts, pictures
 from vidtrack.output.report.page import Page, rendered
 from vidtrack.output.report.sheets import write_sheets
+from vidtrack.traffic.report.close import close_of
 from vidtrack.traffic.report.findings import Findings
 from vidtrack.traffic.report.legs import legs_of
 from vidtrack.traffic.report.paths import Paths, paths_of
 from vidtrack.traffic.report.sheet import WATCHED, Sheet, intervals_of_an_hour, peak_hour, sheet_of
 from vidtrack.traffic.report.speeds import speeds_of
 from vidtrack.traffic.report.turns import drawn, turns
+from vidtrack.traffic.validation.audit import Reviewed
 from vidtrack.video.frame import Image
 
 
-def write_report(folder: Path, found: Findings, scene: Image | None) -> None:
+def write_report(folder: Path, found: Findings, scene: Image | None, reviewed: Reviewed | None = None) -> None:
     """Write report.html, NAME.png and NAME.csv of all that the tables allow.
 
-    scene  (H, W, 3) a picture of the site, under the arrows; None: arrows on white
+    scene     (H, W, 3) a picture of the site, under the arrows; None: arrows on white
+    reviewed  what somebody found who looked at the crossings, shown beside the counts; None: nobody did
 
     Raises ConfigError for a site that cannot be drawn, StoppedEarly on a full disk.
     """
@@ -31,7 +34,8 @@ def write_report(folder: Path, found: Findings, scene: Image | None) -> None:
     peak = peak_hour(sheet.total, found.coverage >= WATCHED, found.edges)
     paths, gone = _paths(found, sheet)
     why_no_peak = "" if peak else _why_no_peak(found)
-    page = Page(found, sheet, peak, why_no_peak, legs_of(found), speeds_of(found), paths, scene is not None)
+    legs, speeds, close = legs_of(found), speeds_of(found), close_of(found)
+    page = Page(found, sheet, peak, why_no_peak, legs, speeds, paths, close, scene is not None, reviewed)
     missing = _missing(page, gone)
     made = _pictures(page, scene, missing)
     for name, content in made.items():

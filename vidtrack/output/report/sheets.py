@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
 
 from vidtrack.output.report.page import Page
-from vidtrack.output.report.spreadsheet import write_sheet
+from vidtrack.output.report.spreadsheet import Cell, write_sheet
+from vidtrack.traffic.validation.audit import Reviewed
 
 SPEED_STEP = 5.0
 """km/h; width of the classes in speed_histogram.csv"""
@@ -44,10 +46,31 @@ def write_sheets(folder: Path, page: Page) -> None:
             for leg in page.legs
         )
         write_sheet(folder / "flow_and_queues.csv", header, day)
+    if page.close is not None:
+        header = ["kind", "conflicts", "with_ttc", "with_pet", "least_ttc_s", "least_pet_s"]
+        write_sheet(folder / "conflicts.csv", header, (_known(astuple(kind)) for kind in page.close.kinds))
     write_sheet(folder / "coverage.csv", ["begin", "end", "coverage"], when)
     write_sheet(folder / "checks.csv", ["check", "meaning", "vehicles"], page.checks)
+    if page.reviewed is not None:
+        _write_reviewed(folder, page.reviewed)
     if page.paths is not None:
         _write_paths(folder, page)
+
+
+def _write_reviewed(folder: Path, reviewed: Reviewed) -> None:
+    header = ["gate", "counted", "looked_at", "false", "missed", "corrected"]
+    header += ["sample", "precision", "precision_low", "precision_high"]
+    rows = (
+        (name, one.counted, one.looked_at, one.false, one.missed, one.corrected, one.sample)
+        + ((None,) * 3 if one.precision is None else astuple(one.precision))
+        for name, one in reviewed.rows
+    )
+    write_sheet(folder / "looked_at.csv", header, rows)
+
+
+def _known(row: tuple[Cell, ...]) -> list[Cell]:
+    """The row with empty cells for infinity."""
+    return [None if cell == np.inf else cell for cell in row]
 
 
 def _write_speeds(folder: Path, page: Page) -> None:

@@ -28,6 +28,11 @@ def write_sheet(path: Path, header: Sequence[str], rows: Iterable[Sequence[Cell]
         writer.writerows([_plain(cell) for cell in row] for row in rows)
 
 
+def without_apostrophe(cell: str) -> str:
+    """The words of a cell as they were before `write_sheet` put an apostrophe in front."""
+    return cell[1:] if cell.startswith("'") and cell[1:].lstrip().startswith(_FORMULA) else cell
+
+
 def _plain(cell: Cell) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""

@@ -25,8 +25,10 @@ class BackgroundWriter:
     finish   called after the last batch
     every_s  time between two batches [s]; 0: no pause
     depth    largest number of queued steps
+    tell     called with what goes wrong
 
     lost     number of steps not written, because `write` failed or was too slow
+    failing  why nothing can be written now; None: it can
     """
 
     def __init__(
@@ -36,9 +38,12 @@ class BackgroundWriter:
         finish: Callable[[], None],
         every_s: float = 0.0,
         depth: int = _DEPTH,
+        tell: Callable[[str], None] = log.warning,
     ) -> None:
         self.name = name
         self.lost = 0
+        self.failing: str | None = None
+        self._tell = tell
         self._write = write
         self._finish = finish
         self._every_s = every_s
@@ -46,20 +51,19 @@ class BackgroundWriter:
         self._waiting: deque[Step] = deque()
         self._changed = Condition()
         self._ending = Event()
-        self._failing = False
         self._warned_s = -_WARN_S
         self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     @classmethod
-    def of(cls, name: str, sink: Sink) -> BackgroundWriter:
+    def of(cls, name: str, sink: Sink, tell: Callable[[str], None] = log.warning) -> BackgroundWriter:
         """A background writer for any sink."""
 
         def write(steps: list[Step]) -> None:
             for step in steps:
                 sink.step(step)
 
-        return cls(name, write, sink.close)
+        return cls(name, write, sink.close, tell=tell)
 
     def step(self, step: Step) -> None:
         """Queue a step; count it as lost if the queue is full."""
@@ -80,7 +84,7 @@ class BackgroundWriter:
         """Wait for the thread to end; after the time-out it is abandoned."""
         self._thread.join(timeout_s)
         if self._thread.is_alive():
-            log.warning("%s could not be finished in %g s; what is written is valid", self.name, timeout_s)
+            self._tell(f"{self.name} could not be finished in {timeout_s:g} s; what is written is valid")
 
     def close(self) -> None:
         """Same as `end`."""
@@ -96,7 +100,7 @@ class BackgroundWriter:
         try:
             self._finish()
         except (Error, OSError) as error:
-            log.warning("%s could not be finished: %s", self.name, error)
+            self._tell(f"{self.name} could not be finished: {error}")
 
     def _write_waiting(self) -> None:
         with self._changed:
@@ -105,15 +109,15 @@ class BackgroundWriter:
         try:
             self._write(steps)
         except (StoppedEarly, OSError) as error:
-            self._failing = True
-            self._lose(len(steps), str(error))
+            self.failing = str(error)
+            self._lose(len(steps), self.failing)
         else:
-            if self._failing:
-                self._failing = False
-                log.warning("%s is written again; the results of %d frames are lost", self.name, self.lost)
+            if self.failing is not None:
+                self.failing = None
+                self._tell(f"{self.name} is written again; the results of {self.lost} frames are lost")
 
     def _lose(self, steps: int, why: str) -> None:
         self.lost += steps
         if monotonic() - self._warned_s > _WARN_S:
             self._warned_s = monotonic()
-            log.warning("%s; tracking goes on", why)
+            self._tell(f"{why}; tracking goes on")

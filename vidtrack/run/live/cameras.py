@@ -19,6 +19,8 @@ from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.video.live.address import redact
 
 _CAMERAS, _ADDRESS = "camera", "address"
+_OF_MANY = {"live": {"retry_first": True}}
+"""Settings of several cameras that differ from those of one: a camera may start later than this machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +69,24 @@ def settings_of(
     Raises ConfigError, naming the camera.
     """
     try:
-        return load(path, assignments, merged(base, camera.settings), Input.CAMERA)
+        return load(path, assignments, merged(merged(_OF_MANY, base), camera.settings), Input.CAMERA)
     except ConfigError as error:
         raise ConfigError(f"camera {camera.name}: {error}") from None
+
+
+def refuse_shared_site(cameras: Iterable[Entry], settings: Iterable[Settings]) -> None:
+    """Raise ConfigError where two cameras have one site: a site is what one camera sees."""
+    owners: dict[Path, str] = {}
+    for camera, wanted in zip(cameras, settings, strict=True):
+        site = wanted.output.site
+        if site is None:
+            continue
+        other = owners.setdefault(site.resolve(), camera.name)
+        if other != camera.name:
+            raise ConfigError(
+                f"{site} cannot be the site of both {other} and {camera.name}: a site is of one camera; list the "
+                f'cameras in a file, each with its own: [{_CAMERAS}."{other}"] with output.site = "{other}.toml"'
+            )
 
 
 def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:

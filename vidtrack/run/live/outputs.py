@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,10 @@ from vidtrack.output.confirmed import LIVE_HOLD_S, Confirmed
 from vidtrack.output.folder import open_run, usable
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
+from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.run.live.background_writer import BackgroundWriter
+from vidtrack.run.live.counting import Counting
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.run import Extras
 from vidtrack.run.sinks import Subject, picture_sinks
@@ -29,10 +32,12 @@ class LiveExtras(Extras):
 
     state   checkpoint file, from which the next run continues
     record  folder of the recording
+    counts  folder of the counts by interval; None: `intervals` in the folder of the results
     """
 
     state: Path | None = None
     record: Path | None = None
+    counts: Path | None = None
 
 
 class Outputs:
@@ -44,19 +49,34 @@ class Outputs:
     """
 
     def __init__(
-        self, folder: Path, subject: Subject, extras: Extras, roll_s: float | None, retention: Retention
+        self,
+        folder: Path,
+        subject: Subject,
+        extras: Extras,
+        roll_s: float | None,
+        retention: Retention,
+        counting: Counting | None,
+        tell: Callable[[str], None],
     ) -> None:
-        self._writers = [BackgroundWriter.of(name, sink) for name, sink in picture_sinks(subject, extras)]
+        self._counting = counting
+        self._writers = [BackgroundWriter.of(name, sink, tell) for name, sink in picture_sinks(subject, extras)]
         # Opened last: if an extra above cannot be opened, the folder stays empty.
-        parts = Parts(folder, subject, extras.decisions, roll_s, retention)
-        tables = BackgroundWriter("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH)
+        reserve = Reserve(subject.settings.live.reserve_bytes)
+        parts = Parts(folder, subject, extras.decisions, roll_s, retention, counting, reserve)
+        tables = BackgroundWriter("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH, tell)
         self.sinks: list[Sink] = [*self._writers, Confirmed(tables, hold_s=LIVE_HOLD_S)]
         self._writers.append(tables)
 
     @property
     def lost(self) -> dict[str, int]:
-        """Number of frames not written, by output."""
-        return {writer.name: writer.lost for writer in self._writers}
+        """Number of frames not written, by output; and of crossings."""
+        counts = {} if self._counting is None else {"counts": self._counting.lost}
+        return {writer.name: writer.lost for writer in self._writers} | counts
+
+    @property
+    def failing(self) -> dict[str, str]:
+        """Why an output cannot be written now, by output."""
+        return {writer.name: writer.failing for writer in self._writers if writer.failing is not None}
 
     def close(self, until_s: float) -> None:
         """Finish all outputs by `until_s` (monotonic); unfinished files stay valid."""

@@ -12,22 +12,27 @@ from types import TracebackType
 from typing import Any
 
 from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError, FormatError
+from vidtrack.output.intervals.days import zone_of
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
 from vidtrack.recording.recorder import NoRecorder, Recorder
-from vidtrack.recording.retention import Retention
+from vidtrack.recording.reserve import Reserve
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
+from vidtrack.run.live.counting import COUNTS, counting_of
+from vidtrack.run.live.limits import part_sizes, retention_of
 from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
 from vidtrack.run.run import recorded
 from vidtrack.run.sinks import Subject, line_counter
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.traffic.metres import footprints_of
+from vidtrack.traffic.metres import footprints_of, site_text
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection
 from vidtrack.video.live.source import LiveSource
+from vidtrack.video.live.stats import LiveStats
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
 
@@ -42,10 +47,13 @@ class LiveRun:
     name    of the source, without credentials
     folder  of the results
     board   current status, for other threads
+    counts  folder of the counts by interval; None without counting lines
 
     After the first picture only `stop` ends the iteration: a lost camera is reopened without limit, and results that
     cannot be written are counted.
     Raises SourceError, ConfigError, FormatError, OutputError at the start.
+
+    stats  of the camera, which other threads may read before the first picture; None: of the run alone
     """
 
     def __init__(
@@ -57,37 +65,53 @@ class LiveRun:
         *,
         force: bool = False,
         connect: Callable[[], Connection] | None = None,
+        stats: LiveStats | None = None,
     ) -> None:
         extras, live = extras or LiveExtras(), settings.live
         refuse_link(settings.output, "live runs")
+        if live.replace_state and extras.state is None:
+            raise ConfigError("setting live.replace_state has no effect without --state")
         self._settings = settings
         self._address = parse_address(address, live.timeout_s)
         self.name = self._address.name
-        roll_s = live.roll_s or (_HOUR_S if live.keep_s or live.keep_bytes else None)
-        retention = Retention(live.keep_s, live.keep_bytes)
+        stats = stats or LiveStats()
+        roll_s = live.roll_s or (_HOUR_S if live.limited else None)
+        retention = retention_of(live)
         self._outputs: Outputs | None = None
         self._until_s: float | None = None  # monotonic time of the end; None: not stopped
         self._in_work = False  # during a frame the checkpoint is inconsistent and must not be saved
         with ExitStack() as locks, ExitStack() as stack:  # on an error below, everything already open is closed
             lock_extras(extras, output, locks)
-            self._checkpoint_file = NoCheckpointFile() if extras.state is None else CheckpointFile(extras.state)
+            self._checkpoint_file = (
+                NoCheckpointFile()
+                if extras.state is None
+                else CheckpointFile(extras.state, stats.warn, live.replace_state)
+            )
             self._recorder = (
-                NoRecorder() if extras.record is None else Recorder(extras.record, settings, roll_s, retention)
+                NoRecorder()
+                if extras.record is None
+                else Recorder(extras.record, settings, roll_s, retention, Reserve(live.reserve_bytes), stats.warn)
             )
             stack.callback(self._recorder.close)
-            self._source = source = stack.enter_context(self._open_source(connect))
+            self._source = source = stack.enter_context(self._open_source(connect, stats))
             stack.enter_context(frame_by_frame(settings.detector.kind))
             self._checkpoint = self._restored(explain=extras.explain)
             if extras.state or extras.record:
                 self._checkpoint.gather()  # raises ConfigError for a detector that cannot be saved
+            if retention.has_sizes:
+                retention.refuse_small(*part_sizes(settings, source.like, recorded=extras.record is not None))
             counter = line_counter(settings, source.width, source.height)
             shown, scene = self._address.shown, self._checkpoint.detector.scene
             self.folder = lock_folder(output, self.name, extras, locks, force=force, in_parts=roll_s is not None)
-            retention.roots.append(self.folder)
-            self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter)
+            retention.results.append(self.folder)
+            zone = zone_of(live.zone)
+            self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
             road = footprints_of(settings.output.site, source.width, source.height)
-            subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, road)
-            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention)
+            site, shape = site_text(settings.output.site), source.like.shape
+            subject = Subject(shown, settings, shape, source.fps, scene, self._reading, counter, road, site)
+            self.counts = None if counter is None else extras.counts or self.folder / COUNTS
+            counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s)
+            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn)
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 
     def __iter__(self) -> Iterator[Step]:
@@ -122,11 +146,12 @@ class LiveRun:
             self._outputs.close(until_s)
             self._checkpoint_file.close(None if self._in_work else self._checkpoint, until_s)
 
-    def _open_source(self, connect: Callable[[], Connection] | None) -> LiveSource:
+    def _open_source(self, connect: Callable[[], Connection] | None, stats: LiveStats) -> LiveSource:
         """Open the camera; numbers and times continue from a saved state."""
         live, found = self._settings.live, self._checkpoint_file.found
         if found is None:
-            return LiveSource(self._address, live, self._recorder, connect=connect)
+            first = self._checkpoint_file.first
+            return LiveSource(self._address, live, self._recorder, first=first, connect=connect, stats=stats)
         since_s = found["time_s"] + max(0.0, time.time() - found["unix_s"])
         return LiveSource(
             self._address,
@@ -136,16 +161,27 @@ class LiveRun:
             origin_s=monotonic() - since_s,
             like=Frame.blank((found["height"], found["width"]), found["coloured"]),
             connect=connect,
+            stats=stats,
         )
 
     def _restored(self, explain: bool) -> Checkpoint:
         """Detector and tracker, restored from the saved state of an earlier run if there is one."""
+        file = self._checkpoint_file
+        checkpoint = self._new_checkpoint(explain)
+        if file.found is not None:
+            try:
+                checkpoint.restore(file.found)
+            except FormatError as error:
+                file.set_aside(error)
+                checkpoint = self._new_checkpoint(explain)
+        if file.first:
+            checkpoint.tracker.register.next_id = file.first
+        return checkpoint
+
+    def _new_checkpoint(self, explain: bool) -> Checkpoint:
         source, settings = self._source, self._settings
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height), explain=explain)
-        checkpoint = Checkpoint(build_detector(settings), tracker, source.like)
-        if self._checkpoint_file.found is not None:
-            checkpoint.restore(self._checkpoint_file.found)
-        return checkpoint
+        return Checkpoint(build_detector(settings), tracker, source.like)
 
     def _frames(self) -> Iterator[Frame]:
         """The frames to track; before each one the checkpoint goes to the recording and the state file."""
@@ -164,7 +200,7 @@ class LiveRun:
     def _reading(self) -> Mapping[str, Any]:
         """The run's counters, for the summary and the page."""
         source, stats = self._source, self._source.stats
-        began = datetime.fromtimestamp(time.time() - source.latency_s(0.0), UTC)
+        began = datetime.fromtimestamp(self._began_s(), UTC)
         return {
             "fps": round(source.fps, 6),
             "fps_in": round(stats.rate(monotonic()), 2),
@@ -183,6 +219,16 @@ class LiveRun:
             "lost": self._lost(),
         }
 
+    def _began_s(self) -> float:
+        """Unix time of time_s 0, by the wall clock as it is now."""
+        return time.time() - self._source.latency_s(0.0)
+
+    def _failing(self) -> dict[str, str]:
+        """Why an output cannot be written now, by output."""
+        outputs = {} if self._outputs is None else self._outputs.failing
+        own = {"recording": self._recorder.failing, "state": self._checkpoint_file.failing}
+        return outputs | {name: why for name, why in own.items() if why is not None}
+
     def _lost(self) -> dict[str, int]:
         """Number of frames, packets and states not written, by output."""
         outputs = {} if self._outputs is None else self._outputs.lost
@@ -190,4 +236,4 @@ class LiveRun:
 
     def _account(self) -> Account:
         stats = self._source.stats
-        return Account(stats.state, self._reading(), list(stats.problems))
+        return Account(stats.state, self._reading(), list(stats.problems), self._failing())

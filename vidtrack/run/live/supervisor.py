@@ -17,7 +17,9 @@ from time import monotonic
 from typing import Any
 
 from vidtrack.recording.retention import parts_of
-from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, unknown, work
+from vidtrack.run.live.counting import COUNTS
+from vidtrack.run.live.view import waiting_for
+from vidtrack.run.live.worker import BEGUN, END, PICTURE, STATUS, Job, work
 from vidtrack.video.live.address import redact
 from vidtrack.video.live.backoff import Backoff
 
@@ -93,6 +95,10 @@ class Supervisor:
         """The newest annotated picture as JPEG; None without one."""
         return self._request(PICTURE) or None
 
+    def counts(self) -> Path | None:
+        """The folder of its counts by interval; None without counting lines."""
+        return counts_of(self.job) if self.job.settings.output.lines else None
+
     @property
     def error(self) -> str | None:
         """Why the process failed; None if it runs, was stopped or succeeded."""
@@ -123,7 +129,7 @@ class Supervisor:
 
     def _start(self, job: Job) -> None:
         self.job = job
-        self._last = unknown(self._shown)
+        self._last = waiting_for(self._shown, "connecting", [])
         self._begun = self._final_status_came = False
         self._started_s = monotonic()
         self._channel, theirs = _SPAWN.Pipe()
@@ -188,8 +194,14 @@ def _continued(job: Job, start: int) -> Job:
             video=extras.video and _numbered(extras.video, start),
             rerun=extras.rerun and str(_numbered(Path(extras.rerun), start)),
             masks=extras.masks and _numbered(extras.masks, start),
+            counts=counts_of(job),
         ),
     )
+
+
+def counts_of(job: Job) -> Path:
+    """The folder of the counts by interval, which all processes of a camera share."""
+    return job.extras.counts or job.folder / COUNTS
 
 
 def _free(folder: Path) -> Path:

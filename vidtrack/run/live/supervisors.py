@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
-from collections import Counter
-from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterable
+from contextlib import ExitStack, suppress
 from multiprocessing.connection import wait
 from pathlib import Path
 from threading import Event
@@ -14,10 +13,11 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from vidtrack.errors import StoppedEarly
+from vidtrack.errors import Error, StoppedEarly
+from vidtrack.output.intervals.book import totals
 from vidtrack.output.linefile import replace_text
 from vidtrack.output.lock import exclusive
-from vidtrack.run.live.supervisor import Supervisor
+from vidtrack.run.live.supervisor import Supervisor, counts_of
 from vidtrack.run.live.worker import Job
 
 log = logging.getLogger(__name__)
@@ -92,20 +92,11 @@ def _alive(supervisors: Iterable[Supervisor]) -> list[Supervisor]:
 
 
 def _summary(supervisor: Supervisor) -> dict[str, Any]:
-    """Summary of one camera: counts added over its processes, and the error of the last one."""
+    """Summary of one camera: figures added over its processes, all its counts, and the error of the last one."""
     now = supervisor.summary()
     runs = [*supervisor.summaries, now]
     content = now | {key: sum(run.get(key, 0) for run in runs) for key in _COUNTED if any(key in run for run in runs)}
-    if "counts" in now:
-        content["counts"] = _added(run.get("counts", {}) for run in runs)
+    with suppress(Error, OSError):  # what cannot be read is told by the next run
+        content["counts"] = totals(counts_of(supervisor.job)) or now.get("counts", {})
     content["restarts"] = supervisor.restarts
     return content if supervisor.error is None else content | {"error": supervisor.error}
-
-
-def _added(counts: Iterable[Mapping[str, Mapping[str, int]]]) -> dict[str, dict[str, int]]:
-    """Sums of counts by line and direction."""
-    total: dict[str, Counter[str]] = {}
-    for lines in counts:
-        for line, ways in lines.items():
-            total.setdefault(line, Counter()).update(ways)
-    return {line: dict(ways) for line, ways in total.items()}

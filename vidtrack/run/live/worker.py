@@ -6,21 +6,19 @@ import json
 import logging
 import os
 import signal
-import sys
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Lock, Thread
 from types import FrameType
-from typing import Any
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import Error
-from vidtrack.output.status import StatusBoard
+from vidtrack.run.live.leave import leave
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.run import LiveRun
+from vidtrack.run.live.view import View
 from vidtrack.video.live.address import redact
 
 log = logging.getLogger(__name__)
@@ -51,11 +49,13 @@ def work(job: Job, channel: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent sends SIGTERM
     signal.signal(signal.SIGTERM, _terminate)
     job.prepare(job.name)
-    answers = _Answers(job, channel)
+    view = View(redact(job.address))
+    answers = _Answers(view, channel)
     try:
-        with LiveRun(job.address, job.settings, job.folder, job.extras, force=job.force) as run:
+        with LiveRun(job.address, job.settings, job.folder, job.extras, force=job.force, stats=view.stats) as run:
             signal.signal(signal.SIGTERM, lambda *_: run.stop())
-            answers.begin(run.board)
+            view.board = run.board
+            answers.begin()
             for _ in run:
                 pass
     except _Terminated:
@@ -63,9 +63,10 @@ def work(job: Job, channel: Connection) -> None:
     except Error as error:
         log.error("%s", error)
         answers.end(str(error))
-        sys.exit(error.exit_code)
+        leave(error.exit_code)
     else:
         answers.end()
+    leave(0)
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
@@ -75,30 +76,26 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 class _Answers:
     """Thread that answers the parent's requests: `NUMBER status` or `NUMBER picture` with `NUMBER content`."""
 
-    def __init__(self, job: Job, channel: Connection) -> None:
-        self._board: StatusBoard | None = None
-        self._shown = redact(job.address)
+    def __init__(self, view: View, channel: Connection) -> None:
+        self._view = view
         self._channel = channel
         self._sending = Lock()
         Thread(target=self._run, name="answers", daemon=True).start()
 
-    def begin(self, board: StatusBoard) -> None:
+    def begin(self) -> None:
         """Report that the run has begun and owns its folder."""
-        self._board = board
         self._send(BEGUN, b"")
 
     def end(self, error: str | None = None) -> None:
         """Send the final status, with the error if there was one."""
-        status = self._status() | {"state": "ended"}
-        if error is not None:
-            status["problems"] = [*status["problems"], (time.time(), error)]
-        self._send(END, json.dumps(status).encode())
+        self._send(END, json.dumps(self._view.ended(error)).encode())
 
     def _run(self) -> None:
         try:
             while True:
                 number, _, what = self._channel.recv_bytes().partition(b" ")
-                self._send(number, self._picture() if what == PICTURE else json.dumps(self._status()).encode())
+                picture = what == PICTURE
+                self._send(number, self._view.picture() or b"" if picture else json.dumps(self._view.status()).encode())
         except (EOFError, OSError):  # the parent is gone
             os.kill(os.getpid(), signal.SIGTERM)
 
@@ -108,18 +105,3 @@ class _Answers:
                 self._channel.send_bytes(tag + b" " + content)
             finally:
                 self._sending.release()
-
-    def _picture(self) -> bytes:
-        return (self._board and self._board.picture()) or b""
-
-    def _status(self) -> dict[str, Any]:
-        if self._board is None:
-            return unknown(self._shown)
-        now = self._board.now()
-        return {field.name: getattr(now, field.name) for field in fields(now)}
-
-
-def unknown(shown: str) -> dict[str, Any]:
-    """The status of a camera before its first picture."""
-    reading: Mapping[str, Any] = {}
-    return {"source": shown, "state": "connecting", "reading": reading, "problems": []}

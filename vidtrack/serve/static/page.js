@@ -74,7 +74,9 @@ function fill(card, section, rows) {
 function show(card, camera) {
   card.classList.toggle("up", camera.up);
   card.querySelector(".name").textContent = camera.name;
-  card.querySelector(".state").textContent = camera.up || camera.state !== "running" ? camera.state : "no frames";
+  const failing = Object.keys(camera.failing ?? {});
+  const trouble = failing.length ? `not written: ${failing.join(", ")}` : "no frames";
+  card.querySelector(".state").textContent = camera.up || camera.state !== "running" ? camera.state : trouble;
   card.querySelector(".source").textContent = camera.source === camera.name ? "" : camera.source;
   card.querySelector(".numbers").replaceChildren(...numbers(camera));
   const counts = Object.entries(camera.counts ?? {}).flatMap(([line, ways]) =>
@@ -89,7 +91,9 @@ function addCard() {
   const card = document.getElementById("camera").content.firstElementChild.cloneNode(true);
   document.querySelector("main").append(card);
   seen.observe(card);
-  watch(card.querySelector(".picture img"), card, cards.push(card) - 1);
+  const place = cards.push(card) - 1;
+  watch(card.querySelector(".picture img"), card, place);
+  followCounts(card, place);
   return card;
 }
 

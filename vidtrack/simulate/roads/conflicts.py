@@ -81,10 +81,24 @@ def _encroachment(a: _Path, b: _Path) -> tuple[float, float, _Path] | None:
     overlap = touching(a.base[i], b.base[j]) if len(i) else np.empty(0, bool)
     if not overlap.any():
         return None
-    later = (b.time[j] - a.time[i])[overlap]
+    i, j = i[overlap], j[overlap]
+    later = b.time[j] - a.time[i]
     best = np.abs(later).argmin()
-    when = max(a.time[i[overlap][best]], b.time[j[overlap][best]])
-    return float(abs(later[best])), float(when), b if later[best] > 0 else a
+    first, second, row = (a, b, j[best]) if later[best] > 0 else (b, a, i[best])
+    if _follows(first, second, int(row)):
+        return None
+    return float(abs(later[best])), float(second.time[row]), second
+
+
+def _follows(first: _Path, second: _Path, row: int) -> bool:
+    """Whether the second vehicle, a length before it is where it is in `row`, is on the way of the first already."""
+    length = np.linalg.norm(second.base[row, 0] - second.base[row, 3])
+    away = np.linalg.norm(second.xy[: row + 1] - second.xy[row], axis=1) >= length
+    before = int(np.flatnonzero(away)[-1]) if away.any() else 0
+    aligned = np.abs(np.angle(np.exp(1j * (first.heading - second.heading[before])))) < CROSSING_ANGLE
+    near = aligned & (np.abs(first.time - second.time[before]) < PET_S)
+    there = np.broadcast_to(second.base[before], (int(near.sum()), 4, 2))
+    return bool(near.any() and touching(first.base[near], there).any())
 
 
 def _closing(a: _Path, b: _Path) -> tuple[float, float, _Path] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,23 @@ class Figures:
     shared: Floats
     occupancy: Floats
     density: Floats
+
+
+def figure_columns(found: Figures) -> dict[str, tuple[str, Any]]:
+    """The figures as columns name -> (unit, values) of a table, way by way."""
+    return {
+        "count": ("n", found.count.ravel()),
+        "count_low": ("n", found.low.ravel()),
+        "count_high": ("n", found.high.ravel()),
+        "flow_per_h": ("1/h", found.flow.ravel()),
+        "time_mean_speed_kmh": ("km/h", 3.6 * found.time_mean.ravel()),
+        "speed_sigma_kmh": ("km/h", 3.6 * found.own.ravel()),
+        "speed_shared_sigma_kmh": ("km/h", 3.6 * found.shared.ravel()),
+        "space_mean_speed_kmh": ("km/h", 3.6 * found.space_mean.ravel()),
+        "v85_kmh": ("km/h", 3.6 * found.v85.ravel()),
+        "occupancy": ("1", found.occupancy.ravel()),
+        "density_per_km": ("1/km", found.density.ravel()),
+    }
 
 
 def figures(passed: Passed, confidence: Floats, length: Floats, edges: Floats, watched: Floats, ways: int) -> Figures:

@@ -18,7 +18,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.lives import End
-from vidtrack.traffic.measures.rows import Rows
+from vidtrack.traffic.measures.rows import Rows, off_road
 
 LONGEST_S = 4.0
 _LOST_S = 1.0
@@ -96,7 +96,7 @@ def gap_rows(tail: End, head: End, joins: Joins) -> Rows:
         )
 
     rows = 2 * len(last)
-    yes, unknown = np.ones(rows, bool), np.full(rows, np.nan)
+    yes = np.ones(rows, bool)
     number = np.repeat(np.arange(len(last)), 2)
     state = both("xy"), both("sigma"), np.zeros(rows), np.full((rows, 2), np.nan)
-    return Rows(number, both("t"), yes, ~yes, *state, *(unknown,) * 4)
+    return Rows(number, both("t"), yes, ~yes, *state, *off_road(rows))

@@ -9,26 +9,27 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
-from vidtrack.traffic.measures.crossings import confidence, following, reasons, section_speeds, way_names
+from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
+from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
-from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
+from vidtrack.traffic.measures.journeys import journeys
 from vidtrack.traffic.measures.lives import Lives
-from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.tables import stamps, table
-from vidtrack.traffic.measures.trips import at_edge, trips_of
 from vidtrack.traffic.site import Site
-
-REACH_M, REACH_PX = 10.0, 100.0
-"""How far from a gate distances are looked at: many times what positions are off."""
+from vidtrack.traffic.vehicles.classes import named, named_by_length
+from vidtrack.traffic.vehicles.vehicles import Vehicles
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,40 +56,55 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
     staying = Staying(outlines, metres=site.calibration is not None)
+    ground = grounds[sizes[0]]
+    meeting, vehicles = Meeting(), Vehicles(ground)
     for rows in reader:
-        for part in (passing, lives, staying):
+        for part in (passing, lives, staying, meeting):
             part.add(rows)
-    return _Figures(day, site, gates, reader, passing.passed(), lives, staying).measures()
+        vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
+    passed = passing.passed()
+    return _Figures(day, site, gates, ground, reader, passed, lives, staying, meeting, vehicles).measures()
 
 
 class _Figures:
     """All figures of a day, from what is left of its tracks."""
 
     def __init__(
-        self, day: Day, site: Site, gates: Gates, reader: Reader, passed: Passed, lives: Lives, staying: Staying
+        self,
+        day: Day,
+        site: Site,
+        gates: Gates,
+        ground: Ground | None,
+        reader: Reader,
+        passed: Passed,
+        lives: Lives,
+        staying: Staying,
+        meeting: Meeting,
+        vehicles: Vehicles,
     ) -> None:
-        self.day, self.site, self.gates, self.staying = day, site, gates, staying
-        self.metres = site.calibration is not None
+        self.day, self.site, self.gates, self.ground = day, site, gates, ground
+        self.staying, self.meeting = staying, meeting
+        self.metres = ground is not None
         self.spans = day.spans
         self.session, self.track_id = reader.names
         tracks = len(self.track_id)
-        self.head, self.tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
-        self.joins = self._joins(passed)
-        self.vehicle = self.joins.vehicles(tracks)
-        across = self._across()
-        self.probability = np.concatenate([confidence(passed), self.joins.probability[across.track]])
-        self.reason = [*reasons(passed), *(["joined"] * len(across))]
-        passed = passed.and_also(across.of(self.joins.before[across.track]))
-        order = np.argsort(passed.t, kind="stable")
-        self.passed, self.probability = passed.only(order), self.probability[order]
-        self.reason = [self.reason[k] for k in order.tolist()]
+        length = self.length = lives.length(tracks)
+        self.kind: list[str | None] = class_of(length, site.classes)
+        self.kind_probability = np.full(tracks, np.nan)
+        found = vehicles.fitted(tracks, passed.track, passed.t)
+        self.scale = None if found is None else found.scale
+        if found is not None:
+            passed = passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
+            self.length = np.where(np.isnan(found.classes.size[:, 0]), length, found.classes.size[:, 0])
+            if site.classes:
+                self.kind, self.kind_probability = named_by_length(self.length, found.classes.sigma[:, 0], site.classes)
+            else:
+                self.kind, self.kind_probability = named(found.classes)
+        driven = journeys(gates, passed, lives.head(tracks), lives.tail(tracks), length, self.spans, self.metres)
+        self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
+        self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
-        begin = np.full(tracks, np.inf)
-        end = -begin
-        np.fmin.at(begin, self.vehicle, self.head.t)
-        np.fmax.at(end, self.vehicle, self.tail.t)
-        self.trips = trips_of(self.passed, gates, self.vehicle[self.passed.track], begin, end, self.spans)
         zone = site.camera.start
         self.edges = edges_of(self.spans, site.report.interval_s, day.utc, None if zone is None else zone.tzinfo)
         self.watched = coverage(self.spans, self.edges)
@@ -106,6 +122,8 @@ class _Figures:
             "queues": self._queues(),
             "checks": self._checks(),
         }
+        if self.ground is not None:
+            tables["conflicts"] = self._conflicts(self.ground)
         report = {
             "site": self.site.camera.name,
             "metres": self.metres,
@@ -125,32 +143,16 @@ class _Figures:
             "trips": len(self.trips.vehicle),
             "complete_trips": int(self.trips.complete.sum()),
             "joins": len(self.joins.before),
+            "conflicts": len(tables["conflicts"]) if self.metres else None,
             "movements": [{"from": a, "to": b, "trips": count} for (a, b), count in sorted(moved.items())],
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
+            "scale": None if self.scale is None else self.scale.told(),
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }
         return Measures(tables, report)
-
-    def _joins(self, passed: Passed) -> Joins:
-        """Joins of tracks that end before an exit, and of those that begin after an entry."""
-        tracks = len(self.track_id)
-        if not self.metres:
-            return Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
-        left, entered = np.zeros((2, tracks), bool)
-        left[passed.track[self.gates.role("exit", "both")[passed.gate]]] = True
-        entered[passed.track[self.gates.role("entry", "both")[passed.gate]]] = True
-        ends = ~left & np.isfinite(self.tail.t) & ~at_edge(self.tail.t, self.spans[:, 1])
-        begins = ~entered & np.isfinite(self.head.t) & ~at_edge(self.head.t, self.spans[:, 0])
-        return joined(self.tail, self.head, self.length, ends, begins, float(np.diff(self.spans).sum()))
-
-    def _across(self) -> Passed:
-        """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
-        passing = Passing(self.gates, REACH_M)
-        passing.add(gap_rows(self.tail, self.head, self.joins))
-        return passing.passed()
 
     def _sections(self) -> list[tuple[int, int, float]]:
         names = self.gates.names
@@ -170,7 +172,7 @@ class _Figures:
                 "direction": ("", direction),
                 "run": ("n", self.session[passed.track]),
                 "track_id": ("n", self.track_id[passed.track]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(passed.track),
                 "length_m": ("m", length),
                 "speed_kmh": ("km/h", 3.6 * passed.speed),
                 "speed_sigma_kmh": ("km/h", 3.6 * passed.speed_sigma),
@@ -202,7 +204,7 @@ class _Figures:
             {
                 "run": ("n", self.session[trips.vehicle]),
                 "track_id": ("n", self.track_id[trips.vehicle]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(trips.vehicle),
                 "length_m": ("m", length),
                 "entry_gate": ("", [names[g] for g in entry]),
                 "exit_gate": ("", [names[g] for g in exit_]),
@@ -232,29 +234,18 @@ class _Figures:
                 "gate": ("", gate),
                 "direction": ("", direction),
                 **self._when(ways),
-                "count": ("n", found.count.ravel()),
-                "count_low": ("n", found.low.ravel()),
-                "count_high": ("n", found.high.ravel()),
-                "flow_per_h": ("1/h", found.flow.ravel()),
-                "time_mean_speed_kmh": ("km/h", 3.6 * found.time_mean.ravel()),
-                "speed_sigma_kmh": ("km/h", 3.6 * found.own.ravel()),
-                "speed_shared_sigma_kmh": ("km/h", 3.6 * found.shared.ravel()),
-                "space_mean_speed_kmh": ("km/h", 3.6 * found.space_mean.ravel()),
-                "v85_kmh": ("km/h", 3.6 * found.v85.ravel()),
-                "occupancy": ("1", found.occupancy.ravel()),
-                "density_per_km": ("1/km", found.density.ravel()),
+                **figure_columns(found),
             }
         )
 
     def _stays(self) -> pa.Table:
         stays, names = self.staying.in_zones(self.vehicle), list(self.site.zones)
-        length = self.length[stays.vehicle]
         return table(
             {
                 "zone": ("", [names[zone] for zone in stays.zone.tolist()]),
                 "run": ("n", self.session[stays.vehicle]),
                 "track_id": ("n", self.track_id[stays.vehicle]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(stays.vehicle),
                 "begin_s": ("s", stays.begin),
                 "end_s": ("s", stays.end),
                 "begin_utc": ("utc", stamps(self.day.utc, stays.begin)),
@@ -288,6 +279,32 @@ class _Figures:
             }
         )
 
+    def _conflicts(self, ground: Ground) -> pa.Table:
+        found = self.meeting.conflicts(self.vehicle, self.spans)
+        columns: dict[str, tuple[str, Any]] = {
+            "time_s": ("s", found.t),
+            "utc": ("utc", stamps(self.day.utc, found.t)),
+            "kind": ("", found.kinds),
+            "angle_deg": ("deg", np.degrees(found.angle)),
+            "run": ("n", self.session[found.second]),
+        }
+        for name, who, speed in zip(("first", "second"), (found.first, found.second), found.speed.T, strict=True):
+            columns |= {
+                f"{name}_track_id": ("n", self.track_id[who]),
+                f"{name}_class": ("", [self.kind[k] for k in who.tolist()]),
+                f"{name}_speed_kmh": ("km/h", 3.6 * speed),
+            }
+        for name, kind in (("ttc", TTC), ("pet", PET)):
+            (x, y), (x_px, y_px) = found.xy[kind].T, ground.pixels(found.xy[kind]).T
+            columns |= {
+                f"{name}_s": ("s", found.value[kind]),
+                f"{name}_sigma_s": ("s", found.sigma[kind]),
+                f"{name}_time_s": ("s", found.when[kind]),
+                **{f"{name}_x_m": ("m", x), f"{name}_y_m": ("m", y)},
+                **{f"{name}_x_px": ("px", x_px), f"{name}_y_px": ("px", y_px)},
+            }
+        return table(columns | {"reason": ("", ["merged" if one else "seen" for one in found.merged.tolist()])})
+
     def _checks(self) -> pa.Table:
         found = balance(self.trips, self.edges, self.watched)
         return table(
@@ -301,6 +318,13 @@ class _Figures:
                 "vanished": ("n", found.vanished),
             }
         )
+
+    def _class_of(self, track: Ints) -> dict[str, tuple[str, Any]]:
+        """The classes of tracks, and how sure they are."""
+        return {
+            "class": ("", [self.kind[k] for k in track.tolist()]),
+            "class_probability": ("1", self.kind_probability[track]),
+        }
 
     def _when(self, times: int) -> dict[str, tuple[str, Any]]:
         """Begin, end and coverage of the intervals, all of them so many times."""

@@ -16,6 +16,9 @@ from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.rows import Rows
 
+REACH_M, REACH_PX = 10.0, 100.0
+"""How far from a gate distances are looked at: many times what positions are off."""
+
 TIME, ALONG, SIGMA, SPEED, SPEED_SIGMA, SPEED_SHARED, BEFORE, AFTER = range(8)
 GATE, TRACK, SIDE, LAST, SEEN, SHOWN, MERGED = range(7)
 _T, _X, _Y, _SIGMA, _SPEED, _SPEED_SIGMA, _SPEED_SHARED = range(7)
@@ -60,6 +63,10 @@ class Passed:
         """Both, these first."""
         names = [column.name for column in fields(self)]
         return Passed(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def at_gate(self, gate: int) -> Passed:
+        """The same passings, of a gate of this number."""
+        return replace(self, gate=np.full(len(self), gate))
 
     def of(self, track: Ints) -> Passed:
         """The same passings of other tracks (P,)."""

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError, SourceError
+from vidtrack.traffic.metres import SITE_COPY
 
 _JOINED_S = 1.0
 """Parts of one live run with less between them are watched without a break."""
@@ -29,6 +32,7 @@ class Recording:
     offset_s    what its `time_s` is behind the site's time
     begin_s, end_s   of what was watched, in the site's time
     session     recordings with the same number are parts of one live run: their tracks have the same numbers
+    breaks      begin and end of each time between without a picture, in its `time_s`
     """
 
     folder: Path
@@ -37,6 +41,14 @@ class Recording:
     begin_s: float
     end_s: float
     session: int
+    breaks: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def spans(self) -> list[list[float]]:
+        """[begin, end] of what was watched without a break [s], in the site's time."""
+        begins = [self.begin_s, *(self.offset_s + end for _, end in self.breaks)]
+        ends = [*(self.offset_s + begin for begin, _ in self.breaks), self.end_s]
+        return [[begin, end] for begin, end in zip(begins, ends, strict=True) if begin < end]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +64,12 @@ class Day:
         spans: list[list[float]] = []
         last = -1
         for one in self.recordings:
-            if spans and one.session == last and one.begin_s - spans[-1][1] < _JOINED_S:
-                spans[-1][1] = max(one.end_s, spans[-1][1])
-            else:
-                spans.append([one.begin_s, one.end_s])
-            last = one.session
+            for begin, end in one.spans:
+                if spans and one.session == last and begin - spans[-1][1] < _JOINED_S:
+                    spans[-1][1] = max(end, spans[-1][1])
+                else:
+                    spans.append([begin, end])
+                last = one.session
         return np.array(spans).reshape(-1, 2)
 
 
@@ -70,6 +83,7 @@ class _Found:
     live: bool
     begin_s: float
     end_s: float
+    breaks: tuple[tuple[float, float], ...]
 
 
 def open_day(runs: Sequence[str], start: datetime | None) -> Day:
@@ -99,9 +113,35 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
             offset = (zero - utc).total_seconds()
         else:
             offset = recordings[-1].end_s - one.begin_s if recordings else 0.0
-        recordings.append(Recording(one.folder, one.size, offset, offset + one.begin_s, offset + one.end_s, session))
+        begin, end = offset + one.begin_s, offset + one.end_s
+        recordings.append(Recording(one.folder, one.size, offset, begin, end, session, one.breaks))
     recordings.sort(key=lambda one: one.end_s)
     return Day(tuple(_apart(recordings)), utc)
+
+
+def measured_run(run: Mapping[str, Any]) -> Recording:
+    """A recording as measures.json has it. Raises SourceError where the run is no longer in its folder."""
+    folder = Path(run["folder"])
+    if not (folder / "summary.json").is_file():
+        raise SourceError(f"the tracks of the run {folder.name} are no longer where they were measured")
+    alone = open_day([str(folder)], None).recordings[0]
+    offset = run["end_s"] - alone.end_s + alone.offset_s
+    return replace(alone, session=run["run"], offset_s=offset, begin_s=run["begin_s"], end_s=run["end_s"])
+
+
+def site_of(runs: Sequence[str]) -> Path:
+    """The site that runs were tracked with: the copy in their folders, each written as for `open_day`.
+
+    Raises ConfigError where a run has none, or another one than the first.
+    """
+    copies = [_split(run)[0] / SITE_COPY for run in runs]
+    for copy in copies:
+        if not copy.is_file():
+            raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
+    for other in copies[1:]:
+        if other.read_bytes() != copies[0].read_bytes():
+            raise ConfigError(f"{copies[0]} and {other} are not the same site; give --site SITE.toml")
+    return copies[0]
 
 
 def _sessions(found: list[_Found]) -> list[int]:
@@ -130,6 +170,7 @@ def _found(run: str) -> _Found:
         frames, end, fps = float(summary["frames"]), float(summary["media_s"]), float(summary["fps"])
         size = int(summary["width"]), int(summary["height"])
         source = summary["settings"]["source"]
+        spans = [(float(first), float(last)) for first, last in summary.get("watched", [])]  # earlier versions: none
     except OSError:
         raise SourceError(f"{folder} has no summary.json, so nobody knows when it watched") from None
     except (KeyError, TypeError, ValueError):
@@ -138,9 +179,11 @@ def _found(run: str) -> _Found:
         raise SourceError(f"{folder} has no frames; there is nothing to measure")
     began = summary.get("began")
     zero = time or (datetime.fromisoformat(began) if began else None)
-    # a part of a live run begins somewhere in it
-    begin = end - (frames - 1) / fps if began else float(source.get("start_s") or 0.0)
-    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps)
+    begin = float(source.get("start_s") or 0.0)
+    if began:  # a part of a live run begins somewhere in it
+        begin = spans[0][0] if spans else end - (frames - 1) / fps
+    breaks = tuple((before[1] + 1 / fps, after[0]) for before, after in pairwise(spans))
+    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks)
 
 
 def _split(run: str) -> tuple[Path, datetime | None]:

@@ -24,6 +24,11 @@ COLUMNS = {
     "checks": ("begin_s", "end_s", "coverage", "inflow", "outflow", "left_over", "appeared", "vanished"),
 }
 """What is read of each table."""
+CONFLICTS = (
+    *("time_s", "kind", "angle_deg", "first_track_id", "first_speed_kmh", "second_track_id", "second_speed_kmh"),
+    *("ttc_s", "ttc_sigma_s", "pet_s", "pet_sigma_s", "reason"),
+)
+"""What is read of the table of conflicts, which only calibrated sites have"""
 KEYS = ("site", "metres", "runs", "utc_of_time_0", "watched_s", "tracks", "joins", "impossible_movements")
 """What is read of measures.json."""
 
@@ -111,6 +116,8 @@ def read_findings(folder: Path) -> Findings:
             raise SourceError(f"{folder} has no {name}; give a folder that vidtrack measure wrote, or measure again")
     tables = {name: _table(folder / f"{name}.parquet", columns) for name, columns in COLUMNS.items()}
     report = _report(folder / "measures.json")
+    if report["metres"] and (folder / "conflicts.parquet").is_file():
+        tables["conflicts"] = _table(folder / "conflicts.parquet", CONFLICTS)
     begin, end = (np.asarray(tables["checks"][name].to_numpy(), float) for name in ("begin_s", "end_s"))
     if len(begin) == 0:
         raise SourceError(f"{folder / 'checks.parquet'} has no intervals; there is nothing to report")

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
-from pathlib import Path
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.errors import SourceError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.rows import Reader, Rows
-from vidtrack.traffic.measures.runs import Day, open_day
+from vidtrack.traffic.measures.runs import Day, measured_run
 from vidtrack.traffic.report.findings import Findings
 from vidtrack.traffic.report.sheet import Movement, Sheet
 from vidtrack.traffic.report.turns import THROUGH
@@ -65,7 +63,7 @@ class Paths:
 def paths_of(found: Findings, sheet: Sheet) -> Paths:
     """Read the tracks of all runs once more.
 
-    Raises SourceError where a run is no longer in its folder, and what `open_day` and `Reader` raise.
+    Raises SourceError where a run is no longer in its folder, and what `measured_run` and `Reader` raise.
     """
     day = _day(found)
     sizes = sorted({recording.size for recording in day.recordings})
@@ -83,17 +81,9 @@ def paths_of(found: Findings, sheet: Sheet) -> Paths:
 
 def _day(found: Findings) -> Day:
     """The recordings as they were measured."""
-    recordings = []
-    for run in found.report["runs"]:
-        folder = Path(run["folder"])
-        if not (folder / "summary.json").is_file():
-            raise SourceError(f"the tracks of the run {folder.name} are no longer where they were measured")
-        alone = open_day([str(folder)], None).recordings[0]
-        offset = run["begin_s"] - alone.begin_s + alone.offset_s
-        times = {"offset_s": offset, "begin_s": run["begin_s"], "end_s": run["end_s"]}
-        recordings.append(replace(alone, session=run["run"], **times))
+    recordings = tuple(measured_run(run) for run in found.report["runs"])
     utc = found.report["utc_of_time_0"]
-    return Day(tuple(recordings), None if utc is None else datetime.fromisoformat(utc))
+    return Day(recordings, None if utc is None else datetime.fromisoformat(utc))
 
 
 def _empty(gates: Gates) -> Heat:

@@ -51,7 +51,7 @@ def turns(where: Drawn) -> dict[tuple[str, str], str]:
     gates, away from it. A change of direction of at most 45 degrees is through; more is left or right. Back to the
     leg that one came from is a U-turn, whatever the angle.
     """
-    into, out = _headings(where, "entry", 1.0), _headings(where, "exit", -1.0)
+    into, out = headings(where, "entry", 1.0), headings(where, "exit", -1.0)
     found = {}
     for start, a in into.items():
         for end, b in out.items():
@@ -61,8 +61,8 @@ def turns(where: Drawn) -> dict[tuple[str, str], str]:
     return found
 
 
-def _headings(where: Drawn, role: str, sign: float) -> dict[str, Floats]:
-    """Direction of travel over the gates of this role, by leg."""
+def headings(where: Drawn, role: str, sign: float) -> dict[str, Floats]:
+    """Direction of travel over the gates of this role, by leg, as a vector; sign: 1 inwards, -1 outwards."""
     total: dict[str, Floats] = {}
     for gate in np.flatnonzero(where.gates.role(role, "both")).tolist():
         leg = where.gates.legs[gate]

@@ -10,15 +10,17 @@ from vidtrack.video.frame import Image
 from vidtrack.video.runs import connect, find_runs
 
 _DARK = 45.0  # grey levels above black of half the scene; by day lamps do not light it
+_LAMP = 100.0  # grey levels above black; a brighter pixel of a dark scene is a lamp
 _EVERY = 4  # px; so many are looked at, across and down
 _LIFT = np.float32(6)  # grey levels; added to both luminances, for the noise of dark pixels
 _SOFT = np.float32(0.2)  # change of the logarithm of the factor over two pixels; at edges of bodies it is larger
 _OPEN = 4  # least number of pixels over which a beam fades into the scene
 
 
-def is_dark(luma: Levels, black: np.float32) -> bool:
-    """Whether the scene (h, w) is so dark that lamps light it."""
-    return bool(np.median(luma[::_EVERY, ::_EVERY]) < black + _DARK)
+def lamps_light(luma: Image, scene: Levels, black: np.float32) -> bool:
+    """Whether lamps light the scene (h, w): it is dark, and they are seen in the picture's luma (h, w)."""
+    dark = np.median(scene[::_EVERY, ::_EVERY]) < black + _DARK
+    return bool(dark and luma.max() > black + _LAMP)
 
 
 @kernel(error_model="numpy")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.video import DisturbanceSettings
-from vidtrack.video.background.beam import is_dark, mark_beams
+from vidtrack.video.background.beam import lamps_light, mark_beams
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, haziness, veil
 from vidtrack.video.background.exposure import follow_gain
@@ -169,7 +169,7 @@ class Disturbance:
             count = mark_shadow(seen, scene, self._black, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
-        if s.beams and is_dark(scene.luma, black):
+        if s.beams and lamps_light(seen.luma, scene.luma, black):
             mark_beams(seen.luma, scene.luma, black, weak)
         hit = np.where((strength > 1) | (weak == BEAM), weak, np.uint8(0))
         if s.shadow and s.amid:

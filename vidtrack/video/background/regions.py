@@ -14,6 +14,8 @@ _REACH = 3  # px to either side of a border over which contrast is taken
 _ALIKE = np.float32(6)  # grey levels within which a pixel is as it was before; wider, dark vehicles pass for it
 _RETURNED = 0.6  # share of a blob's pixels that are as they were before
 _MARGIN = np.float32(1.3)  # against healing what is really there: a dark vehicle on a road with marks
+_CLEAR = np.float32(1.7)  # the same for what may be a known vehicle that waits
+_UNMOVED_S = np.float32(2)  # for which that must be the same
 
 
 @kernel
@@ -42,16 +44,19 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
     """Runs (row, start, stop) of the ghosts: objects that are in the scene and no longer in the picture.
 
     A blob is a ghost if the picture matches the scene as it was before the object was absorbed. It is also a ghost if
-    the object's edge is in the scene only: along the blob's border the scene has clearly more contrast (luminance
-    differences over +-3 px, horizontal and vertical) than the frame, and has been covered for settled_s on average.
+    the object's edge is in the scene only: along the blob's border the scene has more contrast (luminance differences
+    over +-3 px, horizontal and vertical) than the frame, and has been covered for settled_s on average. Under known
+    vehicles no cover is counted: a track can end on the mark of another vehicle. There the contrast must be clearly
+    more, while the cover has not changed for _UNMOVED_S.
     """
     h, w = mask.shape
     row, start, stop = find_runs(mask, False)
     label, count = connect(row, start, stop, 1)
     area = np.zeros(count, np.int64)
     returned = np.zeros(count, np.int64)
-    excess = np.zeros(count, np.float32)  # contrast of the scene above that of the frame
-    lack = np.zeros(count, np.float32)  # seconds of cover below settled_s
+    border = np.zeros(count, np.int64)
+    in_scene, in_frame = np.zeros(count, np.float32), np.zeros(count, np.float32)  # contrast along the border
+    covered_s, steady_s = np.zeros(count, np.float32), np.zeros(count, np.float32)
     for k in range(len(row)):
         y, blob = row[k], label[k]
         area[blob] += stop[k] - start[k]
@@ -64,9 +69,14 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
         for x in range(max(start[k], _REACH), min(stop[k], w - _REACH)):
             if start[k] < x < stop[k] - 1 and mask[y - 1, x] > 0 and mask[y + 1, x] > 0:
                 continue
-            excess[blob] += _contrast(scene.luma, y, x) - _MARGIN * _contrast(luma, y, x)
-            lack[blob] += settled_s - scene.covered_s[y, x]
-    ghost = (returned > _RETURNED * area) | ((excess > 0) & (lack <= 0))
+            border[blob] += 1
+            in_scene[blob] += _contrast(scene.luma, y, x)
+            in_frame[blob] += _contrast(luma, y, x)
+            covered_s[blob] += scene.covered_s[y, x]
+            steady_s[blob] += scene.steady_s[y, x]
+    left = (in_scene > _MARGIN * in_frame) & (covered_s >= settled_s * border)
+    stays = (in_scene > _CLEAR * in_frame) & (steady_s >= _UNMOVED_S * border)
+    ghost = (returned > _RETURNED * area) | left | stays
     chosen = ghost[label]
     return row[chosen], start[chosen], stop[chosen]
 

@@ -87,7 +87,9 @@ def learn(
             scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
             passed = _NONE if covered[y, x] == UNSEEN else dt
             scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + passed
-            if not free and covered[y, x] != UNSEEN:
+            if free:
+                scene.steady_s[y, x] = _NONE
+            elif covered[y, x] != UNSEEN:
                 change = np.float32(picture.luma[y, x]) - scene.cover[y, x]
                 steady = abs(change) < max(_STEADY, _SURPRISE * noise)
                 scene.cover[y, x] += (weight if steady else np.float32(1)) * change

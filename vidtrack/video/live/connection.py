@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import socket
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from time import monotonic
 from urllib.parse import urlsplit
 
 import av
+import av._core
 import av.format
 
 from vidtrack.errors import SourceError
@@ -17,6 +20,7 @@ from vidtrack.video.planes import planar
 
 _RAW = "rawvideo"
 _PROBE_S = 2.0  # FFmpeg's default is up to 5 s; 2 s suffice here
+_LARGEST = 1 << 27  # bytes of one allocation of FFmpeg: a plane of 11,000 x 11,000 pixels, or a coded picture
 
 
 class Refused(SourceError):  # noqa: N818
@@ -67,7 +71,7 @@ class Connection:
                     heard = monotonic()
                     yield packet
         except av.FFmpegError as error:
-            reason = error.strerror or str(error.errno)
+            reason = _TOO_LARGE if error.errno == errno.ENOMEM else error.strerror or str(error.errno)
         if monotonic() - heard > 0.9 * self._timeout_s:
             raise Stalled(f"{self._address.shown} is connected, but nothing came for {self._timeout_s:g} s")
         raise SourceError(f"lost {self._address.shown} after {monotonic() - began:.1f} s: {reason}")
@@ -92,7 +96,20 @@ class Connection:
         self._container.close()
 
 
+_TOO_LARGE = f"a picture larger than {_LARGEST >> 20} MB came; is it a video stream?"
+
+
+def bound_pictures() -> None:
+    """Bound what FFmpeg allocates at once: a picture without an end would take all memory.
+
+    FFmpeg has no option for it. Where its function cannot be called (Windows), nothing is bounded.
+    """
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(_LARGEST))
+
+
 def _open(address: Address, timeout_s: float, options: Sequence[str]) -> av.container.InputContainer:
+    bound_pictures()
     began = monotonic()
     own = dict(option.split("=", 1) for option in options)
     chosen = {"analyzeduration": str(round(_PROBE_S * 1e6)), **address.options, **own}
@@ -128,6 +145,8 @@ def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout
         return Refused(f"{start} permission denied; add your user to the group of the device, mostly video")
     if address.is_device:
         return Refused(f"{start} it is no camera ({error.strerror})")
+    if error.errno == errno.ENOMEM:
+        return SourceError(f"{start} {_TOO_LARGE}")
     if timed_out:
         return Stalled(f"{start} no answer in {timeout_s:g} s")
     if isinstance(error, ConnectionRefusedError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
@@ -90,10 +91,12 @@ class Reader:
                     break
                 self._failures += 1
                 never_seen = self._stats.received == 0
-                if never_seen and (isinstance(error, Refused) or self._failures == _TRIES):
+                tries = math.inf if self._settings.retry_first else _TRIES
+                if never_seen and (isinstance(error, Refused) or self._failures >= tries):
                     self._shots.close(error)
                     break
-                self._report_failure(error, "trying again" if never_seen else "trying again for as long as it takes")
+                gives_up = never_seen and tries == _TRIES
+                self._report_failure(error, "trying again" + ("" if gives_up else " for as long as it takes"))
                 self._wait()
         self._stats.state = "ended"
 

@@ -44,8 +44,10 @@ class LiveSource:
     origin_s   None: the first picture has time 0
     like       all frames are converted to its size and kind; None: those of the first frame
     connect    opens a connection; None: to the address, by FFmpeg
+    stats      filled from the first attempt on; None: new ones
 
-    Opening waits for the first picture. Raises SourceError if the source refuses, or fails three times before that.
+    Opening waits for the first picture. Raises SourceError if the source refuses, or without
+    live.retry_first fails three times before that.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class LiveSource:
         origin_s: float | None = None,
         like: Frame | None = None,
         connect: Callable[[], Connection] | None = None,
+        stats: LiveStats | None = None,
     ) -> None:
         self._address = address
         self._settings = settings
@@ -67,7 +70,7 @@ class LiveSource:
         self._clock = CaptureClock(patient=settings.every_frame)
         self._index = first
         self._told_size = self._told_late = self._stopped = False
-        self.stats = LiveStats()
+        self.stats = stats or LiveStats()
         self.place: Place = (0, 0)
         self._reader = self._read_on()
         shot = self._first_shot()

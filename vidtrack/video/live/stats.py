@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from vidtrack.video.stats import SourceStats, log
 
 _REMEMBERED = 20
+_RATE_S = 10.0
 
 
 @dataclass(slots=True)
@@ -44,6 +45,6 @@ class LiveStats(SourceStats):
         self._arrivals.append(now_s)
 
     def rate(self, now_s: float) -> float:
-        """Recent pictures per second; it falls while none arrive."""
-        times = list(self._arrivals)
+        """Pictures per second in the last seconds; 0 while none arrive."""
+        times = [time_s for time_s in list(self._arrivals) if now_s - time_s < _RATE_S]
         return (len(times) - 1) / max(now_s - times[0], 1e-3) if len(times) > 1 else 0.0

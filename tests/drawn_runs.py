@@ -45,12 +45,25 @@ def along(track, t, x, y=240.0):
 
 
 def write_run(
-    folder, tracks, *, seconds=60.0, metres=False, csv=False, length_m=4.0, began=None, status=None, first=0.0
+    folder,
+    tracks,
+    *,
+    seconds=60.0,
+    metres=False,
+    covariances=False,
+    csv=False,
+    length_m=4.0,
+    began=None,
+    status=None,
+    first=0.0,
+    watched=None,
 ):
     """A finished run of these tracks (id, times (N,), positions (N, 2) px), in order of frames.
 
     metres  at 10 px/m, seen from above; first: its first frame [s]
+    covariances  of the whole state, so that metres of any site can be computed
     status  (N,) words for all tracks, None: confirmed
+    watched as in summary.json; None: as earlier versions, without
     """
     folder.mkdir(parents=True)
     t = np.concatenate([one[1] for one in tracks] or [np.empty(0)])
@@ -68,13 +81,16 @@ def write_run(
         **dict.fromkeys(("sigma_x_px", "sigma_y_px"), 0.5 * ones),
         **{"left_px": xy[:, 0] - 20, "top_px": xy[:, 1] - 15, "width_px": 40 * ones, "height_px": 20 * ones},
     }
+    if covariances:
+        columns |= dict.fromkeys(("sigma_vx_px_s", "sigma_vy_px_s"), ones)
+        columns |= dict.fromkeys(("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy"), 0 * ones)
     if metres:
         columns |= {
             **{"x_m": xy[:, 0] / 10, "y_m": 48 - xy[:, 1] / 10},
-            **{"sigma_x_m": 0.05 * ones, "sigma_y_m": 0.05 * ones},
+            **{"sigma_x_m": 0.05 * ones, "sigma_y_m": 0.05 * ones, "corr_xy_m": 0 * ones},
             **{"speed_kmh": 0.36 * np.hypot(*v.T), "speed_sigma_kmh": ones, "speed_shared_sigma_kmh": 0.5 * ones},
             "heading_deg": np.degrees(np.arctan2(v[:, 0], -v[:, 1])),
-            **{"length_m": length_m * ones, "length_sigma_m": 0.2 * ones},
+            **{"length_m": length_m * ones, "length_sigma_m": 0.2 * ones, "width_m": 2 * ones},
         }
     order = np.lexsort((ids, t))
     table = pa.table({name: pa.array(np.asarray(values)[order]) for name, values in columns.items()})
@@ -88,5 +104,6 @@ def write_run(
         **{"width": SIZE[0], "height": SIZE[1]},
         "settings": {"source": {"start_s": None if first == 0 or began else first}},
     }
-    (folder / "summary.json").write_text(json.dumps(summary | ({"began": began} if began else {})))
+    more = {"began": began, "watched": watched}
+    (folder / "summary.json").write_text(json.dumps(summary | {name: value for name, value in more.items() if value}))
     return str(folder)

@@ -1,0 +1,50 @@
+"""A process ends with its own exit code, whatever its abandoned threads do."""
+
+import subprocess
+import sys
+
+import pytest
+from cameras import HANG_S
+
+ABANDONED = """
+import threading, time
+import pyarrow as pa, pyarrow.csv
+from vidtrack.__main__ import main
+from vidtrack.cli import cli
+
+class Slow:
+    closed = False
+    def write(self, block):
+        entered.set()
+        time.sleep(0.002)
+        return len(block)
+    def flush(self):
+        pass
+    def close(self):
+        pass
+
+def abandoned():
+    table = pa.table({"a": list(range(200_000))})
+    while True:
+        with pa.PythonFile(Slow(), "w") as file:
+            pa.csv.write_csv(table, file, pa.csv.WriteOptions(batch_size=100))
+
+def command(**_):
+    for _ in range(4):
+        threading.Thread(target=abandoned, daemon=True).start()
+    entered.wait()
+    print("done")
+    return CODE
+
+entered = threading.Event()
+cli.main = command
+main()
+"""
+
+
+@pytest.mark.parametrize("code", [0, 3])
+def test_threads_that_write_in_compiled_code_do_not_abort_it(code):
+    program = [sys.executable, "-c", ABANDONED.replace("CODE", str(code))]
+    for _ in range(3):
+        done = subprocess.run(program, capture_output=True, text=True, timeout=HANG_S, check=False)
+        assert (done.returncode, done.stdout, done.stderr) == (code, "done\n", "")

@@ -1,0 +1,214 @@
+"""What a live run writes, without a camera: parts, counts, and which of them a full disk leaves out."""
+
+import csv
+import errno
+import itertools
+import json
+import os
+import shutil
+import time
+from types import SimpleNamespace
+
+import pytest
+from synthetic_steps import make_step
+
+from vidtrack.config.load import load
+from vidtrack.errors import StoppedEarly
+from vidtrack.output.intervals.book import totals
+from vidtrack.output.intervals.day import day_folders, read_day
+from vidtrack.recording.reserve import Reserve
+from vidtrack.recording.retention import Limits, Retention, parts_of
+from vidtrack.run.live.counting import counting_of
+from vidtrack.run.live.parts import Parts
+from vidtrack.run.sinks import Subject, line_counter
+
+BEGAN_S = 1_800_000_000.0  # a full hour
+FPS = 25.0
+
+
+class Clock:
+    """The wall clock of a run; `now` is the media time."""
+
+    def __init__(self, monkeypatch):
+        self.now, self.set_by = 0.0, 0.0
+        monkeypatch.setattr(time, "time", lambda: BEGAN_S + self.set_by + self.now)
+
+    def began_s(self):
+        return BEGAN_S + self.set_by
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    return Clock(monkeypatch)
+
+
+class Station:
+    """Parts of 10 s with a line at x = 100; one vehicle drives over it each second, to the right."""
+
+    def __init__(self, folder, clock, *assignments):
+        given = ["live.roll_s=10", "live.zone=UTC", ("output.lines", ["gate:100,0,100,200"]), *assignments]
+        self.settings = load(assignments=given)
+        counter = line_counter(self.settings, 320, 240)
+        self.subject = Subject("cam", self.settings, (240, 320), FPS, None, dict, counter, None)
+        self.counting = counting_of(self.subject, folder / "intervals", clock.began_s)
+        live = self.settings.live
+        retention = Retention(Limits(live.keep_s, live.keep_bytes))
+        retention.results.append(folder)
+        self.parts = Parts(
+            folder, self.subject, False, live.roll_s, retention, self.counting, Reserve(live.reserve_bytes)
+        )
+        self.clock = clock
+
+    def drive(self, begin_s, end_s, coasting=lambda time_s, number: False):
+        """Write the steps of this time, five at once; returns how many vehicles crossed."""
+        for first in range(round(begin_s * FPS), round(end_s * FPS), 5):
+            steps = []
+            for frame in range(first, min(first + 5, round(end_s * FPS))):
+                time_s = frame / FPS
+                rows = []
+                for number in range(
+                    int(time_s) - 1, int(time_s) + 1
+                ):  # each is seen for 2 s, and crosses in the middle
+                    if number >= 0:
+                        word = "o" if coasting(time_s, number) else "c"
+                        rows.append((number + 1, word, 50 + 50 * (time_s - number), 100))
+                steps.append(make_step(frame, rows))
+            self.clock.now = steps[-1].time_s + 0.1
+            self.parts.write(steps)
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def mot_rows(folder):
+    return [tuple(map(float, line.split(",")[:2])) for line in (folder / "mot.txt").read_text().splitlines()]
+
+
+def test_every_crossing_is_in_one_part_and_in_one_interval(tmp_path, clock):
+    station = Station(tmp_path, clock)
+    station.drive(0, 25)
+    station.parts.finish()
+    parts = parts_of(tmp_path)
+    assert len(parts) == 3
+    crossings = [row for part in parts for row in rows_of(part / "counts.csv")]
+    assert len({row["track_id"] for row in crossings}) == len(crossings) == 24
+    assert totals(tmp_path / "intervals") == {"gate": {"left": 0, "right": 24}}
+    for part in parts:  # a part tells what is in it
+        summary = json.loads((part / "summary.json").read_text())
+        assert summary["counts"]["gate"]["right"] == len(rows_of(part / "counts.csv"))
+    assert json.loads((tmp_path / "summary.json").read_text())["counts"]["gate"]["right"] == 24
+
+
+def test_counts_go_on_after_a_kill_and_after_an_end(tmp_path, clock):
+    """Ten runs: what the page, the summary and the files say is the same, and the rest of each is a stated gap."""
+    for run in range(10):
+        station = Station(tmp_path, clock)
+        station.subject.counter.totals()
+        station.drive(20 * run, 20 * run + 8)
+        if run % 2:
+            station.parts.finish()
+    station = Station(tmp_path, clock)
+    found = sum(totals(tmp_path / "intervals")["gate"].values())
+    assert station.subject.counter.totals()["gate"]["right"] == found
+    assert 10 * 7 <= found <= 10 * 8  # the one that is on the line when a run ends
+    assert json.loads((tmp_path / "summary.json").read_text())["counts"]["gate"]["right"] == found
+    (day,) = day_folders(tmp_path / "intervals")
+    spans = read_day(day).watched - BEGAN_S
+    for run, (begin, end) in enumerate(spans.tolist()):
+        assert begin == pytest.approx(20 * run, abs=0.002)
+        assert end == pytest.approx(20 * run + 7.96, abs=0.002) if run % 2 else 20 * run + 3 < end < 20 * run + 7
+
+
+def test_a_gap_in_the_frames_is_a_gap_in_what_was_watched(tmp_path, clock):
+    station = Station(tmp_path, clock)
+    for begin_s in (0, 30, 60.2):
+        station.drive(begin_s, begin_s + 5)
+    station.parts.finish()
+    (day,) = day_folders(tmp_path / "intervals")
+    assert (read_day(day).watched - BEGAN_S).round(2).tolist() == [[0, 4.96], [30, 34.96], [60.2, 65.16]]
+
+
+@pytest.mark.parametrize("step_s", [3600.0, -3600.0])
+def test_a_step_of_the_wall_clock_neither_loses_nor_doubles(tmp_path, clock, step_s):
+    station = Station(tmp_path, clock)
+    station.drive(0, 10)
+    clock.set_by = step_s
+    station.drive(10, 20)
+    station.parts.finish()
+    assert totals(tmp_path / "intervals")["gate"]["right"] == 19
+    (day,) = day_folders(tmp_path / "intervals")
+    watched = read_day(day).watched
+    assert (watched[:, 1] - watched[:, 0]).sum() == pytest.approx(19.96, abs=0.01)
+    assert len(watched) == 2
+
+
+def test_a_track_found_again_after_the_border_of_a_part_has_its_rows(tmp_path, clock):
+    """Vehicle 10 is hidden from 9.6 s to 10.4 s, over the border at 10 s."""
+    station = Station(tmp_path, clock)
+    station.drive(0, 13, coasting=lambda time_s, number: number == 9 and 9.6 < time_s < 10.4)
+    station.parts.finish()
+    first, second = parts_of(tmp_path)
+    for part in (first, second):
+        tracks = {(float(row["frame"]) + 1, float(row["track_id"])) for row in rows_of(part / "tracks.csv")}
+        assert set(mot_rows(part)) == tracks
+        assert mot_rows(part) == sorted(mot_rows(part))
+    assert not set(mot_rows(first)) & set(mot_rows(second))
+
+
+def test_a_track_that_is_not_found_again_has_none_of_its_gap(tmp_path, clock):
+    station = Station(tmp_path, clock)
+    station.drive(0, 13, coasting=lambda time_s, number: number == 9 and time_s > 9.6)
+    station.parts.finish()
+    rows = [row for part in parts_of(tmp_path) for row in mot_rows(part) if row[1] == 10]
+    assert max(frame for frame, _ in rows) == 9.6 * FPS + 1
+
+
+def test_counts_are_written_where_tracks_have_no_room(tmp_path, clock, monkeypatch):
+    station = Station(tmp_path, clock, "live.reserve_bytes=1e6")
+    station.drive(0, 5)
+    disk = SimpleNamespace(total=10**9, free=150_000)  # less than the fifth that tracks leave
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: disk)
+    for begin_s in itertools.takewhile(lambda t: t < 9, itertools.count(5, 0.2)):
+        with pytest.raises(StoppedEarly, match=r"its last 0\.2 MB are kept for counts"):
+            station.drive(begin_s, begin_s + 0.2)
+    (part,) = parts_of(tmp_path)
+    assert float(rows_of(part / "tracks.csv")[-1]["time_s"]) < 5
+    assert len(rows_of(part / "counts.csv")) == totals(tmp_path / "intervals")["gate"]["right"] >= 7
+    disk.free = 10**8
+    station.drive(9, 10)
+    assert float(rows_of(part / "tracks.csv")[-1]["time_s"]) > 9
+
+
+def test_crossings_of_a_disk_without_any_room_are_written_later(tmp_path, clock, monkeypatch):
+    station = Station(tmp_path, clock)
+    station.drive(0, 5)
+    with monkeypatch.context() as patch:
+        full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        def append(file, block):
+            if block:
+                raise full
+
+        patch.setattr("vidtrack.output.linefile.append", append)
+        patch.setattr("vidtrack.output.intervals.book.append", append)
+        for begin_s in (5, 6, 7):
+            with pytest.raises(StoppedEarly, match="No space left"):
+                station.drive(begin_s, begin_s + 0.2)
+            clock.now = begin_s + 1
+    station.drive(8, 9)
+    station.parts.finish()
+    (part,) = parts_of(tmp_path)
+    assert len(rows_of(part / "counts.csv")) == totals(tmp_path / "intervals")["gate"]["right"]
+
+
+def test_recordings_leave_more_room_than_tracks(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(total=10**9, free=20 * 10**6))
+    reserve = Reserve(None)  # 5 % of the disk: 50 MB, and 10 MB
+    reserve.check_tracks(tmp_path)
+    with pytest.raises(StoppedEarly, match="last 50 MB are kept for results"):
+        reserve.check_recordings(tmp_path)
+    monkeypatch.undo()
+    with pytest.raises(StoppedEarly, match="No such file"):
+        reserve.check_tracks(tmp_path / "gone")

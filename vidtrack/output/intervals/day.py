@@ -1,0 +1,197 @@
+"""What is counted in one day, and the table of its intervals: the columns of `intervals` of vidtrack measure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, date, datetime
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+
+from vidtrack.arrays.types import Floats
+from vidtrack.errors import FormatError
+from vidtrack.output.intervals.days import edges_of_day, span_of, zone_of
+from vidtrack.traffic.lengths import class_of
+from vidtrack.traffic.measures.intervals import coverage, figure_columns, figures
+from vidtrack.traffic.measures.passing import Passed
+from vidtrack.traffic.measures.tables import stamps, table
+
+CROSSINGS, WATCHED, PLAN = "crossings.csv", "watched.csv", "plan.json"
+_TIME = pa.timestamp("ms", "UTC")
+CROSSING_COLUMNS = {
+    "utc": _TIME,
+    "gate": pa.string(),
+    "direction": pa.string(),
+    "track_id": pa.int64(),
+    "length_m": pa.float64(),
+    "speed_kmh": pa.float64(),
+    "speed_sigma_kmh": pa.float64(),
+    "speed_shared_sigma_kmh": pa.float64(),
+}
+WATCHED_COLUMNS = {"begin_utc": _TIME, "end_utc": _TIME}
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is counted.
+
+    gates    names of the counting lines, each with its two directions
+    classes  low and high length of each class [m]; empty without a calibrated site
+    zone     time zone of the days; None: that of this machine
+    """
+
+    gates: Mapping[str, tuple[str, str]]
+    classes: Mapping[str, tuple[float, float]]
+    zone: str | None
+
+    def to_json(self) -> str:
+        """The content of plan.json."""
+        return json.dumps({"gates": self.gates, "classes": self.classes, "zone": self.zone}, indent=2) + "\n"
+
+    @classmethod
+    def read(cls, folder: Path) -> Plan:
+        """The plan of a folder of counts. Raises FormatError."""
+        path = folder / PLAN
+        try:
+            tree: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            gates = {str(name): (str(one), str(other)) for name, (one, other) in tree["gates"].items()}
+            classes = {str(name): (float(low), float(high)) for name, (low, high) in tree["classes"].items()}
+            zone_of(tree["zone"])
+            return cls(gates, classes, tree["zone"])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise FormatError(f"cannot read the plan of the counts {path}: {error}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Day:
+    """The crossings of a day, in the columns CROSSING_COLUMNS, and the (S, 2) Unix times [s] that were watched.
+
+    Spans overlap if the clock was set back: what was watched twice is counted twice, and covered twice.
+    """
+
+    date: date
+    crossings: pa.Table
+    watched: Floats
+
+    def intervals(self, every_s: float, plan: Plan) -> pa.Table:
+        """A row per gate, direction and interval, from the first watched interval to the last one.
+
+        Crossings outside of what was watched, such as the last ones before a kill, are in `count` alone.
+        """
+        edges = edges_of_day(self.date, every_s, zone_of(plan.zone))
+        watched = coverage(self.watched, edges)
+        counted = np.histogram(_unix(self.crossings["utc"]), edges)[0]
+        kept = np.flatnonzero((watched > 0) | (counted > 0))
+        if len(kept):
+            edges, watched = edges[kept[0] : kept[-1] + 2], watched[kept[0] : kept[-1] + 1]
+        else:
+            edges, watched = edges[:1], watched[:0]
+        return _table(self.crossings, edges, watched, plan)
+
+
+def read_day(folder: Path) -> Day:
+    """The counts in a day's folder; a file that is missing has none. Raises FormatError."""
+    crossings = read_lines(folder / CROSSINGS, CROSSING_COLUMNS)
+    spans = [_unix(column) for column in read_lines(folder / WATCHED, WATCHED_COLUMNS).columns]
+    return Day(date.fromisoformat(folder.name), crossings, np.column_stack(spans))
+
+
+def read_lines(path: Path, columns: Mapping[str, pa.DataType]) -> pa.Table:
+    """The whole lines of a table: a kill may have cut the last one."""
+    schema = pa.schema(list(columns.items()))
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        return schema.empty_table()
+    convert = pyarrow.csv.ConvertOptions(column_types=schema, include_columns=schema.names, strings_can_be_null=False)
+    try:
+        whole = BytesIO(content[: content.rfind(b"\n") + 1])
+        return pyarrow.csv.read_csv(whole, convert_options=convert).cast(schema)
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        raise FormatError(f"{path} is damaged: {error}") from None
+
+
+def _table(crossings: pa.Table, edges: Floats, watched: Floats, plan: Plan) -> pa.Table:
+    gates = _all_gates(crossings, plan)
+    ways = [(gate, way) for gate, pair in gates.items() for way in pair]
+    bins = len(watched)
+    unix, length = _unix(crossings["utc"]), _reals(crossings, "length_m")
+    inside = (unix >= edges[0]) & (unix < edges[-1]) & (bins > 0)
+    crossings, unix, length = crossings.filter(pa.array(inside)), unix[inside], length[inside]
+    pairs = zip(crossings["gate"].to_pylist(), crossings["direction"].to_pylist(), strict=True)
+    numbers = {way: number for number, way in enumerate(ways)}
+    way = np.array([numbers[pair] for pair in pairs], int)
+    passed = _passed(crossings, unix, way)
+    begin = edges[0]
+    found = figures(passed, np.ones(len(passed)), length, edges, watched, len(ways))
+    cell = way * bins + np.searchsorted(edges, unix, side="right") - 1
+    counted = np.bincount(cell, minlength=len(ways) * bins).reshape(found.count.shape)
+    found = replace(found, count=np.where(counted > 0, counted, found.count))
+    utc = datetime.fromtimestamp(begin, UTC)
+    when = [np.tile(edge - begin, len(ways)) for edge in (edges[:-1], edges[1:])]
+    columns = {
+        "gate": ("", [gate for gate, _ in ways for _ in range(bins)]),
+        "direction": ("", [direction for _, direction in ways for _ in range(bins)]),
+        "begin_utc": ("utc", stamps(utc, when[0])),
+        "end_utc": ("utc", stamps(utc, when[1])),
+        "coverage": ("1", np.tile(watched, len(ways))),
+        **figure_columns(found),
+    }
+    named = np.array(class_of(length, dict(plan.classes)), object)
+    for name in plan.classes:
+        count = np.bincount(cell[named == name], minlength=len(ways) * bins)
+        columns[f"count_{name}"] = ("n", np.where(np.isnan(found.count.ravel()), np.nan, count))
+    return table(columns)
+
+
+def _all_gates(crossings: pa.Table, plan: Plan) -> dict[str, tuple[str, ...]]:
+    """The gates of the plan, and those that were counted earlier in the day and have been removed since."""
+    gates: dict[str, tuple[str, ...]] = dict(plan.gates)
+    for pair in crossings.group_by(["gate", "direction"], use_threads=False).aggregate([]).to_pylist():
+        known = gates.get(pair["gate"], ())
+        if pair["direction"] not in known:
+            gates[pair["gate"]] = (*known, pair["direction"])
+    return gates
+
+
+def _passed(crossings: pa.Table, unix: Floats, way: np.ndarray) -> Passed:
+    """The crossings as passings; `gate` and `side` are such that 2 gate + side is the way."""
+    n = len(unix)
+    unknown, surely = np.full(n, np.nan), np.ones(n, bool)
+    speed, own, shared = (
+        _reals(crossings, name) / 3.6 for name in ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
+    )
+    return Passed(
+        unix, way // 2, np.arange(n), way % 2, unknown, unknown, unknown, unknown, surely, ~surely, speed, own, shared
+    )
+
+
+def _reals(rows: pa.Table, name: str) -> Floats:
+    return np.asarray(rows[name].to_numpy(), float)
+
+
+def _unix(column: pa.ChunkedArray) -> Floats:
+    return np.asarray(column.cast(pa.int64()).to_numpy(), float) / 1000
+
+
+def day_folders(folder: Path) -> list[Path]:
+    """The folders of the days, oldest first."""
+    found = []
+    for entry in sorted(folder.iterdir()) if folder.is_dir() else []:
+        try:
+            date.fromisoformat(entry.name)
+        except ValueError:
+            continue
+        found.append(entry)
+    return found
+
+
+def is_over(folder: Path, now_s: float, plan: Plan) -> bool:
+    """Whether a day has ended."""
+    return span_of(date.fromisoformat(folder.name), zone_of(plan.zone))[1] <= now_s

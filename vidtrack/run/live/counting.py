@@ -1,0 +1,190 @@
+"""Counts the tracks of a live run: for the files of its parts, the page, and the counts by interval."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from vidtrack.arrays.types import Floats
+from vidtrack.output.intervals.book import CountBook, Passage, totals
+from vidtrack.output.intervals.day import Plan
+from vidtrack.output.sink import Step
+from vidtrack.run.sinks import Subject
+from vidtrack.traffic.lengths import length_sums, mean_length
+from vidtrack.traffic.lines import Crossing, LineCounter
+from vidtrack.traffic.site import read_site
+
+COUNTS = "intervals"
+"""Folder of the counts by interval"""
+
+_FORGET_S = 10.0  # a crossing is decided sooner than this after the last row of its track
+_MARGIN_S = 1.0  # for a vehicle to be clear of the line
+_STEP_S = 0.5  # the wall clock was set if it moved by more than this
+_SPEEDS = ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
+_NOTHING = (np.nan, np.nan, np.nan)
+
+
+class RoadReadings:
+    """Mean length [m] and newest speed [m/s], with its standard deviations (own, shared), of tracks on the road."""
+
+    def __init__(self) -> None:
+        self._sums: dict[int, Floats] = {}
+        self._speeds: dict[int, tuple[float, float, float]] = {}
+        self._seen_s: dict[int, float] = {}
+
+    def add(self, rows: pa.Table) -> None:
+        """Take rows of tracks with the columns of ROAD, in order of time."""
+        ids, track = np.unique(rows["track_id"].to_numpy(), return_inverse=True)
+        time_s, length, sigma = (_reals(rows, name) for name in ("time_s", "length_m", "length_sigma_m"))
+        speeds = np.column_stack([_reals(rows, name) for name in _SPEEDS]) / 3.6
+        sums = length_sums(track, length, sigma, len(ids))
+        last, fast = np.zeros((2, len(ids)), int)
+        last[track] = np.arange(len(track))
+        known = np.flatnonzero(np.isfinite(speeds[:, 0]))
+        fast[track[known]] = known + 1
+        for number, one in enumerate(ids.tolist()):
+            self._sums[one] = self._sums.get(one, 0.0) + sums[number]
+            self._seen_s[one] = time_s[last[number]]
+            if fast[number]:
+                speed, own, shared = speeds[fast[number] - 1].tolist()
+                self._speeds[one] = speed, own, shared
+        self._forget(float(time_s[-1]))
+
+    def of(self, track_id: int) -> tuple[float, float, float, float]:
+        """Length, speed and its standard deviations; NaN where nothing is known."""
+        sums = self._sums.get(track_id)
+        length = np.nan if sums is None else float(mean_length(sums[None])[0])
+        return length, *self._speeds.get(track_id, _NOTHING)
+
+    def _forget(self, now_s: float) -> None:
+        for one in [one for one, seen_s in self._seen_s.items() if now_s - seen_s > _FORGET_S]:
+            for memory in (self._sums, self._speeds, self._seen_s):
+                memory.pop(one, None)
+
+
+class Counting:
+    """Counts steps of confirmed tracks over the lines of `counter`, and writes the counts by interval to `book`.
+
+    began_s  returns the Unix time of time_s 0, by the wall clock as it is now
+    gap_s    no crossings are counted over a longer time without frames
+    late_s   crossings are decided within this time after they happened
+    keep_s   older days are deleted; None: they stay
+
+    A time is watched if frames were tracked in it and their crossings are decided.
+    """
+
+    def __init__(
+        self,
+        counter: LineCounter,
+        book: CountBook,
+        began_s: Callable[[], float],
+        gap_s: float,
+        late_s: float,
+        keep_s: float | None = None,
+    ) -> None:
+        self._counter = counter
+        self._book = book
+        self._began_s = began_s
+        self._gap_s, self._late_s, self._keep_s = gap_s, late_s, keep_s
+        self._readings = RoadReadings()
+        self._offset_s = began_s()
+        self._last_s: float | None = None
+        self._spans: list[tuple[float, float]] = []  # watched, and not told yet; the last one goes on
+
+    @property
+    def lost(self) -> int:
+        """Number of crossings that could not be written to the intervals."""
+        return self._book.lost
+
+    def step(self, steps: Sequence[Step], rows: pa.Table | None) -> list[Crossing]:
+        """Count a batch of steps.
+
+        rows  of their tracks, with the columns of ROAD; None without a calibrated site
+        """
+        self._set_clock()
+        if rows is not None and len(rows):
+            self._readings.add(rows)
+        crossings = [crossing for step in steps for crossing in self._counter.step(step.index, step.tracks)]
+        self._note(crossings)
+        for step in steps:
+            self._watch(step.time_s)
+        self._tell_watched(self._late_s)
+        return crossings
+
+    def save(self) -> None:
+        """Write the counts by interval. Raises StoppedEarly."""
+        self._book.save(self._keep_s)
+
+    def end(self) -> list[Crossing]:
+        """Count tracks whose last position is beyond a line."""
+        crossings = self._counter.close()
+        self._note(crossings)
+        self._tell_watched(0.0)
+        return crossings
+
+    def close(self) -> None:
+        """Finish the files of the intervals. Raises StoppedEarly."""
+        self._book.close()
+
+    def _note(self, crossings: Sequence[Crossing]) -> None:
+        self._book.add(
+            Passage(
+                self._offset_s + crossing.time_s,
+                crossing.line,
+                crossing.direction,
+                crossing.track_id,
+                *self._readings.of(crossing.track_id),
+            )
+            for crossing in crossings
+        )
+
+    def _set_clock(self) -> None:
+        """Follow the wall clock; what was watched before it was set has the times of then."""
+        offset_s = self._began_s()
+        if abs(offset_s - self._offset_s) > _STEP_S:
+            self._tell_watched(0.0)
+            self._offset_s = offset_s
+
+    def _watch(self, time_s: float) -> None:
+        """Frames were tracked until this time."""
+        if self._last_s is not None and time_s - self._last_s <= self._gap_s:
+            self._spans[-1] = (self._spans[-1][0], time_s)
+        else:
+            self._spans.append((time_s, time_s))
+        self._last_s = time_s
+
+    def _tell_watched(self, late_s: float) -> None:
+        """Tell the book of what was watched until `late_s` before the last frame."""
+        if self._last_s is None:
+            return
+        until_s = self._last_s - late_s
+        for begin_s, end_s in self._spans:
+            if begin_s < min(end_s, until_s):
+                self._book.watch(self._offset_s + begin_s, self._offset_s + min(end_s, until_s))
+        left = [(max(begin_s, min(end_s, until_s)), end_s) for begin_s, end_s in self._spans]
+        self._spans = [span for span in left[:-1] if span[0] < span[1]] + left[-1:]
+
+
+def counting_of(subject: Subject, folder: Path, began_s: Callable[[], float]) -> Counting:
+    """The counting of a run with counting lines, which goes on from the counts in `folder`.
+
+    Raises FormatError, StoppedEarly.
+    """
+    counter, settings = subject.counter, subject.settings
+    assert counter is not None
+    classes: Mapping[str, tuple[float, float]] = {}
+    if subject.road is not None and settings.output.site is not None:
+        classes = read_site(settings.output.site).classes
+    gates = {line.name: line.directions for line in counter.lines}
+    book = CountBook(folder, Plan(gates, classes, settings.live.zone))
+    counter.resume(totals(folder))
+    coast_s, hidden_s = settings.tracker.coast_s, settings.tracker.hidden_s
+    late_s = max(coast_s, hidden_s) + _MARGIN_S
+    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s)
+
+
+def _reals(rows: pa.Table, name: str) -> Floats:
+    return np.asarray(rows[name].to_numpy(), float)

@@ -1,0 +1,93 @@
+"""One part of a live run: its summary, its crossings, and its tracks."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+import pyarrow as pa
+
+from vidtrack.errors import StoppedEarly
+from vidtrack.output.counts import HEADER, crossing_lines
+from vidtrack.output.decisions import DecisionLog
+from vidtrack.output.linefile import LineFile, sort_rows
+from vidtrack.output.sink import Step
+from vidtrack.output.site_copy import SiteCopy
+from vidtrack.output.summary import Summary
+from vidtrack.output.tables import Column
+from vidtrack.run.live.track_files import TRACK_FILES, write_lines
+from vidtrack.run.sinks import Subject
+from vidtrack.traffic.lines import Crossing
+
+
+class Part:
+    """One part: with output.level = all the same files as those of a run over a video.
+
+    columns  of its tracks
+
+    Raises StoppedEarly on a write error.
+    """
+
+    def __init__(self, folder: Path, subject: Subject, decisions: bool, columns: Sequence[Column]) -> None:
+        self._lines = subject.lines
+        self._counted: Counter[tuple[str, str]] = Counter()
+        with ExitStack() as stack:  # on a full disk, files already open are closed
+            self._summary = subject.summary(folder, self._totals)
+            self._counts = self._decisions = self._site = None
+            if subject.site is not None:
+                self._site = SiteCopy(folder, subject.site)
+            if subject.counter is not None:
+                self._counts = LineFile(folder / "counts.csv", HEADER)
+                stack.callback(self._counts.close)
+            if decisions:
+                self._decisions = DecisionLog(folder / "decisions.csv")
+                stack.callback(self._decisions.close)
+            self._tracks = TRACK_FILES[subject.settings.output.level](folder, subject, columns)
+            self._files = stack.pop_all()
+
+    def write_crossings(self, crossings: Iterable[Crossing]) -> None:
+        """Write and synchronise rows of counts.csv."""
+        assert self._counts is not None
+        write_lines(self._counts, crossing_lines(crossings))
+        self._counted.update((crossing.line, crossing.direction) for crossing in crossings)
+
+    def write(self, steps: Sequence[Step], chosen: Sequence[Step], rows: pa.Table | None) -> None:
+        """Write and synchronise the chosen ones of these steps, and the rows of their confirmed tracks."""
+        self._tracks.write(chosen, rows)
+        for step in steps:
+            if self._site is not None:
+                self._site.step(step)
+            if self._decisions is not None:
+                self._decisions.step(step)
+        count(self._summary, steps)
+
+    def end(self) -> None:
+        """No more steps will be written; tracks in a gap may still be found again."""
+        self._tracks.end()
+
+    def is_settled(self, later: Sequence[Step]) -> bool:
+        """Whether no gap is open, given the steps after the part."""
+        return self._tracks.is_settled(later)
+
+    def finish(self) -> None:
+        """Close and sort the tables; complete the files of tracks."""
+        with ExitStack() as stack:
+            self._summary.interrupted = False
+            stack.callback(self._summary.close)
+            stack.callback(self._tracks.finish)
+            if self._counts is not None:
+                stack.callback(sort_rows, self._counts.path, columns=1, header=True)
+            stack.push(self._files)
+
+    def _totals(self) -> dict[str, dict[str, int]]:
+        """The part's counts by line and direction."""
+        return {line.name: {way: self._counted[line.name, way] for way in line.directions} for line in self._lines}
+
+
+def count(summary: Summary, steps: Sequence[Step]) -> None:
+    """Update a summary; a write error is ignored, because the next write contains everything."""
+    for step in steps:
+        with suppress(StoppedEarly):
+            summary.step(step)

@@ -1,0 +1,1 @@
+"""The page on which a site is drawn over the tracks of a run, and saved."""

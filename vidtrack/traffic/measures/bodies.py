@@ -1,0 +1,157 @@
+"""Vehicles as rectangles on the road, and the moments at which two of them come close."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.traffic.measures.rows import Rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bodies:
+    """N rectangles in order of time.
+
+    track   (N,) numbers
+    t       (N,) s
+    xy      (N, 2) m; middles
+    v       (N, 2) m/s
+    ahead   (N, 2) unit vectors along the length
+    sides   (N, 2) m; length and width
+    length_sigma  (N,) m; the width is off by the same share
+    speed_sigma   (N,) m/s; of the velocity, taken to be as large across as along
+    spread  (N, 3) m2; variances of the middle in x and in y, and their covariance
+    merged  (N,) it shares a blob with others
+    """
+
+    track: Ints
+    t: Floats
+    xy: Floats
+    v: Floats
+    ahead: Floats
+    sides: Floats
+    length_sigma: Floats
+    speed_sigma: Floats
+    spread: Floats
+    merged: Mask
+
+    @classmethod
+    def of(cls, rows: Rows) -> Bodies:
+        """The rows that the picture shows, with a place, a heading and a length."""
+        known = rows.seen & np.isfinite(rows.length + rows.width + rows.xy[:, 0] + rows.v[:, 0] + rows.spread[:, 0])
+        return cls(
+            *(rows.track[known], rows.t[known], rows.xy[known], rows.v[known], rows.ahead[known]),
+            np.column_stack([rows.length[known], rows.width[known]]),
+            *(rows.length_sigma[known], rows.speed_sigma[known], rows.spread[known], rows.merged[known]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def only(self, chosen: Mask | Ints | slice) -> Bodies:
+        """The rectangles of a mask, of indices or of a slice."""
+        return Bodies(*(getattr(self, column.name)[chosen] for column in fields(self)))
+
+    def and_also(self, other: Bodies) -> Bodies:
+        """Both, these first."""
+        names = [column.name for column in fields(self)]
+        return Bodies(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def half(self, n: Floats) -> Floats:
+        """(N,) how far the rectangles reach from their middles along n (N, 2), times its length."""
+        along, across = np.abs(_dot(self.ahead, n)), np.abs(_cross(self.ahead, n))
+        return np.asarray((self.sides[:, 0] * along + self.sides[:, 1] * across) / 2)
+
+    def variance(self, n: Floats) -> Floats:
+        """(N,) of how far they reach along n (N, 2): by the error of the middle and by that of the sides."""
+        xx, yy, xy = self.spread.T
+        middle = n[:, 0] ** 2 * xx + n[:, 1] ** 2 * yy + 2 * n[:, 0] * n[:, 1] * xy
+        return np.asarray(middle + (self.half(n) * self.length_sigma / self.sides[:, 0]) ** 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encounters:
+    """E moments of two vehicles: `second` comes to where `first` was, or closes in on it.
+
+    first, second   (E,) numbers
+    value, sigma    (E,) s; the time to collision or the post-encroachment time, and its standard deviation
+    rank    (E,) s; of several moments of the same two vehicles the one with the least rank counts
+    t       (E,) s; when
+    xy      (E, 2) m; where they touch
+    angle   (E,) rad; between their headings, 0 to pi
+    speed   (E, 2) m/s; of both
+    merged  (E,) one of them shares a blob with others
+    """
+
+    first: Ints
+    second: Ints
+    value: Floats
+    sigma: Floats
+    rank: Floats
+    t: Floats
+    xy: Floats
+    angle: Floats
+    speed: Floats
+    merged: Mask
+
+    @classmethod
+    def nothing(cls) -> Encounters:
+        """None."""
+        whole, real, pair = np.empty(0, np.int64), np.empty(0), np.empty((0, 2))
+        return cls(whole, whole, *(real,) * 4, pair, real, pair, np.empty(0, bool))
+
+    @classmethod
+    def at(cls, a: Bodies, b: Bodies, value: Floats, sigma: Floats, rank: Floats, t: Floats, xy: Floats) -> Encounters:
+        """Those of vehicles a and b (E,), in this order."""
+        speed = np.column_stack([np.linalg.norm(one.v, axis=1) for one in (a, b)])
+        angle = np.arccos(np.clip(_dot(a.ahead, b.ahead), -1, 1))
+        return cls(a.track, b.track, value, sigma, rank, t, xy, angle, speed, a.merged | b.merged)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def only(self, chosen: Mask | Ints) -> Encounters:
+        """Those of a mask or of indices."""
+        return Encounters(*(getattr(self, column.name)[chosen] for column in fields(self)))
+
+    @classmethod
+    def together(cls, parts: list[Encounters]) -> Encounters:
+        """All of several, one after the other."""
+        return cls(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(cls)))
+
+    def between(self, vehicle: Ints) -> Encounters:
+        """The same between vehicles; `vehicle` (T,) of each number. Those of one vehicle with itself fall out."""
+        names = [column.name for column in fields(self)][2:]
+        first, second = vehicle[self.first], vehicle[self.second]
+        renamed = Encounters(first, second, *(getattr(self, name) for name in names))
+        return renamed.only(first != second)
+
+    @property
+    def pair(self) -> Ints:
+        """(E, 2) the two vehicles, the smaller number first."""
+        return np.sort(np.column_stack([self.first, self.second]), axis=1)
+
+    def least(self) -> Ints:
+        """Indices of the moments that count, one of each two vehicles, the earlier one of equals."""
+        pair = self.pair
+        order = np.lexsort((self.value, self.t, np.round(self.rank, 6), pair[:, 1], pair[:, 0]))
+        return order[np.diff(pair[order], axis=0, prepend=-1).any(axis=1)]
+
+
+def touching_place(a: Bodies, b: Bodies, n: Floats) -> Floats:
+    """(N, 2) the middle of what two rectangles have in common, along unit vectors n (N, 2) and square to them."""
+    place = np.zeros_like(n)
+    for axis in (n, np.column_stack([-n[:, 1], n[:, 0]])):
+        low, high = ([_dot(one.xy, axis) + sign * one.half(axis) for one in (a, b)] for sign in (-1, 1))
+        place += ((np.maximum(*low) + np.minimum(*high)) / 2)[:, None] * axis
+    return place
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.sum(a * b, axis=1))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -1,0 +1,127 @@
+"""Time to collision: when two vehicles would touch if both went on with the velocities that they have.
+
+Hayward: Near-miss determination through use of a scale of danger, Highway Research Record 384 (1972). Vehicles are
+rectangles that do not turn. Along each normal n of an edge of either one, with d between the middles, w the relative
+velocity and h(n) how far both together reach, they overlap while |n d + t n w| < h(n). They touch when the last of the
+four overlaps begins, at
+
+    t = (|n d| - h(n)) / |n w|
+
+if none of the others has ended by then. Its variance is that of n d - h(n) + t n w, over (n w)^2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.compiled import kernel
+from vidtrack.traffic.measures.bodies import Bodies, Encounters, touching_place
+
+TTC_S = 1.5
+"""s; a longer time to collision is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
+_SURE = 2.0
+"""Standard deviations by which a closing speed must differ from 0: else vehicles that stand would collide"""
+
+
+def closing(bodies: Bodies) -> Encounters:
+    """The least time to collision of each two vehicles, of at most TTC_S, in rows of whole moments.
+
+    Moments at which two rectangles overlap give none: vehicles do not, so it is their error. The vehicle ahead in the
+    direction of both together is `first`.
+    """
+    order = np.lexsort((bodies.xy[:, 0], bodies.t))
+    size = max(len(bodies), 64)
+    who, found = np.empty((size, 2), np.int64), np.empty((size, 3))
+    row, count = 0, 0
+    while row < len(bodies):
+        row, count = _look(
+            row, count, order, bodies.t, bodies.xy, bodies.v, bodies.ahead, bodies.sides, bodies.speed_sigma, who, found
+        )  # fmt: skip
+        if row < len(bodies):
+            who, found = np.vstack([who, np.empty_like(who)]), np.vstack([found, np.empty_like(found)])
+    return _least(bodies, who[:count], found[:count])
+
+
+def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
+    """Of rows (M, 2) with times to collision and normals (M, 3) the least of each two vehicles."""
+    pair = np.sort(bodies.track[who], axis=1)
+    order = np.lexsort((found[:, 0], pair[:, 1], pair[:, 0]))
+    new = np.diff(pair[order], axis=0, prepend=-1).any(axis=1)
+    who, (ttc, *n) = who[order[new]], found[order[new]].T
+    behind = np.sum((bodies.xy[who[:, 1]] - bodies.xy[who[:, 0]]) * bodies.v[who].sum(axis=1), axis=1) > 0
+    who[behind] = who[behind, ::-1]
+    a, b, normal = bodies.only(who[:, 0]), bodies.only(who[:, 1]), np.column_stack(n)
+    rate = np.sum((b.v - a.v) * normal, axis=1)
+    drift = (ttc * np.hypot(a.speed_sigma, b.speed_sigma)) ** 2
+    sigma = np.sqrt(a.variance(normal) + b.variance(normal) + drift) / np.abs(rate)
+    then_a, then_b = (replace(one, xy=one.xy + ttc[:, None] * one.v) for one in (a, b))
+    return Encounters.at(a, b, ttc, sigma, ttc, a.t, touching_place(then_a, then_b, normal))
+
+
+@kernel
+def _look(
+    row: int, count: int, order: Ints, t: Floats, xy: Floats, v: Floats, ahead: Floats, sides: Floats, sigma: Floats,
+    who: Ints, found: Floats,
+) -> tuple[int, int]:  # fmt: skip
+    """Look at rows in `order` (of time, then of x) with those after them at the same moment, until all are done or
+    the pairs need more room; the next row and pair.
+
+    who, found   the pairs: (M, 2) rows; (M, 3) time to collision and the normal along which they touch
+    """
+    fastest, longest = 0.0, 0.0
+    for i in range(len(order)):
+        fastest = max(fastest, np.hypot(v[i, 0], v[i, 1]))
+        longest = max(longest, np.hypot(sides[i, 0], sides[i, 1]) / 2)
+    for first in range(row, len(order)):
+        i, begun = order[first], count
+        own = np.hypot(sides[i, 0], sides[i, 1]) / 2
+        widest = TTC_S * (np.hypot(v[i, 0], v[i, 1]) + fastest) + own + longest
+        for later in range(first + 1, len(order)):
+            j = order[later]
+            if t[j] != t[i] or xy[j, 0] - xy[i, 0] > widest:
+                break
+            dx, dy, wx, wy = xy[j, 0] - xy[i, 0], xy[j, 1] - xy[i, 1], v[j, 0] - v[i, 0], v[j, 1] - v[i, 1]
+            far, nearing, w2 = dx * dx + dy * dy, -dx * wx - dy * wy, wx * wx + wy * wy
+            reach = own + np.hypot(sides[j, 0], sides[j, 1]) / 2
+            if far > reach * reach and (nearing <= 0 or far - nearing * nearing / w2 > reach * reach):
+                continue  # the circles around them never meet
+            ttc, nx, ny = _touch(dx, dy, wx, wy, ahead[i], ahead[j], sides[i], sides[j])
+            if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(sigma[i], sigma[j]):
+                continue
+            if count == len(who):
+                return first, begun
+            who[count, 0], who[count, 1] = i, j
+            found[count, 0], found[count, 1], found[count, 2] = ttc, nx, ny
+            count += 1
+    return len(order), count
+
+
+@kernel
+def _touch(
+    dx: float, dy: float, wx: float, wy: float, ahead_i: Floats, ahead_j: Floats, sides_i: Floats, sides_j: Floats
+) -> tuple[float, float, float]:
+    """Time until two rectangles touch, inf if they never do or overlap already, and the normal along which they do."""
+    begin, end, nx, ny = -np.inf, np.inf, 0.0, 0.0
+    apart = False
+    for side in range(4):
+        e = ahead_i if side < 2 else ahead_j
+        x, y = (e[0], e[1]) if side % 2 == 0 else (-e[1], e[0])
+        half = 0.0
+        for other, sides in ((ahead_i, sides_i), (ahead_j, sides_j)):
+            half += abs(other[0] * x + other[1] * y) * sides[0] / 2 + abs(other[0] * y - other[1] * x) * sides[1] / 2
+        d, rate = dx * x + dy * y, wx * x + wy * y
+        apart |= abs(d) > half
+        if rate == 0:
+            if abs(d) > half:
+                return np.inf, 0.0, 0.0
+            continue
+        middle, span = -d / rate, half / abs(rate)
+        if middle - span > begin:
+            begin, nx, ny = middle - span, x, y
+        end = min(end, middle + span)
+    if not apart or begin > end or begin < 0:
+        return np.inf, 0.0, 0.0
+    return begin, nx, ny

@@ -1,0 +1,109 @@
+"""The table `conflicts`: which vehicles came close, by time to collision and post-encroachment time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.traffic.measures.bodies import Bodies, Encounters
+from vidtrack.traffic.measures.closing import closing
+from vidtrack.traffic.measures.encroachment import CROSSING_RAD, PET_S, encroachments
+from vidtrack.traffic.measures.rows import Rows
+
+_ACROSS_RAD, _AGAINST_RAD = np.radians(85), np.radians(150)
+"""Angles from which on vehicles cross (SSAM), and meet head-on"""
+_KINDS = np.array(["rear-end", "merging", "crossing", "head-on"])
+TTC, PET = range(2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conflicts:
+    """C pairs of vehicles in order of time.
+
+    first, second   (C,) numbers; `second` comes to where `first` was, or closes in on it
+    t       (C,) s; of the least post-encroachment time, without one of the least time to collision
+    angle   (C,) rad; between their headings then
+    value, sigma, when   (2, C) s; of TTC and of PET: the least one, its standard deviation, its time; NaN: none
+    xy      (2, C, 2) m; where
+    speed   (C, 2) m/s; of both at t
+    merged  (C,) one of them shares a blob with others then
+    """
+
+    first: Ints
+    second: Ints
+    t: Floats
+    angle: Floats
+    value: Floats
+    sigma: Floats
+    when: Floats
+    xy: Floats
+    speed: Floats
+    merged: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def kinds(self) -> list[str]:
+        """(C,) what the angle says."""
+        return [str(kind) for kind in _KINDS[np.digitize(self.angle, (CROSSING_RAD, _ACROSS_RAD, _AGAINST_RAD))]]
+
+
+class Meeting:
+    """Takes blocks of rows in order of time; remembers those of the last PET_S, and each block's encounters."""
+
+    def __init__(self) -> None:
+        self._recent: Bodies | None = None
+        self._done = -np.inf
+        self._closed, self._encroached = [Encounters.nothing()], [Encounters.nothing()]
+
+    def add(self, rows: Rows) -> None:
+        """Look at some rows. Their last moment may go on in the next block and waits for it."""
+        bodies = Bodies.of(rows)
+        if self._recent is not None:
+            bodies = self._recent.and_also(bodies)
+        if len(bodies):
+            self._look(bodies, until=bodies.t[-1])
+            self._recent = bodies.only(bodies.t > bodies.t[-1] - PET_S)
+
+    def _look(self, bodies: Bodies, until: float) -> None:
+        """Take the moments before `until` that are new."""
+        first, last = np.searchsorted(bodies.t, [self._done, until])
+        if first < last:
+            self._closed.append(closing(bodies.only(slice(first, last))))
+            self._encroached.append(encroachments(bodies))
+        self._done = until
+
+    def conflicts(self, vehicle: Ints, spans: Floats) -> Conflicts:
+        """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break.
+
+        Two that are in one place at one time have no post-encroachment time: vehicles are not, so it is their error.
+        """
+        if self._recent is not None and len(self._recent):
+            self._look(self._recent, until=np.inf)
+        both = (Encounters.together(found).between(vehicle) for found in (self._closed, self._encroached))
+        closed, encroached = (found.only(found.least()) for found in both)
+        span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
+        return _joined(closed, encroached.only((span[0] == span[1]) & (encroached.rank > 0)))
+
+
+def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:
+    """One row for each two vehicles: time and place of the encroachment, else of the closing."""
+    pairs, row = np.unique(np.concatenate([closed.pair, encroached.pair]), axis=0, return_inverse=True)
+    rows = np.split(row.ravel(), [len(closed)])
+    value, sigma, when = np.full((3, 2, len(pairs)), np.nan)
+    xy, speed = np.full((2, len(pairs), 2), np.nan), np.empty((len(pairs), 2))
+    first, second = np.empty((2, len(pairs)), np.int64)
+    angle, merged = np.empty(len(pairs)), np.empty(len(pairs), bool)
+    for kind, found, at in ((TTC, closed, rows[0]), (PET, encroached, rows[1])):  # the last one stays
+        value[kind, at], sigma[kind, at], when[kind, at], xy[kind, at] = found.value, found.sigma, found.t, found.xy
+        first[at], second[at], speed[at] = found.first, found.second, found.speed
+        angle[at], merged[at] = found.angle, found.merged
+    t = np.where(np.isnan(when[PET]), when[TTC], when[PET])
+    order = np.lexsort((second, first, t))
+    return Conflicts(
+        *(first[order], second[order], t[order], angle[order], value[:, order], sigma[:, order], when[:, order]),
+        *(xy[:, order], speed[order], merged[order]),
+    )
