@@ -10,7 +10,6 @@ from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.occlusion.sharing import Exclusive
-from vidtrack.tracking.picture.border import EXIT_S
 from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.tracker import Tracker
@@ -101,7 +100,7 @@ def build_box_tracker(
             hidden_s=settings.hidden_s * pace,
             coast_scans=None,
         ),
-        picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace, exit_s=EXIT_S * pace),
+        picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace),
         two_stage=SINGLE_STAGE if detections.sure_score is None else TwoStage(detections.sure_score),
         detection_probability=detections.detection_probability,
         clutter_density=settings.clutter_density,

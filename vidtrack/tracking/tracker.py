@@ -225,8 +225,9 @@ class Tracker:
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
         self.rates.look(scan)
+        detection, clutter = self.rates.of(self.register.run)
         problem = Problem.gated(
-            self.gate, zhat, cov, scan, *self.rates.of(self.register.run),
+            self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
             modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
         )  # fmt: skip
@@ -282,7 +283,7 @@ class Tracker:
     def _delete(self, found: Association, t: float, events: list[Event]) -> Mask:
         """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         register = self.register
-        left = self.picture.left(register, self.bank, t)
+        left = (register.history & 1 == 0) & (self.picture.in_view(self.bank) < 0.5)  # unseen, and likelier outside
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
         idle = self.life.idle(register, t)
