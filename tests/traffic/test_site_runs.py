@@ -143,7 +143,7 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     blank = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     text = (road / "site.toml").read_text()
     subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints, text)
-    part = Part(folder, subject, decisions=False)
+    part = Part(folder, subject, decisions=False, columns=(*VIDEO, *ROAD))
     part.write([make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])], "")
     part.finish()
     rows = rows_of(folder / "tracks.csv")
