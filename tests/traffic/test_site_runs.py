@@ -144,7 +144,8 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     text = (road / "site.toml").read_text()
     subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints, text)
     part = Part(folder, subject, decisions=False)
-    part.write([make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])], "")
+    steps = [make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])]
+    part.write(steps, steps, track_rows(steps, columns_of(subject), prints))
     part.finish()
     rows = rows_of(folder / "tracks.csv")
     assert list(rows[0]) == [column.name for column in (*VIDEO, *ROAD)]

@@ -141,8 +141,8 @@ def site_of(runs: Sequence[str]) -> Path:
     for other in copies[1:]:
         if other.read_bytes() != copies[0].read_bytes():
             raise ConfigError(
-                f"{copies[0]} and {other} are not the same site; measure the parts of each alone, or "
-                "all of them with --site SITE.toml"
+                f"{copies[0]} and {other} are not the same site; give --site SITE.toml for all of them, "
+                "or measure those of each site alone"
             )
     return copies[0]
 
