@@ -120,6 +120,10 @@ def _rows(frame, who, start, speed, lane, north, length, rng) -> pa.Table:
         "heading_deg": np.round(np.where(up, 0, 90) + rng.standard_normal(count), 2),
         "length_m": np.round(length[who], 3),
         "length_sigma_m": noisy(0.4),
+        "seen_left_px": np.round(SCALE * (x - length[who] / 2), 3),
+        "seen_top_px": np.round(720 - SCALE * y - high / 2, 3),
+        "seen_right_px": np.round(SCALE * (x + length[who] / 2), 3),
+        "seen_bottom_px": np.round(720 - SCALE * y + high / 2, 3),
         "width_m": np.round(np.minimum(0.4 * length[who], 2.55), 3),
     }
     return pa.table(columns)
@@ -127,9 +131,9 @@ def _rows(frame, who, start, speed, lane, north, length, rng) -> pa.Table:
 
 def read(folder: Path) -> None:
     """Read the columns that figures need, and nothing else."""
-    from vidtrack.traffic.measures.rows import ROAD_COLUMNS, blocks
+    from vidtrack.traffic.measures.rows import EDGE_COLUMNS, ROAD_COLUMNS, blocks
 
-    for table in blocks(folder, ROAD_COLUMNS):
+    for table in blocks(folder, (*ROAD_COLUMNS, *EDGE_COLUMNS)):
         for name in table.column_names:
             table[name].combine_chunks()
 

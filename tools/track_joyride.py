@@ -31,6 +31,7 @@ from vidtrack.radar.scans import clutter_density, measurements
 from vidtrack.run.radar import track_plots
 from vidtrack.tracks import Status
 
+GATE = 0.999
 NEAR_M = 50.0
 BOAT = ("radar.max_speed=20", "radar.accel=1", "radar.quiet_accel=0.1", "radar.detection_probability=0.85")
 PEERS = {"stonesoup pda": "pda", "stonesoup jpda": "jpda"}
@@ -61,7 +62,7 @@ def stone_soup(kind: str, plots: Path, data: Joyride, peers: Path) -> Iterator[S
             intensity=radar.accel**2 * radar.hold_s,
             speed=radar.max_speed / 2,
             p_d=radar.detection_probability,
-            p_g=common.gate_probability,
+            p_g=GATE,
             clutter=clutter_density(measurements(read_plots(plots, radar), radar)),
             hits=common.confirm_hits,
             misses=radar.coast_scans,

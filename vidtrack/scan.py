@@ -34,6 +34,7 @@ class Scan:
     run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form only within a run
     surveyed   (4,) left, top, right, bottom of the sensor's field of view; None: the tracker's bounds
     pixel      size of the sensor's pixel in units of z
+    rim        by how much boxes reach beyond the targets on each side, in units of z
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
     definite, boxes of negative size, and runs below 0.
@@ -52,6 +53,7 @@ class Scan:
     lasting: Floats | None = None
     surveyed: Floats | None = None
     pixel: float = 1.0
+    rim: float = 0.0
 
     def __post_init__(self) -> None:
         from vidtrack.arrays.checks import check_covariances, check_measurements  # loads the compiler

@@ -37,6 +37,7 @@ class Tracks:
     box            (T, 4) left, top, width, height, absolute; NaN if the sensor has no boxes
     group          (T,) number >= 0 common to tracks that share one blob; -1: not shared
     group_since_s  (T,) time the group was formed; NaN: not shared
+    exchange       (T,) probability that the track has exchanged targets with others, while they were not resolved
     age_s          (T,) seconds since the track's first measurement
     travel         (T,) distance from the track's first position
     existence      (T,) probability that the track is a target
@@ -66,6 +67,7 @@ class Tracks:
     position: tuple[int, ...] = (0, 2)
     velocity: tuple[int, ...] = (1, 3)
     run: Ints | None = None
+    exchange: Floats | None = None
     events: tuple[Event, ...] = field(default=())
     choices: Choices | None = None
     prior_x: Floats | None = None

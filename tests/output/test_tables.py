@@ -14,11 +14,13 @@ from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.mot import MotFile, settle_gaps
 from vidtrack.output.parquet import ParquetParts
 from vidtrack.output.tables import RADAR_3D, ROAD, VIDEO, TrackTable, layout, schema, track_rows
+from vidtrack.scan import Scan
 
 HEADER = (
     "frame,time_s,track_id,status,x_px,y_px,vx_px_s,vy_px_s,sigma_x_px,sigma_y_px,corr_xy,"
     "left_px,top_px,width_px,height_px,group_id,nis,"
-    "sigma_vx_px_s,sigma_vy_px_s,corr_vxy,corr_x_vx,corr_x_vy,corr_y_vx,corr_y_vy"
+    "sigma_vx_px_s,sigma_vy_px_s,corr_vxy,corr_x_vx,corr_x_vy,corr_y_vx,corr_y_vy,"
+    "seen_left_px,seen_top_px,seen_right_px,seen_bottom_px"
 )
 
 
@@ -42,7 +44,7 @@ def test_columns_are_exactly_the_documented_ones(tmp_path):
     run(TrackTable(tmp_path), [(1, "c", 100.0, 50.0)])
     assert (tmp_path / "tracks.csv").read_text().splitlines() == [
         HEADER,
-        "0,0,1,confirmed,100,50,50,0,2,1,0.1,90,45,20,10,-1,1.5,3,3,0,0,0,0,0",
+        "0,0,1,confirmed,100,50,50,0,2,1,0.1,90,45,20,10,-1,1.5,3,3,0,0,0,0,0,89.5,44.5,109.5,54.5",
     ]
 
 
@@ -59,6 +61,18 @@ def test_the_covariance_of_position_and_velocity_can_be_rebuilt():
         for name, (i, j) in pairs.items():
             corr[i, j] = corr[j, i] = values[f"corr_{name}"]
         assert np.allclose(corr * np.outer(sigma, sigma), wanted, atol=0.01)
+
+
+def test_edges_are_those_of_a_track_s_own_measurement_without_its_rim():
+    rows = [(1, "c", 100, 50), (2, "m", 9, 9), (3, "o", 5, 5), (4, "c", 4, 40)]
+    box = np.array([[-12.0, -6, 24, 12], [-4, -10, 9, 20]])  # of the tracks 1 and 4
+    scan = Scan(0.0, [[100.0, 50], [4, 40]], np.eye(2), box=box, surveyed=np.array([0.0, 0, 200, 100]), rim=2.0)
+    table = track_rows([replace(make_step(0, rows), scan=scan)])
+    edge = np.column_stack([table[f"seen_{side}_px"].to_numpy() for side in ("left", "top", "right", "bottom")])
+    assert edge[0].tolist() == [89.5, 45.5, 109.5, 53.5]
+    assert np.isnan(edge[1:3]).all()
+    assert np.isnan(edge[3, 0])  # the border cuts it
+    assert edge[3, 1:].tolist() == [31.5, 6.5, 47.5]
 
 
 def test_columns_of_tables_that_earlier_versions_wrote():

@@ -63,6 +63,21 @@ def test_rows_in_any_order_are_sorted(tmp_path):
     assert plots.time_s.tolist() == [0, 1, 2]
 
 
+def test_plots_of_one_time_are_a_scan_where_no_column_says_which(tmp_path, caplog):
+    rows = ("8,100,5", "0,100,5", "0,300,5", "4,100,5", "20,100,5")
+    with caplog.at_level(logging.WARNING):
+        plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [0, 0, 1, 2, 5]
+    assert plots.time_s.tolist() == [0, 0, 4, 8, 20]
+    assert "4 scans, 4 s apart" in caplog.text
+
+
+def test_bad_times_without_scans_are_refused_as_bad_times(tmp_path):
+    path = write(tmp_path / "p.csv", "0,100,5", "nan,100,5", "4,100,5", header="time_s,range_m,azimuth_deg")
+    with pytest.raises(PlotFormatError, match="time_s"):
+        read_plots(path)
+
+
 def test_spaces_after_commas_do_no_harm(tmp_path):
     path = write(tmp_path / "p.csv", "0, 0, 100, 5", header="scan, time_s, range_m, azimuth_deg")
     assert read_plots(path).z[0, 0] == 100

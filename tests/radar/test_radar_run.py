@@ -63,7 +63,7 @@ def test_a_run_writes_what_it_promises(tmp_path, scenario):
     out = run(scenario("radar-tws"), tmp_path / "out", extras=Extras(decisions=True))
     names = {"tracks.csv", "tracks.parquet", "summary.json", "tracks.png", "decisions.csv"}
     assert {path.name for path in out.iterdir()} == names
-    assert (out / "tracks.csv").read_text().splitlines()[0] == f"{HEADER},{OF_VELOCITY}"
+    assert (out / "tracks.csv").read_text().splitlines()[0] == f"{HEADER},{OF_VELOCITY},exchange"
     assert (out / "decisions.csv").read_text().startswith("scan,time_s,track_id,event,")
     summary = json.loads((out / "summary.json").read_text())
     assert summary["interrupted"] is False
@@ -88,7 +88,7 @@ def test_units_are_in_the_parquet_file_and_rows_are_those_of_the_csv(tmp_path, s
 def test_in_space_the_height_follows(tmp_path, scenario):
     out = run(scenario("radar-altitude"), tmp_path / "out")
     header = (out / "tracks.csv").read_text().splitlines()[0]
-    assert header == f"{HEADER},z_m,vz_m_s,sigma_z_m,{OF_VELOCITY},sigma_vz_m_s"
+    assert header == f"{HEADER},z_m,vz_m_s,sigma_z_m,{OF_VELOCITY},sigma_vz_m_s,exchange"
     found = scores(out, scenario("radar-altitude"), 500.0)
     assert found["tracks"] == 1
     assert found["idf1"] > 0.99

@@ -1,8 +1,11 @@
 import json
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from vidtrack.amplitude.densities import detection_probability
+from vidtrack.amplitude.reduction import q2
 from vidtrack.cli.threshold import command
 from vidtrack.errors import ConfigError
 
@@ -42,6 +45,16 @@ def test_strongest_neighbour_prefers_the_lowest_threshold_and_says_what_is_enoug
     assert found["p_fa_one_percent"] < 1e-3
 
 
+@pytest.mark.parametrize("gate", [2.5, 3, 5])
+def test_other_gates_have_the_exact_optimum_and_no_closed_form(gate):
+    found = numbers("--snr-db", 10, "--cells", 100, "--gate", gate)
+    assert list(found) == ["p_fa_exact", "p_d", "q2", "clamped"]
+    around = found["p_fa_exact"] * np.array([0.9, 1.0, 1.1])
+    q = q2(detection_probability(around, 10.0), 100 * around, gate=gate)
+    assert q.argmax() == 1
+    assert found["q2"] == pytest.approx(q[1], rel=1e-9)
+
+
 def test_a_prediction_without_end_is_null():
     found = numbers("--filter", "psn", "--snr-db", 16, "--weibull", "1,1")
     assert found["error"] is None
@@ -59,7 +72,8 @@ def test_table_and_file(tmp_path):
         (("--snr-db", 10), "--cells is None"),
         (("--snr-db", 10, "--cells", 0), "--cells is 0"),
         (("--snr-db", 10, "--cells", 10, "--pfa-max", 2), "--pfa-max is 2"),
-        (("--snr-db", 10, "--cells", 10, "--gate", 3), "gate of 4"),
+        (("--snr-db", 10, "--cells", 10, "--gate", 0), "gate is 0"),
+        (("--snr-db", 10, "--cells", 10, "--weibull", "1,1"), "Rayleigh clutter"),
         (("--snr-db", 10, "--filter", "psn", "--weibull", "-1,2"), "shape is -1"),
         (("--snr-db", 10, "--filter", "psn", "--cell", -1), "cell volume is -1"),
     ],

@@ -80,6 +80,26 @@ def test_crossing_and_unresolved_aircraft_do_what_they_promise(seed):
     assert not unresolved.merged[:, [0, 1, 2, 3, 4, -5, -4, -3, -2, -1]].any()
 
 
+def test_half_of_the_parting_pairs_cross():
+    crossed = []
+    for seed in range(12):
+        seen = simulate_radar("radar-parting", seed)
+        assert seen.merged[0].sum() >= 5
+        assert not seen.merged[:, [0, 1, 2, 3, 4, -5, -4, -3, -2, -1]].any()
+        apart = seen.states[0, [0, -1], :2] - seen.states[1, [0, -1], :2]
+        crossed.append(apart[0] @ apart[1] < 0)
+    assert 2 <= sum(crossed) <= 10
+
+
+@pytest.mark.parametrize("after", [1.0, -1.0, 0.5])
+def test_a_sidestep_ends_at_its_share_and_its_velocity_is_the_derivative(after):
+    flight = sidestep(fly((0, 0, 0), (100, 0, 0)), np.array([0.0, 1000.0, 0.0]), 0.05, (10, 30, 60, 90), after)
+    t = np.linspace(0, 100, 2001)
+    p, v = flight(t)
+    np.testing.assert_allclose(p[[0, 900, -1], 1], [1000, 50, 1000 * after])
+    np.testing.assert_allclose(np.gradient(p, t, axis=0)[1:-1], v[1:-1], atol=1.0)
+
+
 def test_surveillance_holds_manoeuvres_and_separation():
     seen = simulate_radar("radar-tws", 4)
     v = seen.states[..., 3:]

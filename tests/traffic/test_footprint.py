@@ -9,7 +9,7 @@ from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 
 from vidtrack.formats import read_mot
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.footprint import Footprints, footprint, velocity
+from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut, velocity
 from vidtrack.traffic.site import Site
 
 CAMERA = Pinhole()
@@ -177,3 +177,22 @@ def test_a_footprint_without_a_heading_has_no_length():
     _, _, box = seen(CAR, (0, 25), 0)
     _, sides = footprint(GROUND, box[None], np.full((1, 2), np.nan), 0.4)
     assert np.isnan(sides).all()
+
+
+def test_speeds_follow_from_edges_where_the_tracker_lags():
+    t = np.arange(40) / 25
+    sights = [seen(CAR, (1.0, 44.0 - 15 * at), 180) for at in t]
+    xy, u, box = (np.array(column) for column in zip(*sights, strict=True))
+    edge = np.column_stack([box[:, :2], box[:, :2] + box[:, 2:]]) - 0.5
+    P = np.repeat(np.diag([1.0, 1.0, 900.0, 900.0])[None], len(t), axis=0)
+    road = Footprints(GROUND, (WIDTH, HEIGHT))
+    stand = road.place(np.zeros(len(t), int), xy, 0.8 * u, P, box, Seen(t, edge))
+    assert stand.speed[-1] == pytest.approx(15, rel=0.03)
+    assert placed((xy[-1], 0.8 * u[-1], box[-1])).speed[0] == pytest.approx(12, rel=0.05)
+    assert stand.speed_own_sigma[-1] < 1.0
+    assert (np.linalg.norm(stand.speed_by_shared, axis=1)[-10:] < 0.5).all()
+
+
+def test_edges_that_the_border_may_cut_are_not_known():
+    edge = np.array([[2.0, 5.0, 400.0, 300.0], [50.0, 60.0, WIDTH - 1.0, HEIGHT - 3.0]])
+    assert np.isnan(uncut(edge, (WIDTH, HEIGHT))).tolist() == [[True, True, False, False], [False, False, True, True]]

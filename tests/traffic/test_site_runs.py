@@ -18,7 +18,7 @@ from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
-from vidtrack.run.live.parts import Part
+from vidtrack.run.live.part import Part, columns_of
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.measures.runs import site_of
 from vidtrack.traffic.metres import footprints_of

@@ -20,6 +20,8 @@ from vidtrack.scan import Scan
 
 Distance = Literal["mahalanobis", "decoupled", "box", "euclidean"]
 FULL, DECOUPLED, BOX, EUCLIDEAN = range(4)
+PROBABILITY = 0.999
+"""Default share of true measurements inside a gate."""
 _MODES = {"mahalanobis": FULL, "decoupled": DECOUPLED, "box": BOX, "euclidean": EUCLIDEAN}
 
 
@@ -84,7 +86,7 @@ class Gate:
     radius       px or m, gate of the euclidean distance
     """
 
-    probability: float = 0.999
+    probability: float = PROBABILITY
     distance: Distance = "mahalanobis"
     radius: float = 50.0
 
@@ -102,8 +104,8 @@ class Gate:
             return self.radius**2
         return quantile(self.probability, 1 if self.distance == "box" else dim)
 
-    def limits(self, cov: Floats, scan: Scan) -> Floats:
-        """(T,) largest admitted squared distance of each row."""
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
+        """(T,) largest admitted squared distance of each row; P_D (T,) and clutter density (T,) do not count."""
         return np.full(len(cov), self.limit(cov.shape[1]))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
@@ -114,15 +116,24 @@ class Gate:
         return np.full(len(limit), self.probability ** (dim if self.distance == "box" else 1))
 
     def pairs(
-        self, zhat: Floats, cov: Floats, scan: Scan, run: Ints | None = None, angles: tuple[int, ...] = ()
+        self,
+        zhat: Floats,
+        cov: Floats,
+        scan: Scan,
+        run: Ints | None = None,
+        angles: tuple[int, ...] = (),
+        detection: float | Floats = 0.9,
+        clutter: float | Floats = 1e-5,
     ) -> Pairs:
         """All pairs inside the gate, both sides of the same Monte Carlo run.
 
         zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each measurement's R.
-        `angles` are components in -pi..pi that wrap. Candidates come from a grid over the first two axes, so the time
-        grows with the number of pairs and not with T times M.
+        `angles` are components in -pi..pi that wrap. `detection` and `clutter` are P_D and the density of false
+        measurements, one for all or (T,). Candidates come from a grid over the first two axes, so the time grows with
+        the number of pairs and not with T times M.
         """
-        limit = self.limits(cov, scan)
+        rows = len(zhat)
+        limit = self.limits(cov, scan, np.full(rows, detection), np.full(rows, clutter))
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
@@ -134,33 +145,39 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class LikelihoodGate(Gate):
-    """The maximum-likelihood gate: a pair is admitted if it is likelier than a miss plus a new target (SPEC 001).
+    """The maximum-likelihood gate, which is optimal for two hypotheses (SPEC 001; Blackman 1986, section 4.2).
 
-    v' S^-1 v <= 2 ln(P_D / ((1 - P_D) new_density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
+    A pair is admitted if it is likelier than its alternative, that the target is missed and the measurement is false or
+    of a new target: v' S^-1 v <= 2 ln(P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
+    Among few false measurements the gate is wide, and holds a target that manoeuvres; in dense ones it is narrow.
 
-    detection_probability, new_density [per unit of measurement space]   P_D and the density of new targets
+    detection_probability, new_density [per unit of measurement space]   P_D, and the density of false measurements and
+    new targets. None: the P_D and clutter density of the tracker, the latter with new_share of new targets in addition
     """
 
-    detection_probability: float = 0.9
-    new_density: float = 1e-5
+    detection_probability: float | None = 0.9
+    new_density: float | None = 1e-5
+    new_share: float = 0.1
 
     def __post_init__(self) -> None:
         Gate.__post_init__(self)
-        if not 0 < self.detection_probability <= 1:
+        if self.detection_probability is not None and not 0 < self.detection_probability <= 1:
             raise ConfigError(f"detection probability is {self.detection_probability}; it must be above 0, at most 1")
-        if not self.new_density > 0:
+        if self.new_density is not None and not self.new_density > 0:
             raise ConfigError(f"density of new targets is {self.new_density}; it must be above zero")
         if self.distance != "mahalanobis":
             raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
 
-    def limits(self, cov: Floats, scan: Scan) -> Floats:
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
         """(T,) largest admitted squared distance of each row; zero where no measurement is likely enough."""
         dim = cov.shape[1]
         S = cov if scan.noise is None else cov + scan.noise
-        with np.errstate(divide="ignore"):  # P_D of one: everything is likelier than a miss
-            odds = np.log(self.detection_probability) - np.log(1 - self.detection_probability)
+        seen = detection if self.detection_probability is None else self.detection_probability
+        density = clutter * (1 + self.new_share) if self.new_density is None else self.new_density
+        with np.errstate(divide="ignore"):  # P_D of one, or no clutter: everything is likelier than a miss
+            odds = np.log(seen) - np.log(1 - seen) - np.log(density)
         log_s = np.linalg.slogdet(S)[1]
-        return np.maximum(0.0, 2 * (odds - np.log(self.new_density)) - dim * np.log(TURN) - log_s)
+        return np.maximum(0.0, 2 * odds - dim * np.log(TURN) - log_s)
 
     def inside(self, limit: Floats, dim: int) -> Floats:
         """(T,) P_G, the share of a target's own measurements that gates of these limits admit; chi-square."""

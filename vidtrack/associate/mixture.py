@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from vidtrack.arrays.rows import starts
-from vidtrack.arrays.types import Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Gate, Pairs
 from vidtrack.estimate.bank import Modes
 from vidtrack.estimate.kernels import TURN
@@ -19,15 +19,25 @@ LEAST_MODE = 0.01
 """Least probability of a mode that has a gate; the likelihood counts all modes."""
 
 
-def mixture_pairs(gate: Gate, modes: Modes, scan: Scan, run: Ints | None = None, angles: tuple[int, ...] = ()) -> Pairs:
+def mixture_pairs(
+    gate: Gate,
+    modes: Modes,
+    scan: Scan,
+    run: Ints | None = None,
+    angles: tuple[int, ...] = (),
+    detection: float | Floats = 0.9,
+    clutter: float | Floats = 1e-5,
+) -> Pairs:
     """Pairs inside the gate of any mode.
 
+    detection, clutter   P_D and clutter density, one for all or (T,)
     log_l  (N,) ln of the sum over the modes of weight N(v; 0, S); cost follows from it
     d2, nis, log_s  of the mode that explains the measurement best
     """
     weight, zhat, cov = modes
     count, rows, dim = zhat.shape
-    each = [gate.pairs(zhat[j], cov[j], scan, run, angles) for j in range(count)]
+    with np.errstate(divide="ignore"):  # a mode of weight w against clutter is one of weight 1 against 1 / w of it
+        each = [gate.pairs(zhat[j], cov[j], scan, run, angles, detection, clutter / weight[j]) for j in range(count)]
     open_to = [weight[j, pairs.row] >= LEAST_MODE for j, pairs in enumerate(each)]
     keys = [(pairs.row * len(scan) + pairs.measurement)[mask] for pairs, mask in zip(each, open_to, strict=True)]
     key = np.unique(np.concatenate(keys))

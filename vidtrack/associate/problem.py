@@ -60,9 +60,9 @@ class Problem:
         mixture of these, with moments zhat and cov.
         """
         if modes is None:
-            pairs = gate.pairs(zhat, cov, scan, run, angles)
+            pairs = gate.pairs(zhat, cov, scan, run, angles, detection, clutter)
         else:
-            pairs = mixture_pairs(gate, modes, scan, run, angles)
+            pairs = mixture_pairs(gate, modes, scan, run, angles, detection, clutter)
         if label is not None and scan.label is not None:
             mine, theirs = label[pairs.row], scan.label[pairs.measurement]
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))
@@ -107,6 +107,17 @@ class Problem:
     def only(self, mask: Mask) -> Problem:
         """The problem with the pairs of a mask (N,)."""
         return self.having(self.pairs.only(mask))
+
+    def apart(self, shared: Ints) -> Problem:
+        """The problem without the rows that share a measurement (T,), -1: none, and without these measurements.
+
+        These rows count neither as seen nor as missed.
+        """
+        own = shared < 0
+        if own.all():
+            return self
+        left = self.only(own[self.pairs.row] & ~np.isin(self.pairs.measurement, shared[~own]))
+        return replace(left, detection=np.where(own, self.detection, 0.0))
 
     def having(self, pairs: Pairs) -> Problem:
         """The problem with other pairs of the same rows."""

@@ -72,6 +72,8 @@ def command(options: MeasureOptions) -> None:
         write_json(found.report, options.json_to)
     if not options.quiet:
         click.echo(_told(found.report), err=True)
+        if found.report["scale"] and found.report["scale"]["off"]:
+            click.echo(_doubt(found.report["scale"]), err=True)
     if options.json_to != "-":
         click.echo(folder)
 
@@ -86,4 +88,13 @@ def _told(report: dict[str, Any]) -> str:
         f"{report['complete_trips']} whole trips of {report['trips']}, {report['joins']} broken tracks joined; "
         f"{wrong} trips over impossible movements, {report['appeared']} vehicles appeared between the gates, "
         f"{report['vanished']} vanished; {close}"
+    )
+
+
+def _doubt(scale: dict[str, Any]) -> str:
+    """One line: the sizes of the vehicles contradict the calibration."""
+    return (
+        f"vidtrack: vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
+        f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the calibration: "
+        "speeds are off by as much"
     )

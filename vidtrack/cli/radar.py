@@ -40,9 +40,9 @@ Examples:
 @click.option(
     "--estimator",
     type=choice(names.Estimator),
-    help="Filter of each track.  [default: kalman]",
+    help="Filter of each track.  [default: imm]",
 )
-@click.option("--model", type=choice(names.Model), help="How targets move.  [default: cv]")
+@click.option("--model", type=choice(names.Model), help="How targets move.  [default: ct for imm, else cv]")
 @click.option(
     "--skip-bad-rows", is_flag=True, default=None, help="Leave out rows that cannot be right, and count them."
 )

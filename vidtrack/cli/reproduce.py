@@ -54,6 +54,8 @@ def command(options: ReproduceOptions) -> None:
     for name, experiment in chosen.items():
         if not options.quiet:
             click.echo(f"{name} ...", err=True)
-        result = experiment.reproduce(options.runs, options.seed)
-        result.write(folder, name)
+        for result in experiment.results(
+            options.runs, options.seed
+        ):  # written at once: it is kept if the run is killed
+            result.write(folder, name)
         click.echo(f"{name}: {result.verdict}")

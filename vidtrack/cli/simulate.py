@@ -17,7 +17,15 @@ if TYPE_CHECKING:
 
 VIDEO = ("crossing", "crossing-45", "nine", "junction")
 ROADS = ("road", "junction-3d", "roundabout", "motorway")
-RADAR = ("radar-tws", "radar-incoming", "radar-altitude", "radar-speed", "radar-crossing", "radar-unresolved")
+RADAR = (
+    "radar-tws",
+    "radar-incoming",
+    "radar-altitude",
+    "radar-speed",
+    "radar-crossing",
+    "radar-unresolved",
+    "radar-parting",
+)
 PICTURE = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "clock")
 WEATHER = ("clear", "rain", "snow", "fog")
 LIGHT = ("day", "low-sun", "dusk", "night")
@@ -143,6 +151,7 @@ def command(options: SimulateOptions) -> None:
     radar-speed       the same, it accelerates with 2.5 g from 200 to 350 m/s
     radar-crossing    two aircraft cross at a small angle in clutter
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
+    radar-parting     the same for 10 to 90 s, and half of the pairs have crossed when they part
     """
     start_log(options.verbose, options.quiet)
     scenarios = next(kind for kind in OPTIONS if options.scenario in kind)

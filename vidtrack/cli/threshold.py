@@ -54,10 +54,10 @@ def command(options: ThresholdOptions) -> None:
     """The P_FA that lets a filter learn most of a Swerling I target.
 
     pda: P_FA that maximises the information reduction factor q2 for --cells resolution cells in the gate, in closed
-    form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter and a gate of 4; --q, --cell and --weibull play no
-    part. Where the closed form does not hold (SNR of 1.96 dB or less) or gives --pfa-max or more, p_fa is
-    --pfa-max and clamped is true. psn: P_FA that minimises the predicted steady-state error of a probabilistic
-    strongest neighbour filter.
+    form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter; --q, --cell and --weibull play no part. The closed form
+    is for a --gate of 4; with another gate only the exact optimum is given. Where the closed form does not hold (SNR
+    of 1.96 dB or less) or gives --pfa-max or more, p_fa is --pfa-max and clamped is true. psn: P_FA that minimises
+    the predicted steady-state error of a probabilistic strongest neighbour filter.
     """
     from vidtrack.errors import ConfigError
 
@@ -89,7 +89,7 @@ def _of_psn(options: ThresholdOptions, snr: float) -> Numbers:
 
 def _of_pda(options: ThresholdOptions, snr: float) -> Numbers:
     from vidtrack.amplitude.densities import detection_probability
-    from vidtrack.amplitude.reduction import KE_GATE, q2
+    from vidtrack.amplitude.reduction import KE_GATE, LEAST_GATE, MOST_GATE, q2
     from vidtrack.amplitude.threshold import closed_form, optimum
     from vidtrack.errors import ConfigError
 
@@ -98,15 +98,19 @@ def _of_pda(options: ThresholdOptions, snr: float) -> Numbers:
         raise ConfigError(
             f"--cells is {cells}; give the number of resolution cells in the gate, {LEAST_CELLS:g}..{MOST_CELLS:g}"
         )
-    if options.gate != KE_GATE or options.weibull is not None:
-        raise ConfigError("the threshold of pda holds for a gate of 4 and Rayleigh clutter; leave --gate and --weibull")
-    p_fa, clamped = closed_form(snr, cells, options.pfa_max)
+    if options.weibull is not None:
+        raise ConfigError("the threshold of pda holds for Rayleigh clutter; leave --weibull")
+    if not LEAST_GATE <= options.gate <= MOST_GATE:
+        raise ConfigError(f"gate is {options.gate:g}; it must lie in {LEAST_GATE:g}..{MOST_GATE:g}")
+    exact = float(optimum(snr, cells, options.pfa_max, gate=options.gate))
+    fitted = options.gate == KE_GATE
+    p_fa, clamped = closed_form(snr, cells, options.pfa_max) if fitted else (exact, exact >= options.pfa_max)
     p_d = detection_probability(p_fa, snr)
     return {
-        "p_fa": float(p_fa),
-        "p_fa_exact": float(optimum(snr, cells, options.pfa_max)),
+        **({"p_fa": float(p_fa)} if fitted else {}),
+        "p_fa_exact": exact,
         "p_d": float(p_d),
-        "q2": float(q2(p_d, cells * p_fa)),
+        "q2": float(q2(p_d, cells * p_fa, gate=options.gate)),
         "clamped": bool(clamped),
     }
 

@@ -25,10 +25,10 @@ class RadarSettings(Group):
     """m/s; the same of a range rate"""
     skip_bad_rows: bool = False
     """invalid rows are left out and counted; false: they end the run"""
-    estimator: Estimator = "kalman"
+    estimator: Estimator = "imm"
     """kalman, converted: plots become unbiased positions; ekf, ukf, particle: range and angles stay; imm: two models"""
-    model: Model = "cv"
-    """motion: nearly constant velocity, nearly constant acceleration, Singer's fading acceleration, coordinated turn"""
+    model: Model | None = None
+    """nearly constant velocity, nearly constant acceleration, Singer, coordinated turn; None: ct for imm, else cv"""
     detection_probability: float | None = Field(0.9, gt=0, lt=1)
     """probability that a scan shows a target; None: from the tracks so far"""
     clutter_density: float | None = Field(None, gt=0)
@@ -39,11 +39,11 @@ class RadarSettings(Group):
     """m/s^2; standard deviation of a target's acceleration"""
     hold_s: float = Field(4.0, gt=0)
     """s; correlation time of the acceleration"""
-    quiet_accel: float = Field(1.0, gt=0)
+    quiet_accel: float = Field(0.3, gt=0)
     """m/s^2; standard deviation of the acceleration in imm's quiet mode; its other mode is radar.model"""
-    quiet_s: float = Field(60.0, gt=0)
+    quiet_s: float = Field(500.0, gt=0)
     """s; mean time that imm's quiet mode lasts"""
-    manoeuvre_s: float = Field(15.0, gt=0)
+    manoeuvre_s: float = Field(20.0, gt=0)
     """s; mean time that imm's other mode lasts"""
     particles: int = Field(2000, ge=2)
     """samples of each track in the particle filter"""
@@ -53,6 +53,14 @@ class RadarSettings(Group):
     """share of a plot's errors that are five times as large, for the particle filter"""
     euclidean_radius_m: float = Field(2000.0, gt=0)
     """m; gate of the euclidean distance"""
+    unresolved: bool = True
+    """targets nearer than a resolution cell to each other give one plot, and stay separate tracks"""
+    cell_range_m: float | None = Field(None, gt=0)
+    """m; side of a resolution cell in range; None: learnt, in standard deviations of the plots"""
+    cell_azimuth_deg: float | None = Field(None, gt=0, le=90)
+    """degrees; the same in azimuth"""
+    cell_elevation_deg: float | None = Field(None, gt=0, le=90)
+    """degrees; the same in elevation"""
     life: Life = "llr"
     """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
     coast_scans: int = Field(5, ge=1, le=62)

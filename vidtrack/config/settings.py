@@ -65,8 +65,8 @@ class TrackerSettings(Group):
     """scans after which split and mht decide"""
     distance: Distance = "mahalanobis"
     """confidence region with the full covariance, with the variances per axis only (eq. 8), or plain distance"""
-    gate_probability: float = Field(0.999, ge=0, le=1)
-    """share of a vehicle's own measurements that fall inside its gate"""
+    gate_probability: float | None = Field(None, ge=0, le=1)
+    """share of a target's own measurements inside its gate; None: .999; radar: where target is likelier than clutter"""
     euclidean_radius_px: float = Field(50.0, gt=0)
     """px; gate of the euclidean distance"""
     accel: float = Field(2.0, gt=0)

@@ -76,3 +76,6 @@ class Mixture(Protocol):
 
     def modes(self, sensor: Sensor) -> Modes:
         """The predicted measurement of each mode; S adds R."""
+
+    def forget(self, rows: Ints) -> None:
+        """Make all modes of these rows equally probable: what was observed does not tell them."""

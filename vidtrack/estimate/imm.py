@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import logsumexp
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Modes
@@ -99,6 +99,11 @@ class IMMBank:
         self.mode = (mode / mode.sum(axis=0)).T
         self.hits = self.hits[parent] + (decision.beta0 < 0.5)
         self.scale = self.scale[parent]
+        self.x, self.P = self._moments(self.banks, self.mode)
+
+    def forget(self, rows: Ints) -> None:
+        """Make all modes of these rows equally probable: what was observed does not tell them."""
+        self.mode[rows] = 1 / len(self.banks)
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:

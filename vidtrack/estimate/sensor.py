@@ -50,7 +50,33 @@ class Position:
         return z, R
 
 
+@dataclass(frozen=True, slots=True)
+class PositionVelocity:
+    """The measurement is position and velocity, [x, vx, y, vy, ...]."""
+
+    angles: ClassVar[tuple[int, ...]] = ()
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, 2 d) positions and velocities."""
+        return x[:, : 2 * len(position)]
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(1, 2 d, n) selection of their columns."""
+        return _selection(tuple(range(2 * len(position))), x.shape[1])
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """The positions and their covariances."""
+        return z[:, ::2], R[:, ::2, ::2]
+
+
 POSITION = Position()
+POSITION_VELOCITY = PositionVelocity()
+
+
+def still(sensor: Sensor) -> Sensor:
+    """The measurement model without the motion of targets during the scan (`radar.sweep`)."""
+    inner: Sensor = getattr(sensor, "sensor", sensor)
+    return inner
 
 
 @lru_cache

@@ -18,6 +18,10 @@ if TYPE_CHECKING:  # radar runs must not load OpenCV
     from vidtrack.video.frame import Frame
 
 
+_HALF_PX = 0.5
+"""Pixel 0 covers -0.5 to 0.5."""
+
+
 @dataclass(frozen=True, slots=True)
 class Step:
     """The results of the whole pipeline for one frame or one radar scan.
@@ -44,6 +48,25 @@ class Step:
     def shown(self) -> Tracks:
         """The tracks in pixels of this picture."""
         return _moved(self.tracks, self.motion)
+
+    @property
+    def seen(self) -> Floats:
+        """(T, 4) left, top, right and lower edges of what the tracks were measured by [px of the scene].
+
+        NaN where a track has no measurement of its own, and where the edge of what is surveyed cuts it. By what the
+        outlines of blobs are too wide, they are moved in.
+        """
+        scan, tracks, edge = self.scan, self.tracks, np.full((len(self.tracks), 4), np.nan)
+        own = np.flatnonzero((tracks.measurement >= 0) & (tracks.group < 0))
+        if scan.box is None or len(own) == 0:
+            return edge
+        box, taken = scan.box, tracks.measurement[own]
+        low, high = (scan.z + box[:, :2])[taken], (scan.z + box[:, :2] + box[:, 2:])[taken]
+        if scan.surveyed is not None:
+            low = np.where(low < scan.surveyed[:2] + scan.pixel, np.nan, low)
+            high = np.where(high > scan.surveyed[2:] - scan.pixel, np.nan, high)
+        edge[own] = np.hstack([low + scan.rim, high - scan.rim]) - _HALF_PX
+        return edge
 
     def in_picture(self) -> Step:
         """The step with scan and tracks in pixels of this picture."""

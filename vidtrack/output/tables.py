@@ -80,13 +80,16 @@ def _of_velocity(unit: str, decimals: int = 3) -> tuple[Column, ...]:
 _PAIRS = {"vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
 """Correlations besides `corr_xy`, with their rows in the covariance."""
 
-VIDEO = (*_VIDEO, *_of_velocity("px"))
-"""Columns of video tracks. `group_id` is -1 without a shared blob; `nis` is empty without an update."""
+_SEEN = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 
-RADAR = (*_RADAR, *_of_velocity("m"))
-"""Columns of radar tracks in the plane: x east, y north."""
+VIDEO = (*_VIDEO, *_of_velocity("px"), *(_real(name, "px") for name in _SEEN))
+"""Columns of video tracks. `group_id` is -1 without a shared blob; `nis` is empty without an update; `seen_` are edges
+of the track's own measurement, in the scene."""
 
-RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"))
+RADAR = (*_RADAR, *_of_velocity("m"), _real("exchange", "1", 6))
+"""Columns of radar tracks in the plane: x east, y north; `exchange` is the probability of another track's target."""
+
+RADAR_3D = (*_RADAR_3D, *_of_velocity("m"), _real("sigma_vz_m_s", "m/s"), _real("exchange", "1", 6))
 """Columns of radar tracks in space: z up."""
 
 ROAD = (
@@ -132,7 +135,8 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
     """
     counts = [len(step.tracks) for step in steps]
     position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
-    on_road = {} if road is None else _road_values(steps, road)
+    seen = np.concatenate([step.seen for step in steps])
+    on_road = {} if road is None else _road_values(steps, seen, road)
     steps = [step.in_picture() for step in steps]
     x, P, box = (stacked(steps, name) for name in ("x", "P", "box"))
     cov = P[:, position][:, :, position]
@@ -145,6 +149,8 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
         "group_id": stacked(steps, "group"),
         "nis": stacked(steps, "nis"),
     }
+    if any(column.name == "exchange" for column in columns):
+        values["exchange"] = stacked(steps, "exchange")
     values["frame"] = values["scan"] = np.repeat([step.index for step in steps], counts)
     for unit in ("px", "m"):
         for k, axis in enumerate("xyz"[: len(position)]):
@@ -158,14 +164,18 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
         values[f"corr_{name}"] = P[:, i, j] / np.sqrt(P[:, i, i] * P[:, j, j])
     values |= on_road
     values |= zip(("left_px", "top_px", "width_px", "height_px"), box.T, strict=True)
+    values |= zip(_SEEN, seen.T, strict=True)
     return pa.Table.from_arrays([_array(c, values[c.name]) for c in columns], schema=schema(columns))
 
 
-def _road_values(steps: Sequence[Step], road: Footprints) -> dict[str, Floats]:
-    """The values of ROAD, all (N,)."""
+def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[str, Floats]:
+    """The values of ROAD, all (N,); edge (N, 4) px that were seen."""
+    from vidtrack.traffic.footprint import Seen
+
+    t = np.repeat([step.time_s for step in steps], [len(step.tracks) for step in steps])
     plane = [*steps[0].tracks.position[:2], *steps[0].tracks.velocity[:2]]
     x, P = stacked(steps, "x")[:, plane], stacked(steps, "P")[:, plane][:, :, plane]
-    stand = road.place(stacked(steps, "id"), x[:, :2], x[:, 2:], P, stacked(steps, "box"))
+    stand = road.place(stacked(steps, "id"), x[:, :2], x[:, 2:], P, stacked(steps, "box"), Seen(t, edge))
     sigma = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     shared = np.linalg.norm(stand.xy_shared, axis=2)
     return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -18,10 +18,14 @@ class Experiment:
     module: str
     title: str
 
-    def reproduce(self, runs: int | None = None, seed: int = 0) -> Result:
-        """Run the experiment. runs: Monte Carlo runs or simulated videos; None: as many as the claim needs."""
-        function: Callable[[int | None, int], Result] = import_module(f"vidtrack.papers.{self.module}").reproduce
-        return function(runs, seed)
+    def results(self, runs: int | None = None, seed: int = 0) -> Iterator[Result]:
+        """Run the experiment: the result, in long experiments also those of the parts that are done.
+
+        runs  Monte Carlo runs or simulated videos; None: as many as the claim needs
+        """
+        reproduce = import_module(f"vidtrack.papers.{self.module}").reproduce
+        found: Result | Iterator[Result] = reproduce(runs, seed)
+        yield from (found,) if isinstance(found, Result) else found
 
 
 EXPERIMENTS = {

@@ -26,11 +26,12 @@ from vidtrack.radar.scans import Measurements
 def motion(settings: RadarSettings, dim: int) -> Motion:
     """The motion model of the settings."""
     speed, accel, hold_s = settings.max_speed / 2, settings.accel, settings.hold_s
-    if settings.model == "ca":
+    model = settings.model or ("ct" if settings.estimator == "imm" else "cv")
+    if model == "ca":
         return ConstantAcceleration(dim, change=accel, hold_s=hold_s, speed=speed, accel=accel)
-    if settings.model == "singer":
+    if model == "singer":
         return Singer(dim, accel=accel, hold_s=hold_s, speed=speed)
-    if settings.model == "ct":
+    if model == "ct":
         return CoordinatedTurn(dim, accel=accel, hold_s=hold_s, speed=speed)
     return ConstantVelocity(dim, accel=accel, hold_s=hold_s, speed=speed)
 

@@ -57,12 +57,13 @@ class Plots:
 def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots:
     """Read a CSV or Parquet table of plots.
 
-    Rows may come in any order. Standard deviations come from columns, else from the settings.
+    Rows may come in any order. Without a column `scan`, plots of the same time are one scan. Standard
+    deviations come from columns, else from the settings.
     Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
     rows. With settings.skip_bad_rows bad rows are left out with a warning.
     """
     settings = settings or RadarSettings()
-    table = read_table(Path(path), KNOWN)
+    table = _numbered(read_table(Path(path), KNOWN))
     measured = _measured(table)
     _hint_at_misspelt(table)
     sigma = {name: _sigma(table, name, settings) for name in measured}
@@ -75,6 +76,27 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     if table.faults:
         _log.warning("%s; left out", table.problem())
     return _sorted(table, measured, sigma)
+
+
+def _numbered(table: Table) -> Table:
+    """The table with a column of scans: those of its times, if it has none and no other column may be meant.
+
+    A gap of several usual steps between two times holds empty scans.
+    """
+    scan, time = TIME
+    similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
+    if scan in table.names or time not in table.columns or similar:
+        return table
+    times, member = np.unique(table.columns[time], return_inverse=True)
+    steps = np.diff(times[np.isfinite(times)])
+    usual = float(np.median(steps)) if len(steps) else 1.0
+    number = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(steps / usual)))])
+    number = np.concatenate([number, np.full(len(times) - len(number), np.nan)])
+    _log.warning(
+        "%s has no column 'scan': plots of the same time are one scan; %d scans, %.6g s apart",
+        table.path, len(steps) + 1, usual,
+    )  # fmt: skip
+    return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
 
 
 def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from vidtrack.associate.gate import Gate
 from vidtrack.associate.methods import STRENGTH
+from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import Confirmed
@@ -26,9 +26,12 @@ from vidtrack.radar.plots import read_plots
 from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
-from vidtrack.tracking.methods import life, rule
+from vidtrack.tracking.methods import gate, life, rule
+from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracking.unresolved.cell import PolarCell
+from vidtrack.tracking.unresolved.unresolved import Unresolved
 from vidtrack.tracks import Tracks
 
 
@@ -106,13 +109,23 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
     return Tracker(
         model=motion(radar, found.dim),
         estimator=estimator(radar, found, seed),
-        associate=rule(common),
-        gate=Gate(common.gate_probability, common.distance, radar.euclidean_radius_m),
+        associate=rule(common, unresolved=radar.unresolved),
+        gate=gate(common, radar.euclidean_radius_m, adaptive=True),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         picture=NoPicture(),
+        sharing=_sharing(radar, found.dim),
         detection_probability=radar.detection_probability,
         clutter_density=radar.clutter_density,
         surveyed=surveyed(found),
         explain=explain,
         smooth=settings.output.smooth,
     )
+
+
+def _sharing(radar: RadarSettings, dim: int) -> Sharing:
+    """The model for unresolved targets; alpha-beta has no covariances from which to tell them."""
+    if not radar.unresolved or radar.estimator == "alpha-beta":
+        return Exclusive()
+    angles = (radar.cell_azimuth_deg, radar.cell_elevation_deg)[: dim - 1]
+    sides = (radar.cell_range_m, *(None if side is None else math.radians(side) for side in angles))
+    return Unresolved(PolarCell(radar.position[:dim], sides))

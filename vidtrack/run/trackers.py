@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from vidtrack.associate.gate import Gate
 from vidtrack.associate.shape import Shape
 from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
 from vidtrack.config.settings import DetectionSettings, Settings, TrackerSettings
 from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.tracking.deferred.forest import ForestRule
-from vidtrack.tracking.methods import life, rule
+from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.occlusion.sharing import Exclusive
-from vidtrack.tracking.picture.border import EXIT_S
 from vidtrack.tracking.picture.picture import Picture
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.tracker import Tracker
@@ -46,7 +44,7 @@ def build_blob_tracker(
     return Tracker(
         model=_motion(settings, settings.accel),
         associate=associate,
-        gate=_gate(settings),
+        gate=gate(settings, settings.euclidean_radius_px),
         life=life(
             settings.life,
             settings,
@@ -92,7 +90,7 @@ def build_box_tracker(
     return Tracker(
         model=_motion(settings, settings.accel if detections.accel is None else detections.accel, pace),
         associate=rule(settings),
-        gate=_gate(settings),
+        gate=gate(settings, settings.euclidean_radius_px),
         life=life(
             settings.life,
             settings,
@@ -102,7 +100,7 @@ def build_box_tracker(
             hidden_s=settings.hidden_s * pace,
             coast_scans=None,
         ),
-        picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace, exit_s=EXIT_S * pace),
+        picture=Picture(bounds, shape=Shape(), box_s=detections.box_s * pace),
         two_stage=SINGLE_STAGE if detections.sure_score is None else TwoStage(detections.sure_score),
         detection_probability=detections.detection_probability,
         clutter_density=settings.clutter_density,
@@ -122,7 +120,3 @@ def _motion(settings: TrackerSettings, accel: float, pace: float = 1.0) -> Const
         hold_s=settings.hold_s * pace,
         per_size=True,
     )
-
-
-def _gate(settings: TrackerSettings) -> Gate:
-    return Gate(settings.gate_probability, settings.distance, settings.euclidean_radius_px)

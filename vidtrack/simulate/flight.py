@@ -64,8 +64,8 @@ def weave(flight: Flight, amplitude: float, period_s: float, from_s: float) -> F
     return states
 
 
-def sidestep(flight: Flight, offset: ArrayLike, near: float, times_s: Sequence[float]) -> Flight:
-    """The flight displaced by `offset` [m], but by its share `near` in the middle.
+def sidestep(flight: Flight, offset: ArrayLike, near: float, times_s: Sequence[float], after: float = 1.0) -> Flight:
+    """The flight displaced by `offset` [m], but by its share `near` in the middle, and by `after` of it at the end.
 
     times_s  the four times between which it comes nearer and goes away again, each along half a cosine
     """
@@ -74,8 +74,9 @@ def sidestep(flight: Flight, offset: ArrayLike, near: float, times_s: Sequence[f
     def states(times: Floats) -> tuple[Floats, Floats]:
         p, v = flight(times)
         coming, going = np.clip((times - a) / (b - a), 0, 1), np.clip((times - c) / (d - c), 0, 1)
-        share = 1 - (1 - near) * (np.cos(np.pi * going) - np.cos(np.pi * coming)) / 2
-        slope = (1 - near) * np.pi / 2 * (np.sin(np.pi * going) / (d - c) - np.sin(np.pi * coming) / (b - a))
+        share = 1 + (near - 1) * (1 - np.cos(np.pi * coming)) / 2 + (after - near) * (1 - np.cos(np.pi * going)) / 2
+        slope = (near - 1) * np.sin(np.pi * coming) / (b - a) + (after - near) * np.sin(np.pi * going) / (d - c)
+        slope *= np.pi / 2
         return p + share[:, None] * np.array(offset), v + slope[:, None] * np.array(offset)
 
     return states

@@ -93,6 +93,17 @@ def unresolved(rng: Generator) -> list[Target]:
     return [Target(sidestep(flight, side * across, near=1 / 40, times_s=times)) for side in (-1, 1)]
 
 
+def parting(rng: Generator) -> list[Target]:
+    """Two aircraft come together as in `unresolved`, stay so for 10 to 90 s, and part; half of the pairs cross."""
+    course = rng.uniform(0, 2 * np.pi)
+    flight = _through(_place(rng, 15e3, 30e3), course, rng.uniform(180, 220), 100.0)
+    across = 1200 * np.array([np.cos(course), -np.sin(course), 0.0])
+    half = rng.uniform(5.0, 45.0)
+    times = (65.0 - half, 100.0 - half, 100.0 + half, 135.0 + half)
+    after = float(rng.choice([1.0, -1.0]))
+    return [Target(sidestep(flight, side * across, near=1 / 40, times_s=times, after=after)) for side in (-1, 1)]
+
+
 def _all_seen(seen: Seen) -> bool:
     return bool(seen.there.all())
 
@@ -111,12 +122,17 @@ def _crosses(seen: Seen) -> bool:
     return _all_seen(seen) and distance.min() < 100 and distance[[0, -1]].min() > 3000
 
 
-def _shares_a_cell(seen: Seen) -> bool:
-    """One echo for 20 scans in a row, each its own in the first and the last five."""
+def _shares_a_cell(seen: Seen, scans: int = 20) -> bool:
+    """One echo for so many scans in a row, each its own in the first and the last five."""
     merged = seen.merged[0]
     ends = merged[:5].any() or merged[-5:].any()
     run = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], merged, [0]]))))[::2].max(initial=0)
-    return _all_seen(seen) and not ends and run >= 20
+    return _all_seen(seen) and not ends and run >= scans
+
+
+def _meets(seen: Seen) -> bool:
+    """The same, for 5 scans."""
+    return _shares_a_cell(seen, 5)
 
 
 SCENARIOS: dict[str, tuple[Radar, Draw, int, Holds]] = {
@@ -126,6 +142,7 @@ SCENARIOS: dict[str, tuple[Radar, Draw, int, Holds]] = {
     "radar-speed": (MULTIFUNCTION, speed, 232, _all_seen),
     "radar-crossing": (FINE, crossing, 51, _crosses),
     "radar-unresolved": (COARSE, unresolved, 51, _shares_a_cell),
+    "radar-parting": (COARSE, parting, 51, _meets),
 }
 """Radar, targets, number of scans, and what is guaranteed for every seed."""
 

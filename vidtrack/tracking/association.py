@@ -34,10 +34,10 @@ class Association(NamedTuple):
     free: Mask
 
     @classmethod
-    def exclusive(cls, problem: Problem, decision: Decision, free: Mask) -> Association:
-        """No two tracks share a measurement."""
-        nobody = np.full(problem.rows, -1)
-        return cls(problem, decision, heaviest(decision), nobody, np.ones(problem.measurements, bool), free)
+    def deferred(cls, problem: Problem, decision: Decision, shared: Ints, free: Mask) -> Association:
+        """What a forest decided for rows that do not share a measurement (T,)."""
+        on = shared[decision.parent]
+        return cls(problem, decision, heaviest(decision), on, np.ones(problem.measurements, bool), free)
 
     @property
     def measurement(self) -> Ints:
@@ -51,8 +51,10 @@ class Timing(Protocol):
     A row of the register is a track, or one of the possible histories of a track.
     """
 
-    def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
-        """Assign measurements to the rows; the register's rows become their successors."""
+    def associate(
+        self, problem: Problem, shared: Ints, view: View | None, register: Register, events: list[Event]
+    ) -> Association:
+        """Assign measurements to the rows that do not share one (T,); the register's rows become their successors."""
 
     def shown(self, rows: int) -> Mask:
         """(rows,) the rows, of the first `rows`, that are output as tracks."""

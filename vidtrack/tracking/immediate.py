@@ -40,8 +40,11 @@ class Immediate:
 
     STATE = ()
 
-    def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
+    def associate(
+        self, whole: Problem, shared: Ints, view: View | None, register: Register, events: list[Event]
+    ) -> Association:
         """Confirmed tracks first, then the measurements that they share, then tentative tracks."""
+        problem, unresolved = whole.apart(shared), shared
         pairs, count = problem.pairs, problem.measurements
         confirmed = register.status != TENTATIVE
         sure = self.two_stage.sure(problem.scan)
@@ -49,16 +52,17 @@ class Immediate:
         shared, hides = self.sharing.claim(view, decision, confirmed, count)
         decision = decision.without(shared >= 0)
         free = hides & ~_claimed(decision, count)
+        free[unresolved[unresolved >= 0]] = False
         open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
         if np.count_nonzero(open_to_all):
             second = self.two_stage.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
             free &= ~_claimed(second, count)
             decision = decision.joined(second)
-        shared, free = self.sharing.catch(view, decision, shared, free)
+        shared, free = self.sharing.catch(view, decision, np.maximum(shared, unresolved), free)
         free &= sure & self.births
         if not self.rule.gated_births:
-            free[pairs.measurement] = False
-        return Association(problem, decision, heaviest(decision), shared, hides, distinct(problem.scan, free))
+            free[whole.pairs.measurement] = False
+        return Association(whole, decision, heaviest(decision), shared, hides, distinct(problem.scan, free))
 
     @property
     def _starter(self) -> Associator:

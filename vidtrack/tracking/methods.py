@@ -6,7 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from vidtrack.associate import methods
+from vidtrack.associate.gate import PROBABILITY, Gate, LikelihoodGate
 from vidtrack.associate.hard import Associator
+from vidtrack.associate.jpda import JPDA
 from vidtrack.config.settings import TrackerSettings
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.deferred.mht import MHT
@@ -18,13 +20,30 @@ METHODS: dict[str, Callable[[], Associator | ForestRule]] = {**methods.METHODS, 
 """Those that decide in one scan, and those that wait."""
 
 
-def rule(settings: TrackerSettings) -> Associator | ForestRule:
-    """The association method of these settings."""
+def rule(settings: TrackerSettings, *, unresolved: bool = False) -> Associator | ForestRule:
+    """The association method of these settings.
+
+    unresolved  targets may share measurements; when they part, both of a pair's orders are equally probable, and
+                jpda must be JPDA*, which takes one of them: with the mean of both the tracks would coalesce
+    """
+    if settings.method == "jpda" and unresolved:
+        return JPDA(star=True)
     if settings.method == "mht":
         return MHT(n_scan=settings.n_scan)
     if settings.method == "split":
         return Split(n_scan=settings.n_scan)
     return methods.METHODS[settings.method]()
+
+
+def gate(settings: TrackerSettings, radius: float, *, adaptive: bool = False) -> Gate:
+    """The gate of these settings; radius [px or m] of the euclidean distance.
+
+    adaptive  without a probability given, the gate follows P_D and clutter density
+    """
+    if settings.gate_probability is None and adaptive and settings.distance == "mahalanobis":
+        return LikelihoodGate(detection_probability=None, new_density=None)
+    probability = PROBABILITY if settings.gate_probability is None else settings.gate_probability
+    return Gate(probability, settings.distance, radius)
 
 
 def life(

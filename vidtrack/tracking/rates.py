@@ -94,15 +94,19 @@ class Rates:
         self.low = low if first else np.minimum(self.low, low)
         self.high = high if first else np.maximum(self.high, high)
 
-    def learn(self, decision: Decision, register: Register, alone: Mask, inside: Floats, count: int, dt: float) -> None:
+    def learn(
+        self, decision: Decision, shared: Ints, register: Register, alone: Mask, inside: Floats, count: int, dt: float
+    ) -> None:
         """Learn from a decision about `count` measurements, dt seconds after the last.
 
+        shared (K,) measurement that each row shares, -1: none
         alone  (K,) rows of the register that count: those believed, on no shared blob; inside (K,) their P_G
         """
         forget = float(np.exp(-dt / MEMORY_S))
         known = alone & (register.status != TENTATIVE)
         runs = 1 + int(register.run.max(initial=0))
         claimed = np.bincount(decision.measurement, decision.beta * known[decision.row], count)
+        claimed[shared[shared >= 0]] = 1.0
         self.false = forget * self.false + float(np.maximum(1 - claimed, 0).sum())
         self.scans = forget * self.scans + runs
         found = known & (register.status != MERGED) & (register.history & 1 == 1)

@@ -22,15 +22,15 @@ class Register:
 
     id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest),
     start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
-    merged (number of the tracks on its blob, -1 alone) and merged_since_s, score (log-odds that it is a target), best
-    (highest score since it was confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s
-    (time seen on a blob of its own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and
-    when it last moved on by REST of its size). Where a smoother needs them also
-    prior_x, prior_P and gain (see Tracks), made anew in every scan.
+    merged (number of the tracks on its measurement, -1 alone) and merged_since_s, exchange (probability that the target
+    is another's, since they were not resolved), score (log-odds that it is a target), best (highest score since it was
+    confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its
+    own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by
+    REST of its size). Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
-             "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s")  # fmt: skip
+             "exchange", "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
 
@@ -47,6 +47,7 @@ class Register:
         self.box = np.empty((0, 4))
         self.merged = np.empty(0, np.int64)
         self.merged_since_s = np.empty(0)
+        self.exchange = np.empty(0)
         self.score = np.empty(0)
         self.best = np.empty(0)
         self.run = np.empty(0, np.int64)
@@ -114,6 +115,7 @@ class Register:
             "start": position,
             "box": box,
             "merged": -1,
+            "exchange": 0.0,
             "score": score,
             "best": score,
             "run": run,

@@ -35,5 +35,6 @@ def snapshot(
         position=model.position,
         velocity=model.velocity,
         run=register.run.copy(),
+        exchange=register.exchange.copy(),
         **more,
     )

@@ -32,6 +32,7 @@ from vidtrack.tracking.deferred.deferred import Deferred
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.immediate import Immediate
 from vidtrack.tracking.lifecycle import Life, LifeCycle
+from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import Picture, Surroundings, View
 from vidtrack.tracking.picture.road import Road
@@ -68,8 +69,8 @@ class Tracker:
     gate       Gate, or the probability of one
     life       confirmation and deletion: LifeCycle(), M of N, or LogRatio(), by the log-likelihood ratio
     picture    Picture() for measurements with boxes, with its bounds, or NoPicture() for points
-    sharing    model for measurements of several targets: Exclusive() (none) or Occlusion(); MHT and Split require
-               Exclusive()
+    sharing    model for measurements of several targets: Exclusive() (none), Occlusion() for blobs (not with MHT and
+               Split), or Unresolved() for points
     two_stage  association by score in two stages; None: scores do not count
     estimator  makes the bank of filters from the model
     births     whether measurements that belong to no track start one
@@ -130,7 +131,7 @@ class Tracker:
         dt = self._predict(scan, events)
         view = self.picture.view(scan, self.register, self.bank)
         problem = self._gate(scan, view)
-        found = self._associate(problem, view, events)
+        found = self._associate(problem, view, dt, events)
         outcome = self._update(found, scan, view, dt)
         kept = self._delete(found, scan.t, events)
         born = self._register(found, scan, view, events)
@@ -183,10 +184,8 @@ class Tracker:
             raise ConfigError(f"associate is {rule!r}; give an instance, such as GNN()")
         if not isinstance(rule, ForestRule):
             return Immediate(rule, self.sharing, self.two_stage, births)
-        if not isinstance(self.sharing, Exclusive):
-            raise ConfigError(
-                f"{type(rule).__name__} decides later and knows no shared measurements; leave sharing out"
-            )
+        if isinstance(self.sharing, Occlusion):
+            raise ConfigError(f"{type(rule).__name__} decides later and knows no shared blobs; leave Occlusion out")
         return Deferred(rule.forest(), self.two_stage, births)
 
     def _predict(self, scan: Scan, events: list[Event]) -> float:
@@ -226,8 +225,9 @@ class Tracker:
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
         self.rates.look(scan)
+        detection, clutter = self.rates.of(self.register.run)
         problem = Problem.gated(
-            self.gate, zhat, cov, scan, *self.rates.of(self.register.run),
+            self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
             modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
         )  # fmt: skip
@@ -235,9 +235,11 @@ class Tracker:
             problem = thresholded(problem, self.threshold)
         return self.picture.weigh(problem, view)
 
-    def _associate(self, problem: Problem, view: View | None, events: list[Event]) -> Association:
-        """Assign measurements to tracks, now or later."""
-        return self.timing.associate(problem, view, self.register, events)
+    def _associate(self, problem: Problem, view: View | None, dt: float, events: list[Event]) -> Association:
+        """Assign measurements to tracks, now or later; first those of targets that the sensor does not resolve."""
+        shown = self.timing.shown(problem.rows)
+        shared = self.sharing.unresolved(problem, shown, self.register, self.bank, dt)
+        return self.timing.associate(problem, shared, view, self.register, events)
 
     def _update(self, found: Association, scan: Scan, view: View | None, dt: float) -> Outcome:
         """Update states, boxes and existence with the measurements that the tracks took."""
@@ -266,7 +268,9 @@ class Tracker:
         self.register.add_evidence(log_ratio)
         if self.rates.estimated:
             alone &= self.timing.shown(problem.rows)
-            self.rates.learn(found.decision, self.register, alone, problem.inside, problem.measurements, dt)
+            self.rates.learn(
+                found.decision, found.shared, self.register, alone, problem.inside, problem.measurements, dt
+            )
         return nis
 
     def _why(self, found: Association) -> Choices | None:
@@ -279,7 +283,7 @@ class Tracker:
     def _delete(self, found: Association, t: float, events: list[Event]) -> Mask:
         """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         register = self.register
-        left = self.picture.left(register, self.bank, t)
+        left = (register.history & 1 == 0) & (self.picture.in_view(self.bank) < 0.5)  # unseen, and likelier outside
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
         idle = self.life.idle(register, t)

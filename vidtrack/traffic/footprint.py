@@ -20,12 +20,13 @@ z, and the derivative of its picture point gives velocities, u in the picture an
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.pace import Pace
 
 _SLENDER, _SLENDER_SIGMA = 0.4, 0.1
 """Width over length of vehicles, from motorcycles and cars (0.4) to lorries (0.25), and its standard deviation."""
@@ -37,6 +38,8 @@ _ROUNDS = 3
 _SILHOUETTE = 0.02
 """Standard deviation of speeds, as a share, because a centroid is of a silhouette and not one point of the vehicle:
 measured for cars by tools/road_plane.py"""
+_NEAR = 0.01
+"""Share of the picture's width; edges nearer to the border may be cut by it"""
 _HEADING_SIGMA = 0.5
 """rad; a heading that is less certain is not used: the last good one of the track stays"""
 _ALL_WAYS = 2 / np.pi
@@ -94,6 +97,14 @@ class Stand:
         return np.divide(self.v, speed, out=np.column_stack([np.cos(angle), np.sin(angle)]), where=speed > 0)
 
 
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What was seen of N rows: t (N,) s, edge (N, 4) px left, top, right and lower edges, NaN where there are none."""
+
+    t: Floats
+    edge: Floats
+
+
 class Footprints:
     """Places vehicles on the road. Remembers the heading of those that stop; rows must come in order of time.
 
@@ -105,19 +116,38 @@ class Footprints:
         self._ground = ground
         self._size = size
         self._heading: dict[int, Floats] = {}
+        self._pace = Pace()
 
-    def place(self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats) -> Stand:
+    def place(self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats, seen: Seen | None = None) -> Stand:
         """The vehicles of N rows.
 
         track  (N,) identities
         xy, u  (N, 2) positions [px] and velocities [px/s] of the tracks
         P      (N, 4, 4) covariance of (x, y, their velocities)
         box    (N, 4) left, top, width, height [px]
+        seen   what was seen of them; None: velocities follow from u alone
         """
         box = np.where(self._cut(box)[:, None], np.nan, box)
         headings = self._headings(track, xy, u, P, box)
         with np.errstate(invalid="ignore"):
-            return self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
+            stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
+            return stand if seen is None else self._paced(stand, track, seen)
+
+    def _paced(self, stand: Stand, track: Ints, seen: Seen) -> Stand:
+        """The same with velocities that were filtered on the road, where their errors are smaller."""
+        ground, (left, _, right, bottom) = self._ground, uncut(seen.edge, self._size).T
+        foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
+        v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
+        cov = cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
+        better = np.trace(cov, axis1=1, axis2=2) < np.trace(stand.v_own, axis1=1, axis2=2)
+        ahead, behind = stand.xy + v / 2, stand.xy - v / 2  # half a second
+        shared = ground.by_shared_error(ahead) - ground.by_shared_error(behind)
+        return replace(
+            stand,
+            v=np.where(better[:, None], v, stand.v),
+            v_own=np.where(better[:, None, None], cov, stand.v_own),
+            v_shared=np.where(better[:, None, None], shared, stand.v_shared),
+        )
 
     def _stand(self, xy: Floats, u: Floats, P: Floats, box: Floats, e: Floats, e_sigma: Floats) -> Stand:
         ground = self._ground
@@ -190,6 +220,13 @@ class Footprints:
         """(N,) whether the left, right or lower border of the picture cuts the box."""
         (left, top, wide, high), (width, height) = box.T, self._size
         return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
+
+
+def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
+    """(N, 4) left, top, right and lower edges [px]; NaN where the border of a picture (width, height) may cut them."""
+    near = _NEAR * size[0]
+    inside = np.hstack([edge[:, :2] > near, edge[:, 2:] < np.array(size) - near])
+    return np.asarray(np.where(inside, edge, np.nan))
 
 
 def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[Floats, Floats]:

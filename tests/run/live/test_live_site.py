@@ -112,7 +112,7 @@ def test_a_site_that_the_page_saves_begins_a_part(camera, tmp_path, monkeypatch)
         wide = max(table["x_m"].to_pylist())
         assert 0.4 * 320 / scale < wide < 320 / scale
         measure(part, "-o", f"measures-{scale}")
-    with pytest.raises(ConfigError, match="give --site SITE.toml for all of them, or measure those of each"):
+    with pytest.raises(ConfigError, match=r"give --site SITE\.toml for all of them, or measure those of each"):
         measure(folder, "-o", "all")
     measure(folder, "--site", site, "-o", "all")
     assert json.loads((tmp_path / "all" / "measures.json").read_text())["metres"]

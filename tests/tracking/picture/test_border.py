@@ -16,13 +16,17 @@ def test_a_box_is_cut_on_the_sides_that_reach_the_border():
 
 def test_without_a_border_nothing_is_cut():
     assert not Border().sides(BOXES).any()
-    assert not Border().outside(BOXES[:, :2] - 1000).any()
+    assert (Border().in_view(BOXES[:, :2] - 1000, BOXES[:, 2:]) == 1).all()
 
 
-def test_a_box_leaves_where_it_moves_towards_the_border_that_cuts_it():
-    outwards = np.array([[-5.0, 0.0], [0.0, -5.0], [0.0, 5.0], [5.0, 5.0]])
-    np.testing.assert_array_equal(PICTURE.leaving(BOXES, outwards), [True, True, True, False])
-    assert not PICTURE.leaving(BOXES, -outwards).any()
+def test_the_probability_to_be_in_view_is_the_share_of_the_position_within_the_border():
+    xy = np.array([[50.0, 40.0], [99.5, 40.0], [99.5, 79.5], [-30.0, 40.0], [3.0, 70.0]])
+    var = np.array([[4.0, 4.0], [4.0, 4.0], [9.0, 1.0], [25.0, 25.0], [16.0, 100.0]])
+    found = PICTURE.in_view(xy, var)
+    np.testing.assert_allclose(found[:4], [1, 0.5, 0.25, 0], atol=1e-8)
+    drawn = xy[4] + np.sqrt(var[4]) * np.random.default_rng(1).normal(size=(100_000, 2))
+    within = np.all((drawn > -0.5) & (drawn < [99.5, 79.5]), axis=1)
+    assert abs(found[4] - within.mean()) < 0.006
 
 
 def test_cut_boxes_are_drawn_out_to_the_border_and_no_farther():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import logit
 
 import vidtrack as vt
 
@@ -32,6 +33,17 @@ def test_a_track_ends_where_the_picture_does():
     assert len(without) == 1
     told = [event.reason for tracks in played(vt.Picture(SIZE), scans) for event in tracks.events]
     assert told.count("left the picture") == 1
+
+
+def test_a_miss_tells_less_of_a_track_that_may_be_outside_the_picture():
+    """A miss multiplies the odds of existence by 1 - P_D s, where s is the probability to be in the picture."""
+    scans = [driving(k + 0.9) for k in range(12)] + [vt.box_scan(1.29, [])]  # at 319 px of 320 when it is missed
+
+    def loss(picture):
+        before, after = (logit(tracks.existence[0]) for tracks in played(picture, scans)[-2:])
+        return before - after
+
+    assert 0 < loss(vt.Picture(SIZE)) < 0.9 * loss(vt.Picture())
 
 
 def test_the_clutter_is_counted_over_the_picture():

@@ -23,7 +23,7 @@ UNSURE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Deferred:
-    """Each scan is decided some scans later. No measurement is shared.
+    """Each scan is decided some scans later.
 
     forest     the histories of all tracks
     two_stage  which scores may start a track
@@ -36,13 +36,18 @@ class Deferred:
 
     STATE = ("forest",)
 
-    def associate(self, problem: Problem, view: View | None, register: Register, events: list[Event]) -> Association:
+    def associate(
+        self, problem: Problem, shared: Ints, view: View | None, register: Register, events: list[Event]
+    ) -> Association:
         """Grow the forest; the register's rows become their successors."""
+        problem = problem.apart(shared)
         pairs, sure = problem.pairs, self.two_stage.sure(problem.scan)
         log_l = pairs.log_l + np.where(sure, 0.0, np.log(UNSURE))[pairs.measurement]
         problem = replace(problem, pairs=replace(pairs, log_l=log_l))
-        starts = distinct(problem.scan, sure & self.births)
-        return Association.exclusive(*self.forest.grow(problem, register, starts, events))
+        starts = sure & self.births
+        starts[shared[shared >= 0]] = False
+        problem, decision, born = self.forest.grow(problem, register, distinct(problem.scan, starts), events)
+        return Association.deferred(problem, decision, shared, born)
 
     def shown(self, rows: int) -> Mask:
         """(rows,) the output row of each track."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
@@ -69,6 +70,10 @@ class Occlusion:
     def __post_init__(self) -> None:
         if not 0 < self.cover <= 1:
             raise ConfigError(f"occlusion cover is {self.cover}; it must lie in 0..1")
+
+    def unresolved(self, problem: Problem, shown: Mask, register: Register, bank: Estimator, dt: float) -> Ints:
+        """(T,) none: blobs have edges, and are claimed after the association."""
+        return ALONE.unresolved(problem, shown, register, bank, dt)
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.

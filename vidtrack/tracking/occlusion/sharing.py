@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
 from vidtrack.estimate.bank import Estimator
 from vidtrack.tracking.association import Association
@@ -16,10 +17,16 @@ from vidtrack.tracking.register import Register
 
 
 class Sharing(Protocol):
-    """A model for measurements that tracks share: `Exclusive` (no sharing) or `Occlusion`.
+    """A model for measurements that tracks share: `Exclusive` (no sharing), `Occlusion` or `Unresolved`.
 
     A view is None if measurements have no extent.
     """
+
+    def unresolved(self, problem: Problem, shown: Mask, register: Register, bank: Estimator, dt: float) -> Ints:
+        """(T,) the measurement that each row shares whatever the association decides about others; -1: none.
+
+        shown  (T,) rows that are output; dt seconds after the last scan
+        """
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """(T,) the measurement whose edges update each track, -1: none; (M,) those that may hide another target.
@@ -48,6 +55,10 @@ class Exclusive:
     """Each measurement is of one target."""
 
     STATE = ()
+
+    def unresolved(self, problem: Problem, shown: Mask, register: Register, bank: Estimator, dt: float) -> Ints:
+        """(T,) none."""
+        return np.full(problem.rows, -1)
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """No track shares a measurement, and all measurements may be of new targets."""

@@ -1,10 +1,11 @@
-"""The border of the picture: which boxes it cuts, and which tracks are leaving."""
+"""The border of the picture: which boxes it cuts, and how probably a position is in view."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
@@ -12,8 +13,6 @@ from vidtrack.scan import Scan
 
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
-EXIT_S = 0.2
-"""s; a track that is leaving over the border is deleted this long after its last evidence."""
 SPECK = 1 / 30
 """Share of the picture's longer side; a smaller object must travel as far as one of this size to be confirmed. The
 leaves of a swaying tree are small, and a track that jumps from leaf to leaf seems to travel."""
@@ -60,13 +59,13 @@ class Border:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""
         return _cut(box, self._edges, self._reach)
 
-    def outside(self, xy: Floats) -> Mask:
-        """(N,) positions (N, d) beyond the border."""
-        return _outside(xy, self._edges)
-
-    def leaving(self, box: Floats, v: Floats) -> Mask:
-        """(N,) boxes cut by the border they move towards with velocities v (N, 2)."""
-        return _leaving(box, v, self._edges, self._reach)
+    def in_view(self, xy: Floats, var: Floats) -> Floats:
+        """(N,) probability that positions with means (N, d) and variances (N, d) are within the border."""
+        if np.isinf(self.width):
+            return np.ones(len(xy))
+        edges, sigma = np.array(self._edges) - 0.5, np.sqrt(var[:, :2])  # a pixel is a unit square around its position
+        below, above = (ndtr((edge - xy[:, :2]) / sigma) for edge in (edges[:2], edges[2:]))
+        return np.asarray((above - below).prod(axis=1))
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) extended to the border on the given sides (N, 4)."""
@@ -91,27 +90,6 @@ def _cut(box: Floats, edges: tuple[float, float, float, float], reach: float) ->
     for i in range(len(box)):
         cut[i] = sides[i].any()
     return cut
-
-
-@kernel
-def _outside(xy: Floats, edges: tuple[float, float, float, float]) -> Mask:
-    outside = np.zeros(len(xy), np.bool_)
-    if np.isinf(edges[2]):
-        return outside
-    for i in range(len(xy)):
-        x, y = xy[i, 0] + 0.5, xy[i, 1] + 0.5  # a pixel is a unit square around its integer position
-        outside[i] = x < edges[0] or y < edges[1] or x > edges[2] or y > edges[3]
-    return outside
-
-
-@kernel
-def _leaving(box: Floats, v: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
-    leaving, sides = np.zeros(len(box), np.bool_), _sides(box, edges, reach)
-    for i in range(len(box)):
-        for axis in range(min(2, v.shape[1])):
-            near, far = sides[i, axis] and v[i, axis] < 0, sides[i, axis + 2] and v[i, axis] > 0
-            leaving[i] |= near or far
-    return leaving
 
 
 @kernel

@@ -6,14 +6,14 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import absolute, follow, longer
-from vidtrack.tracking.picture.border import EXIT_S, Border
+from vidtrack.tracking.picture.border import Border
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
 from vidtrack.tracks import Tracks
@@ -61,8 +61,8 @@ class Surroundings(Protocol):
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
         """Move the boxes of tracks towards those of the measurements that they have taken (T,)."""
 
-    def left(self, register: Register, bank: Estimator, t: float) -> Mask:
-        """(T,) tracks without a hit in this scan that are beyond the border, or were leaving when last seen."""
+    def in_view(self, bank: Estimator) -> Floats:
+        """(T,) probability that each track is where the scan looks; elsewhere P_D is zero."""
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) sizes by which objects at xy (T, d) must travel to be believed."""
@@ -97,9 +97,9 @@ class NoPicture:
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
         """Nothing has a box."""
 
-    def left(self, register: Register, bank: Estimator, t: float) -> Mask:
-        """(T,) none."""
-        return np.zeros(len(register), bool)
+    def in_view(self, bank: Estimator) -> Floats:
+        """(T,) ones."""
+        return np.ones(len(bank))
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) zeros."""
@@ -112,11 +112,10 @@ class NoPicture:
 class Picture:
     """The picture of a camera. It learns, if it has a road: each tracker needs its own.
 
-    bounds  (width, height) px; a track that leaves them is deleted; None: as each scan says, else no border
+    bounds  (width, height) px; outside P_D is zero and tracks are deleted; None: as each scan says, else no border
     shape   how the size of boxes counts in the association; None: it does not
     road    what traffic teaches about the scene, scan by scan; None: nothing
     box_s   time constant [s] with which a track's box follows its measurements' boxes
-    exit_s  a track that is leaving over the border is deleted this long [s] after its last evidence
 
     Raises ConfigError for a time constant that is not above zero.
     """
@@ -130,7 +129,6 @@ class Picture:
         shape: Shape | None = None,
         road: Road | None = None,
         box_s: float = 0.3,
-        exit_s: float = EXIT_S,
     ) -> None:
         if not box_s > 0:
             raise ConfigError(f"box_s is {box_s}; it must be above zero")
@@ -138,7 +136,6 @@ class Picture:
         self.shape = shape
         self.road = road
         self.box_s = box_s
-        self.exit_s = exit_s
         self.border = Border(*bounds) if bounds else Border()
 
     def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
@@ -171,16 +168,11 @@ class Picture:
             rows = (taken >= 0).nonzero()[0]
             bank.scale[rows] = longer(register.box)[rows]
 
-    def left(self, register: Register, bank: Estimator, t: float) -> Mask:
-        """(T,) tracks without a hit in this scan that are beyond the border, or were leaving when last seen."""
-        left = register.history & 1 == 0
-        missed = left.nonzero()[0]
-        if len(missed):
-            x = bank.x[missed]
-            xy, v = x.take(bank.model.position, axis=1), x.take(bank.model.velocity, axis=1)
-            going = self.border.leaving(absolute(register.box[missed], xy), v)
-            left[missed] = self.border.outside(xy) | going & (t - register.updated_s[missed] > self.exit_s)
-        return left
+    def in_view(self, bank: Estimator) -> Floats:
+        """(T,) probability that each track is within the border of the last scan."""
+        position = bank.model.position
+        var = bank.P.diagonal(axis1=1, axis2=2)
+        return self.border.in_view(bank.x.take(position, axis=1), var.take(position, axis=1))
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) longer sides, of specks that of the least object; more where the picture is restless."""

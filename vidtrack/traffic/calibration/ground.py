@@ -78,11 +78,22 @@ class Ground:
         """(2,) the gradient of w [1/m]."""
         return np.asarray(self.k[6:] / self.plane.scale)
 
+    @property
+    def homography(self) -> Floats:
+        """(3, 3) from metres to homogeneous undistorted picture points [px]."""
+        plane = np.diag([1 / self.plane.scale, 1 / self.plane.scale, 1.0])
+        plane[:2, 2] = -self.plane.origin / self.plane.scale
+        return np.asarray(self._from_plane() @ plane)
+
     def pose(self) -> Pose | None:
         """The camera; None where its focal length cannot be told from the homography."""
-        view = np.array([[self.picture.scale, 0, 0], [0, self.picture.scale, 0], [0, 0, 1.0]])
+        return pose_of(self._from_plane(), self.plane.scale, self.center, self.focal_px)
+
+    def _from_plane(self) -> Floats:
+        """(3, 3) from the normalised plane to homogeneous undistorted picture points [px]."""
+        view = np.diag([self.picture.scale, self.picture.scale, 1.0])
         view[:2, 2] = self.picture.origin
-        return pose_of(view @ matrix(self.k), self.plane.scale, self.center, self.focal_px)
+        return np.asarray(view @ matrix(self.k))
 
     def by_own_error(self, xy_m: Floats) -> Floats:
         """(N, 2, 2) derivative of positions with respect to their picture points [m/px]."""

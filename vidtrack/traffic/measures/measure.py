@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
@@ -27,6 +28,8 @@ from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.tables import stamps, table
 from vidtrack.traffic.site import Site
+from vidtrack.traffic.vehicles.classes import named, named_by_length
+from vidtrack.traffic.vehicles.vehicles import Vehicles
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +56,14 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
     staying = Staying(outlines, metres=site.calibration is not None)
-    meeting = Meeting()
+    ground = grounds[sizes[0]]
+    meeting, vehicles = Meeting(), Vehicles(ground)
     for rows in reader:
         for part in (passing, lives, staying, meeting):
             part.add(rows)
-    ground = grounds[sizes[0]]
-    return _Figures(day, site, gates, ground, reader, passing.passed(), lives, staying, meeting).measures()
+        vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
+    passed = passing.passed()
+    return _Figures(day, site, gates, ground, reader, passed, lives, staying, meeting, vehicles).measures()
 
 
 class _Figures:
@@ -75,6 +80,7 @@ class _Figures:
         lives: Lives,
         staying: Staying,
         meeting: Meeting,
+        vehicles: Vehicles,
     ) -> None:
         self.day, self.site, self.gates, self.ground = day, site, gates, ground
         self.staying, self.meeting = staying, meeting
@@ -82,8 +88,19 @@ class _Figures:
         self.spans = day.spans
         self.session, self.track_id = reader.names
         tracks = len(self.track_id)
-        head, tail, self.length = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
-        driven = journeys(gates, passed, head, tail, self.length, self.spans, self.metres)
+        length = self.length = lives.length(tracks)
+        self.kind: list[str | None] = class_of(length, site.classes)
+        self.kind_probability = np.full(tracks, np.nan)
+        found = vehicles.fitted(tracks, passed.track, passed.t)
+        self.scale = None if found is None else found.scale
+        if found is not None:
+            passed = passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
+            self.length = np.where(np.isnan(found.classes.size[:, 0]), length, found.classes.size[:, 0])
+            if site.classes:
+                self.kind, self.kind_probability = named_by_length(self.length, found.classes.sigma[:, 0], site.classes)
+            else:
+                self.kind, self.kind_probability = named(found.classes)
+        driven = journeys(gates, passed, lives.head(tracks), lives.tail(tracks), length, self.spans, self.metres)
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         if not self.metres:
@@ -131,6 +148,7 @@ class _Figures:
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
+            "scale": None if self.scale is None else self.scale.told(),
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }
@@ -154,7 +172,7 @@ class _Figures:
                 "direction": ("", direction),
                 "run": ("n", self.session[passed.track]),
                 "track_id": ("n", self.track_id[passed.track]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(passed.track),
                 "length_m": ("m", length),
                 "speed_kmh": ("km/h", 3.6 * passed.speed),
                 "speed_sigma_kmh": ("km/h", 3.6 * passed.speed_sigma),
@@ -186,7 +204,7 @@ class _Figures:
             {
                 "run": ("n", self.session[trips.vehicle]),
                 "track_id": ("n", self.track_id[trips.vehicle]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(trips.vehicle),
                 "length_m": ("m", length),
                 "entry_gate": ("", [names[g] for g in entry]),
                 "exit_gate": ("", [names[g] for g in exit_]),
@@ -222,13 +240,12 @@ class _Figures:
 
     def _stays(self) -> pa.Table:
         stays, names = self.staying.in_zones(self.vehicle), list(self.site.zones)
-        length = self.length[stays.vehicle]
         return table(
             {
                 "zone": ("", [names[zone] for zone in stays.zone.tolist()]),
                 "run": ("n", self.session[stays.vehicle]),
                 "track_id": ("n", self.track_id[stays.vehicle]),
-                "class": ("", class_of(length, self.site.classes)),
+                **self._class_of(stays.vehicle),
                 "begin_s": ("s", stays.begin),
                 "end_s": ("s", stays.end),
                 "begin_utc": ("utc", stamps(self.day.utc, stays.begin)),
@@ -274,7 +291,7 @@ class _Figures:
         for name, who, speed in zip(("first", "second"), (found.first, found.second), found.speed.T, strict=True):
             columns |= {
                 f"{name}_track_id": ("n", self.track_id[who]),
-                f"{name}_class": ("", class_of(self.length[who], self.site.classes)),
+                f"{name}_class": ("", [self.kind[k] for k in who.tolist()]),
                 f"{name}_speed_kmh": ("km/h", 3.6 * speed),
             }
         for name, kind in (("ttc", TTC), ("pet", PET)):
@@ -301,6 +318,13 @@ class _Figures:
                 "vanished": ("n", found.vanished),
             }
         )
+
+    def _class_of(self, track: Ints) -> dict[str, tuple[str, Any]]:
+        """The classes of tracks, and how sure they are."""
+        return {
+            "class": ("", [self.kind[k] for k in track.tolist()]),
+            "class_probability": ("1", self.kind_probability[track]),
+        }
 
     def _when(self, times: int) -> dict[str, tuple[str, Any]]:
         """Begin, end and coverage of the intervals, all of them so many times."""

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, footprint
+from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
 from vidtrack.traffic.measures.runs import Day, Recording
 
 BLOCK = 1 << 18
@@ -32,8 +32,9 @@ _STATE = (
     *("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "sigma_vx_px_s", "sigma_vy_px_s"),
     *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *_BOX),
 )
+EDGE_COLUMNS = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
-"""What is read of a run with metres."""
+"""What is read of a run with metres, besides the edges."""
 _LONGEST_LINE = 1 << 16
 """Bytes; no line of a table is as long."""
 _NOT_SEEN = "coasting"
@@ -56,6 +57,8 @@ class Rows:
     length, length_sigma, width   (N,) m
     ahead    (N, 2) unit vectors along the vehicles on the road
     spread   (N, 3) m2; variances of its own position error, in x and in y, and their covariance
+    edge     (N, 4) px of the picture; left, top, right and lower edges that were seen of the vehicle alone; NaN where
+             the border cuts them, in runs of earlier versions, and without a calibration
     """
 
     track: Ints
@@ -73,6 +76,7 @@ class Rows:
     width: Floats
     ahead: Floats
     spread: Floats
+    edge: Floats
 
     def __len__(self) -> int:
         return len(self.t)
@@ -83,9 +87,9 @@ class Rows:
 
 
 def off_road(count: int) -> tuple[Floats, ...]:
-    """The last seven columns of rows (count,) of which nothing is known on the road: NaN."""
-    nothing = np.full((count, 3), np.nan)
-    return *(nothing[:, 0] for _ in range(5)), nothing[:, :2], nothing
+    """The last eight columns of rows (count,) of which nothing is known on the road: NaN."""
+    nothing = np.full((count, 4), np.nan)
+    return *(nothing[:, 0] for _ in range(5)), nothing[:, :2], nothing[:, :3], nothing
 
 
 _MARGIN = 0.15
@@ -99,12 +103,14 @@ _ROUGH_M = 1.0
 class Reader:
     """Reads the recordings of a day, one block after the other; numbers the tracks of all of them from 0.
 
-    grounds  by the size of the picture; None: positions stay in pixels, and there are no speeds
+    grounds  by the size of the picture; None: positions stay in pixels, and there are no speeds. Edges are in pixels of
+             the smallest
     """
 
     def __init__(self, day: Day, grounds: dict[tuple[int, int], Ground | None]) -> None:
         self._day = day
         self._grounds = grounds
+        self._size = min(grounds)
         self._numbers: dict[tuple[int, int], int] = {}
 
     @property
@@ -146,9 +152,11 @@ class Reader:
         length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
         margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
         sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
+        edge = (_edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         sides = length, column["length_sigma_m"], column["width_m"]
         spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
-        return Rows(track, t, seen, merged, xy, sigma, margin, speed[:, None] * ahead, *sigmas, *sides, ahead, spread)
+        state = xy, sigma, margin, speed[:, None] * ahead
+        return Rows(track, t, seen, merged, *state, *sigmas, *sides, ahead, spread, edge)
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
         """(N,) numbers over the whole day."""
@@ -163,10 +171,11 @@ def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
+    edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= names else ()
     if set(_ROAD) <= names and _of_this_site(folder, ground):
-        return ROAD_COLUMNS
+        return *ROAD_COLUMNS, *edges
     _demand(folder, names, _STATE, "has no metres of this site, and they cannot be computed")
-    return *_ALWAYS, *_STATE
+    return *_ALWAYS, *_STATE, *edges
 
 
 def _demand(folder: Path, names: set[str], needed: tuple[str, ...], what: str) -> None:
@@ -185,6 +194,14 @@ def _of_this_site(folder: Path, ground: Ground) -> bool:
             held = (x > left) & (x < left + width) & (y > top + height / 4) & (y < top + height)
             return bool(np.mean(held[known]) > 1 / 2)
     return True
+
+
+def _edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
+    """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
+    if EDGE_COLUMNS[0] not in column:
+        return np.full((len(column["time_s"]), 4), np.nan)
+    with np.errstate(invalid="ignore"):
+        return uncut(np.column_stack([column[name] for name in EDGE_COLUMNS]), size)
 
 
 def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Floats]:
@@ -214,7 +231,10 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str
         corr[:, i, j] = corr[:, j, i] = column[f"corr_{name}"]
     P = corr * sigma[:, :, None] * sigma[:, None, :]
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
-    stand = road.place(track, xy, u, P, np.column_stack([column[name] for name in _BOX]))
+    box = np.column_stack([column[name] for name in _BOX])
+    edge = [column[name] for name in EDGE_COLUMNS if name in column]
+    seen = Seen(column["time_s"], np.column_stack(edge)) if edge else None
+    stand = road.place(track, xy, u, P, box, seen)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],

@@ -17,6 +17,10 @@ from vidtrack.video.blobs.regions import Regions, find_regions
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.runs import Runs
 
+_RIM = 1.5
+"""Processed pixels by which blobs reach beyond vehicles on each side, since the picture is smoothed before it is
+compared: the median at drawn sites (tools/score_speeds.py)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Blobs:
@@ -51,7 +55,7 @@ class Blobs:
         box[:, :2] -= self.centroid
         return Scan(
             time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting,
-            surveyed=self.surveyed, pixel=self.step,
+            surveyed=self.surveyed, pixel=self.step, rim=_RIM * self.step,
         )  # fmt: skip
 
     def moved(self, place: Floats | None) -> Blobs:

@@ -1,0 +1,95 @@
+"""Two aircraft that share plots stay two tracks, under each kind of association."""
+
+import numpy as np
+import pytest
+
+from vidtrack.associate.hard import GNN
+from vidtrack.config.load import load
+from vidtrack.run.radar import track_plots
+from vidtrack.scan import Scan
+from vidtrack.simulate.radar_scenarios import simulate_radar
+from vidtrack.simulate.radar_write import write_radar
+from vidtrack.state import gather, restore
+from vidtrack.tracking.picture.picture import NoPicture
+from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracking.unresolved.cell import PolarCell
+from vidtrack.tracking.unresolved.unresolved import Unresolved
+from vidtrack.tracks import MERGED, TENTATIVE
+
+SEED = 404
+
+
+@pytest.fixture(scope="module")
+def parting(tmp_path_factory):
+    """Plots of a pair, and the scans in which it gives one plot."""
+    folder = tmp_path_factory.mktemp("parting")
+    seen = simulate_radar("radar-parting", SEED)
+    write_radar(seen, folder)
+    return folder / "plots.csv", np.flatnonzero(seen.merged[0]), seen
+
+
+@pytest.mark.parametrize("method", ["gnn", "jpda", "mht"])
+def test_two_tracks_go_through_a_stretch_with_one_plot(parting, method):
+    plots, together, seen = parting
+    snapshots = [tracks for _, tracks in track_plots(plots, load(assignments=[f"tracker.method={method}"]))]
+    early = snapshots[together[0] - 1]
+    pair = early.id[(early.status != TENTATIVE)]
+    near = [np.linalg.norm(early.xy[early.id == i] - seen.states[:, together[0] - 1, :2], axis=1).min() for i in pair]
+    pair = pair[np.array(near) < 1000]
+    assert len(pair) == 2
+    merged = 0
+    for scan in range(together[0], together[-1] + 1):
+        tracks = snapshots[scan]
+        assert set(pair) <= set(tracks.id), scan
+        mine = np.isin(tracks.id, pair)
+        merged += (tracks.status[mine] == MERGED).all()
+        groups = tracks.group[mine]
+        assert (groups >= 0).all() == (tracks.status[mine] == MERGED).all()
+        assert groups[0] == groups[1]
+    assert merged > 0.8 * len(together)
+    last = snapshots[-1]
+    assert set(pair) <= set(last.id)
+    assert (last.exchange[np.isin(last.id, pair)] > 0.1).all()
+    told = [event for tracks in snapshots for event in tracks.events if event.track_id in pair]
+    assert {"merge", "split"} <= {event.kind for event in told}
+    assert any("exchanged with probability" in event.reason for event in told)
+
+
+def tracker():
+    return Tracker(
+        associate=GNN(), picture=NoPicture(), sharing=Unresolved(PolarCell((0.0, 0.0), (150.0, 0.01))),
+        clutter_density=1e-9,
+    )  # fmt: skip
+
+
+def scans(count):
+    """Two targets on parallel courses 5 km away, 40 m apart in range: one plot of both in each scan."""
+    for k in range(1, count):
+        yield Scan(float(k), np.array([[10.0 * k, 5000.0]]), 4 * np.eye(2))
+
+
+def test_the_middle_is_followed_and_the_difference_less_and_less_known():
+    run = tracker()
+    run.add(0.0, np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0]]), np.tile(np.diag([4.0, 1, 4, 1]), (2, 1, 1)))
+    wide = []
+    for scan in scans(20):
+        tracks = run.step(scan)
+        assert len(tracks) == 2
+        wide.append(tracks.xy_cov[0, 1, 1])
+    assert (tracks.status == MERGED).all()
+    np.testing.assert_allclose(tracks.xy.mean(axis=0), [190, 5000], atol=2)
+    assert wide[-1] > wide[5] > wide[0]
+    assert wide[-1] < 150**2
+
+
+def test_a_saved_state_goes_on_as_if_it_had_not_been_saved():
+    first, second = tracker(), tracker()
+    steps = list(scans(14))
+    first.add(0.0, np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0]]), np.tile(np.diag([4.0, 1, 4, 1]), (2, 1, 1)))
+    for scan in steps[:8]:
+        first.step(scan)
+    restore(second, gather(first))
+    for scan in steps[8:]:
+        ours, theirs = first.step(scan), second.step(scan)
+        np.testing.assert_array_equal(ours.x, theirs.x)
+        np.testing.assert_array_equal(ours.group, theirs.group)

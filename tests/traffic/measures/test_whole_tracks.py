@@ -1,0 +1,63 @@
+"""Speeds, classes and the scale in the figures, from edges that were seen."""
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from drawn_runs import CALIBRATED, site, straight, write_run
+
+from vidtrack.traffic.measures.measure import measured
+
+CAR_PX = (43.0, 17.5)
+
+
+def run_with_edges(folder, tracks, size=CAR_PX):
+    """A finished run from straight above, 10 px/m, whose rows have a speed that is wrong and edges that are right."""
+    write_run(folder, tracks, metres=True)
+    table = pq.read_table(folder / "tracks.parquet")
+    x, y = table["x_px"].to_numpy(), table["y_px"].to_numpy()
+    (wide, high), column = size, table.column_names.index("speed_kmh")
+    table = table.set_column(column, "speed_kmh", pa.array(0.8 * table["speed_kmh"].to_numpy()))
+    edges = {"left": x - wide / 2, "top": y - high / 2, "right": x + wide / 2, "bottom": y + high / 2}
+    for side, values in edges.items():
+        table = table.append_column(f"seen_{side}_px", pa.array(values))
+    pq.write_table(table, folder / "tracks.parquet")
+    return [str(folder)]
+
+
+def test_crossings_have_the_speed_size_and_class_of_the_whole_track(tmp_path):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    rows = measured(runs, site(CALIBRATED)).tables["crossings"].to_pylist()
+    assert [row["gate"] for row in rows] == ["west", "middle", "east"]
+    for row in rows:
+        assert row["speed_kmh"] == pytest.approx(43.2, rel=0.005)
+        assert 0 < row["speed_sigma_kmh"] < 1.0
+        assert row["length_m"] == pytest.approx(4.3, abs=0.3)
+        assert row["class"] == "car"
+        assert row["class_probability"] > 0.8
+
+
+def test_a_site_s_own_classes_are_by_length(tmp_path):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    own = site(CALIBRATED, classes={"short": (0.0, 3.0), "middling": (3.0, 6.0)})
+    rows = measured(runs, own).tables["crossings"].to_pylist()
+    assert {row["class"] for row in rows} == {"middling"}
+    assert min(row["class_probability"] for row in rows) > 0.9
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_the_report_says_when_vehicles_come_out_too_large(tmp_path, factor):
+    tracks = [straight(track, 3.0 * track, 20, 200 + 5 * track, 120.0, 4.0) for track in range(1, 15)]
+    runs = run_with_edges(tmp_path / "run", tracks, tuple(factor * side for side in CAR_PX))
+    scale = measured(runs, site(CALIBRATED)).report["scale"]
+    assert scale["vehicles"] == 14
+    assert scale["factor"] == pytest.approx(factor, rel=0.12)
+    assert scale["off"] == (factor != 1.0)
+
+
+def test_runs_of_earlier_versions_have_the_speeds_of_their_rows(tmp_path):
+    write_run(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)], metres=True)
+    found = measured([str(tmp_path / "run")], site(CALIBRATED))
+    assert found.report["scale"] is None
+    assert np.allclose(found.tables["crossings"]["speed_kmh"].to_numpy(), 43.2)
+    assert found.tables["crossings"]["class"].to_pylist() == [None] * 3

@@ -1,0 +1,1 @@
+"""Unresolved targets: tracks of several point targets that share one measurement."""

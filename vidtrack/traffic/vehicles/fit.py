@@ -1,0 +1,278 @@
+"""Fits a cuboid of constant size on a smooth path to the boxes of a track.
+
+The unknowns are the middle of the footprint at each knot p_k, and for the whole track the length, width and height of
+the vehicle and by how much its boxes are too wide (px). The sum of squares has, each over its variance,
+
+    edges of the boxes - edges of the cuboid             by `cuboid.box_edges`; weights of Student's t for edges far off
+    (p_k+1 - p_k) / h_k - (p_k - p_k-1) / h_k-1          the velocity is a random walk, with variance JOLT per second
+    size - what vehicles are like                        wide: classes are told apart afterwards
+
+By Gauss and Newton: the p_k are coupled to two neighbours on either side, so their normal matrix is a band; the four
+numbers of the whole track are eliminated first (Schur complement). The vehicle heads along its path.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.compiled import kernel
+from vidtrack.traffic.vehicles.cuboid import box_edges
+
+SIZE = 4
+"""Numbers of the whole track: length, width, height [m], and by how much the boxes are too wide [px]."""
+MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 1.0, 1.2, 1.0])
+"""The size as it is known beforehand."""
+_LEAST = np.array([0.3, 0.3, 0.5, -5.0])
+_JOLT = 1.0
+"""m2/s3; by how much the variance of a velocity grows in a second"""
+_EDGE_PX, _ROW_PX = 0.4, 1.8
+"""px; standard deviation of the edges of a knot, and that of one row which goes down with their number"""
+_SHAPE_M = np.array([0.10, 0.30, 0.10, 0.06])
+"""m; by which a vehicle's outline is no cuboid's: left, top, right, bottom"""
+_FREEDOM = 4.0
+"""of Student's t"""
+_FAR, _FAR_SHARE = 3.0, 0.2
+"""Standard deviations by which an edge is far off; where more than a share are, the track is not of one vehicle."""
+_COARSE = (10.0, 3.0, 1.0, 1.0, 1.0)
+"""Factors of the standard deviations in the rounds: what is far off loses its weight only when the path is known."""
+_HEADING_M = 4.0
+"""m of path that a heading is taken from"""
+_DRIFT = 0.006
+"""Standard deviation of a speed, as a share, because shadows and corners that come into view move the edges along: the
+errors of the vehicles of one site lean to one side by as much"""
+_LEAST_MISFIT = 0.05
+"""Of noise as it is stated above: it is not taken to be less, however well a short track fits."""
+_BAND = 4
+"""Places beside the diagonal of the normal matrix, for two coordinates and two neighbours"""
+_LEAST_KNOTS, _LEAST_PATH_M, _SPEED_KNOTS = 3, 2.0, 4
+"""For a size; a speed needs more."""
+
+
+@kernel(error_model="numpy")
+def fit(
+    first: Ints, t: Floats, edge: Floats, rows: Floats, start: Floats, G: Floats, up: Floats,
+    asked_of: Ints, asked: Floats, path: Floats, size: Floats, cov: Floats, quality: Floats, speed: Floats,
+) -> None:  # fmt: skip
+    """Fit T tracks of K knots.
+
+    first (T + 1,), t (K,), edge (K, 4), rows (K,) as in `Knots`, edges straightened; start (K, 2) m rough places
+    G (3, 3), up (3,) as in `cuboid`
+    asked_of (T + 1,) where the times of each track begin among those at which speeds are asked for, asked (W,) s
+
+    Writes path (K, 2), size (T, SIZE), cov (T, SIZE, SIZE), NaN for those that are too short; speed (W, 6): metres per
+    second and standard deviation, the velocity's direction (2,), the numbers of the two knots around that time.
+    """
+    most = 0
+    for i in range(len(first) - 1):
+        most = max(most, first[i + 1] - first[i])
+    band, right = np.empty((2 * most, _BAND + 1)), np.empty((2 * most, SIZE + 1))
+    coupling, heading = np.empty((2 * most, SIZE)), np.empty((most, 2))
+    whole, rest = np.empty((SIZE, SIZE)), np.empty(SIZE)
+    for i in range(len(first) - 1):
+        a, b = first[i], first[i + 1]
+        size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
+        speed[asked_of[i] : asked_of[i + 1]] = np.nan
+        path[a:b] = start[a:b]
+        driven = np.hypot(start[b - 1, 0] - start[a, 0], start[b - 1, 1] - start[a, 1]) if b > a else 0.0
+        if b - a < _LEAST_KNOTS or not driven > _LEAST_PATH_M:
+            continue
+        size[i] = MEAN
+        n = 2 * (b - a)
+        misfit = strange = 0.0
+        for coarse in _COARSE:
+            _headings(path[a:b], heading)
+            misfit, strange = _normal(t[a:b], edge[a:b], rows[a:b], path[a:b], heading, size[i], G, up, coarse,
+                                      band[:n], right[:n], whole, rest)  # fmt: skip
+            coupling[:n] = right[:n, :SIZE]
+            _factor(band[:n])
+            _solve(band[:n], right[:n])
+            _eliminate(coupling[:n], right[:n], whole, rest)
+            step = np.maximum(np.linalg.solve(whole, rest), _LEAST - size[i])
+            size[i] += step
+            for k in range(b - a):
+                for axis in range(2):
+                    change = right[2 * k + axis, SIZE]
+                    for s in range(SIZE):
+                        change -= right[2 * k + axis, s] * step[s]
+                    path[a + k, axis] += change
+        cov[i] = np.linalg.inv(whole)
+        quality[i] = max(misfit, _LEAST_MISFIT)
+        if strange > _FAR_SHARE:
+            size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
+            continue
+        if b - a < _SPEED_KNOTS:
+            continue
+        for w in range(asked_of[i], asked_of[i + 1]):
+            _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], cov[i], quality[i], speed[w])
+            speed[w, 4] += a
+            speed[w, 5] += a
+
+
+@kernel(error_model="numpy")
+def _headings(path: Floats, heading: Floats) -> None:
+    """Write unit vectors (K, 2) along a path (K, 2), over some metres of it."""
+    last = len(path) - 1
+    for k in range(last + 1):
+        i, j = k, k
+        while True:
+            dx, dy = path[j, 0] - path[i, 0], path[j, 1] - path[i, 1]
+            if dx * dx + dy * dy >= _HEADING_M**2 or (i == 0 and j == last):
+                break
+            i, j = max(i - 1, 0), min(j + 1, last)
+        far = max(np.hypot(dx, dy), 1e-9)
+        heading[k, 0], heading[k, 1] = dx / far, dy / far
+
+
+@kernel(error_model="numpy")
+def _residuals(
+    edge: Floats, rows: float, p: Floats, e: Floats, size: Floats, G: Floats, up: Floats, coarse: float,
+    state: Floats, model: Floats, by_state: Floats, residual: Floats, by_size: Floats, weight: Floats,
+) -> tuple[float, int]:  # fmt: skip
+    """Write residuals (4,), their derivatives by_state (4, 5) and by_size (4, SIZE), and weights (4,) of a knot.
+
+    Returns the weighted sum of squares, and how many edges are far off.
+    """
+    state[0], state[1] = p[0], p[1]
+    state[2], state[3], state[4] = size[0], size[1], size[2]
+    scale = box_edges(G, up, state, e, model, by_state)
+    total, strange = 0.0, 0
+    for side in range(4):
+        sign = -1.0 if side < 2 else 1.0
+        residual[side] = edge[side] - model[side] - sign * size[3]
+        weight[side] = 0.0
+        if np.isnan(residual[side]):
+            residual[side] = 0.0
+            continue
+        variance = _EDGE_PX**2 + _ROW_PX**2 / rows + (_SHAPE_M[side] * scale) ** 2
+        variance *= coarse**2
+        far = residual[side] ** 2 / variance
+        strange += far > _FAR**2
+        weight[side] = (_FREEDOM + 1) / (_FREEDOM + far) / variance
+        total += weight[side] * residual[side] ** 2
+        by_size[side, 0], by_size[side, 1], by_size[side, 2] = by_state[side, 2], by_state[side, 3], by_state[side, 4]
+        by_size[side, 3] = sign
+    return total, strange
+
+
+@kernel(error_model="numpy")
+def _normal(
+    t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
+    coarse: float, band: Floats, right: Floats, whole: Floats, rest: Floats,
+) -> tuple[float, float]:  # fmt: skip
+    """Write the normal equations: of the path band (2 K, _BAND + 1) and, with its coupling to the size and its right
+    side, right (2 K, SIZE + 1); of the size whole (SIZE, SIZE) and rest (SIZE,).
+
+    Returns the misfit, 1 where the noise is as stated, and the share of edges that are far off.
+    """
+    band[:], right[:], whole[:], rest[:] = 0.0, 0.0, 0.0, 0.0
+    state, model, by_state = np.empty(5), np.empty(4), np.zeros((4, 5))
+    residual, by_size, weight = np.zeros(4), np.zeros((4, SIZE)), np.zeros(4)
+    total, strange, count = 0.0, 0, 0
+    for s in range(SIZE):
+        whole[s, s] = 1 / SIGMA[s] ** 2
+        rest[s] = (MEAN[s] - size[s]) / SIGMA[s] ** 2
+    for k in range(len(t)):
+        squares, far = _residuals(edge[k], rows[k], path[k], heading[k], size, G, up, coarse, state, model, by_state,
+                                  residual, by_size, weight)  # fmt: skip
+        total += squares
+        strange += far
+        for side in range(4):
+            if weight[side] == 0:
+                continue
+            count += 1
+            for i in range(2):
+                wi = weight[side] * by_state[side, i]
+                for j in range(i + 1):
+                    band[2 * k + i, i - j] += wi * by_state[side, j]
+                for s in range(SIZE):
+                    right[2 * k + i, s] += wi * by_size[side, s]
+                right[2 * k + i, SIZE] += wi * residual[side]
+            for s in range(SIZE):
+                for r in range(SIZE):
+                    whole[s, r] += weight[side] * by_size[side, s] * by_size[side, r]
+                rest[s] += weight[side] * by_size[side, s] * residual[side]
+    c = np.empty(3)
+    for k in range(1, len(t) - 1):
+        before, after = t[k] - t[k - 1], t[k + 1] - t[k]
+        c[0], c[1], c[2] = 1 / before, -1 / before - 1 / after, 1 / after
+        w = 2 / (_JOLT * (before + after))
+        for axis in range(2):
+            bend = c[0] * path[k - 1, axis] + c[1] * path[k, axis] + c[2] * path[k + 1, axis]
+            for i in range(3):
+                for j in range(i + 1):
+                    band[2 * (k - 1 + i) + axis, 2 * (i - j)] += w * c[i] * c[j]
+                right[2 * (k - 1 + i) + axis, SIZE] -= w * c[i] * bend
+    return total / max(count, 1), strange / max(count, 1)
+
+
+@kernel(error_model="numpy")
+def _factor(band: Floats) -> None:
+    """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place."""
+    for i in range(len(band)):
+        for d in range(min(i, _BAND), -1, -1):
+            j = i - d
+            value = band[i, d]
+            for m in range(max(i - _BAND, j - _BAND, 0), j):
+                value -= band[i, i - m] * band[j, j - m]
+            if d == 0:
+                band[i, 0] = np.sqrt(max(value, 1e-12))
+            else:
+                band[i, d] = value / band[j, 0]
+
+
+@kernel(error_model="numpy")
+def _solve(band: Floats, right: Floats) -> None:
+    """Solve for all right sides (n, m), in place, with the factor."""
+    n = len(band)
+    for i in range(n):
+        for d in range(1, min(i, _BAND) + 1):
+            for c in range(right.shape[1]):
+                right[i, c] -= band[i, d] * right[i - d, c]
+        for c in range(right.shape[1]):
+            right[i, c] /= band[i, 0]
+    for i in range(n - 1, -1, -1):
+        for d in range(1, min(n - 1 - i, _BAND) + 1):
+            for c in range(right.shape[1]):
+                right[i, c] -= band[i + d, d] * right[i + d, c]
+        for c in range(right.shape[1]):
+            right[i, c] /= band[i, 0]
+
+
+@kernel(error_model="numpy")
+def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) -> None:
+    """Take the path out of the size's equations (Schur complement): coupling (2 K, SIZE), solved (2 K, SIZE + 1)."""
+    for k in range(len(coupling)):
+        for s in range(SIZE):
+            for r in range(SIZE):
+                whole[s, r] -= coupling[k, s] * solved[k, r]
+            rest[s] -= coupling[k, s] * solved[k, SIZE]
+
+
+@kernel(error_model="numpy")
+def _speed(
+    t: Floats, path: Floats, asked: float, band: Floats, right: Floats, cov: Floats, misfit: float, speed: Floats
+) -> None:
+    """Write the slope of the path at a time, and its error (6,)."""
+    if not t[0] <= asked <= t[-1]:
+        return
+    j = 1
+    while t[j] < asked:
+        j += 1
+    i = j - 1
+    h = t[j] - t[i]
+    vx, vy = (path[j, 0] - path[i, 0]) / h, (path[j, 1] - path[i, 1]) / h
+    v = np.hypot(vx, vy)
+    ex, ey = vx / max(v, 1e-9), vy / max(v, 1e-9)
+    a = np.zeros((len(band), 1))
+    a[2 * j, 0], a[2 * j + 1, 0], a[2 * i, 0], a[2 * i + 1, 0] = ex / h, ey / h, -ex / h, -ey / h
+    by_size = np.zeros(SIZE)
+    for s in range(SIZE):
+        for r in (2 * i, 2 * i + 1, 2 * j, 2 * j + 1):
+            by_size[s] -= a[r, 0] * right[r, s]
+    _solve(band, a)
+    variance = (ex * (a[2 * j, 0] - a[2 * i, 0]) + ey * (a[2 * j + 1, 0] - a[2 * i + 1, 0])) / h * misfit
+    for s in range(SIZE):
+        for r in range(SIZE):
+            variance += by_size[s] * cov[s, r] * by_size[r] * misfit
+    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance + (_DRIFT * v) ** 2), ex, ey, i, j

@@ -1,0 +1,122 @@
+"""Tracks thinned out to knots: the mean edges of the boxes that were seen over some tenths of a second of driving."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
+
+STEP_S, STEP_M = 0.2, 0.5
+"""A knot ends when it has lasted so long and the vehicle has moved so far: one that stands makes no knots."""
+_BEGIN, _X, _Y, _TIME, _ROWS, _EDGE, _SEEN = 0, 1, 2, 3, 4, 5, 9
+COLUMNS = 13
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Knots:
+    """K knots in order of tracks and times.
+
+    first  (T + 1,) where the knots of each track begin
+    t      (K,) s; mean time
+    edge   (K, 4) px; mean left, top, right and lower edges of the boxes, NaN where none was seen
+    rows   (K,) how many boxes
+    """
+
+    first: Ints
+    t: Floats
+    edge: Floats
+    rows: Floats
+
+    def between(self, begin: int, end: int) -> Knots:
+        """Those of the tracks begin, begin + 1, ..., end - 1."""
+        first = self.first[begin : end + 1]
+        rows = slice(first[0], first[-1])
+        return Knots(first - first[0], self.t[rows], self.edge[rows], self.rows[rows])
+
+    def only(self, chosen: Mask) -> Knots:
+        """The knots of a mask (K,)."""
+        before = np.concatenate([[0], np.cumsum(chosen)])
+        return Knots(before[self.first], self.t[chosen], self.edge[chosen], self.rows[chosen])
+
+
+class Knotting:
+    """Takes rows in order of time, makes knots of them."""
+
+    def __init__(self) -> None:
+        self._open = np.full((0, COLUMNS), np.nan)
+        self._done: list[tuple[Ints, Floats, Floats]] = []
+
+    def add(self, track: Ints, t: Floats, xy: Floats, edge: Floats) -> None:
+        """Look at rows: track (N,), t (N,) s, xy (N, 2) m roughly, edge (N, 4) px."""
+        if len(track) == 0:
+            return
+        tracks = int(track.max()) + 1
+        if tracks > len(self._open):
+            more = max(tracks, 2 * len(self._open)) - len(self._open)
+            self._open = np.vstack([self._open, np.full((more, COLUMNS), np.nan)])
+        who, done = np.empty(len(track), np.int64), np.empty((len(track), 6))
+        count = _gather(track, t, xy, edge, self._open, who, done)
+        self._keep(who[:count], done[:count])
+
+    def knots(self, tracks: int) -> Knots:
+        """All knots of `tracks` tracks, with those that rows are still gathered for; what is kept is given away."""
+        open_ = np.flatnonzero(self._open[:, _ROWS] > 0)
+        rest = np.empty((len(open_), 6))
+        _means(self._open[open_], rest)
+        self._keep(open_, rest)
+        who, t, values = (np.concatenate(column) for column in zip(*self._done, strict=True))
+        self._done.clear()
+        order = np.lexsort((t, who))
+        first = np.searchsorted(who[order], np.arange(tracks + 1))
+        return Knots(first, t[order], values[order, :4].astype(float), values[order, 4].astype(float))
+
+    def _keep(self, who: Ints, done: Floats) -> None:
+        """A day has millions of knots: edges in single precision are as good as a thousandth of a pixel."""
+        self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))
+
+
+@kernel(error_model="numpy")
+def _mean(knot: Floats, done: Floats) -> None:
+    """Write a knot (COLUMNS,) as mean time, four mean edges, rows (6,)."""
+    done[0] = knot[_TIME] / knot[_ROWS]
+    for side in range(4):
+        done[1 + side] = knot[_EDGE + side] / knot[_SEEN + side]  # 0 / 0: never seen
+    done[5] = knot[_ROWS]
+
+
+@kernel
+def _means(knots: Floats, done: Floats) -> None:
+    for i in range(len(knots)):
+        _mean(knots[i], done[i])
+
+
+@kernel(error_model="numpy")
+def _gather(track: Ints, t: Floats, xy: Floats, edge: Floats, open_: Floats, who: Ints, done: Floats) -> int:
+    """Add rows to the open knots (T, COLUMNS); writes the tracks and values of those that end, returns their number."""
+    count = 0
+    for i in range(len(track)):
+        if np.isnan(edge[i, 3]) or np.isnan(xy[i, 0]):
+            continue
+        knot = open_[track[i]]
+        if (
+            knot[_ROWS] > 0
+            and t[i] - knot[_BEGIN] >= STEP_S
+            and np.hypot(xy[i, 0] - knot[_X], xy[i, 1] - knot[_Y]) >= STEP_M
+        ):
+            _mean(knot, done[count])
+            who[count] = track[i]
+            count += 1
+            knot[_ROWS] = 0
+        if not knot[_ROWS] > 0:
+            knot[:] = 0
+            knot[_BEGIN], knot[_X], knot[_Y] = t[i], xy[i, 0], xy[i, 1]
+        knot[_TIME] += t[i]
+        knot[_ROWS] += 1
+        for side in range(4):
+            if not np.isnan(edge[i, side]):
+                knot[_EDGE + side] += edge[i, side]
+                knot[_SEEN + side] += 1
+    return count

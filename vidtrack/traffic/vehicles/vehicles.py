@@ -1,0 +1,168 @@
+"""All vehicles of a day: their rows go in one after the other, their speeds, sizes and classes come out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.vehicles.classes import Classified, classified
+from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
+from vidtrack.traffic.vehicles.knots import Knots, Knotting
+from vidtrack.traffic.vehicles.pieces import pieces
+from vidtrack.traffic.vehicles.scale import Scale, scale_of
+
+_BATCH = 4096
+"""Tracks that are fitted at a time, which bounds the memory."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Speeds:
+    """W speeds, NaN where they are not known: (W,) m/s, standard deviations of the own and of the shared error."""
+
+    speed: Floats
+    own: Floats
+    shared: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """Speeds that were asked for; the classes of T tracks, NaN where there is no fit; the calibration's scale."""
+
+    speeds: Speeds
+    classes: Classified
+    scale: Scale | None
+
+
+class Vehicles:
+    """Takes rows in order of time; None for the ground: nothing is known in metres."""
+
+    def __init__(self, ground: Ground | None) -> None:
+        self._ground = ground
+        self._knotting = Knotting()
+
+    def add(self, track: Ints, t: Floats, xy: Floats, edge: Floats) -> None:
+        """Look at rows: track (N,), t (N,) s, xy (N, 2) m, edge (N, 4) px left, top, right and lower edges seen."""
+        if self._ground is not None:
+            self._knotting.add(track, t, xy, edge)
+
+    def fitted(self, tracks: int, track: Ints, t: Floats) -> Fitted | None:
+        """Speeds of tracks (W,) at times (W,) s, and the classes of all `tracks`; None without edges."""
+        if self._ground is None:
+            return None
+        knots = self._knotting.knots(tracks)
+        if len(knots.t) == 0:
+            return None
+        speeds, sizes = np.full((3, len(t)), np.nan), []
+        for begin in range(0, tracks, _BATCH):
+            asked = np.flatnonzero((track >= begin) & (track < begin + _BATCH))
+            some = knots.between(begin, min(begin + _BATCH, tracks))
+            speeds[:, asked], found = _fitted(self._ground, some, track[asked] - begin, t[asked])
+            sizes.append(replace(found, track=found.track + begin))
+        told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
+        scale = scale_of(told.information, told.vector, told.speed)
+        return Fitted(Speeds(*speeds), _classes(told, tracks), scale)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sizes:
+    """What B tracks (B,) say about the size s of their vehicles, exp(-s' A s / 2 + b' s), and their mean speeds [m/s].
+
+    information (B, 3, 3) A, vector (B, 3) b, speed (B,)
+    """
+
+    track: Ints
+    information: Floats
+    vector: Floats
+    speed: Floats
+
+
+def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Floats, _Sizes]:
+    """(3, W) speeds as in `Speeds`, and sizes, of some tracks; each time is looked up in the piece that it lies in."""
+    with np.errstate(invalid="ignore"):
+        place = ground.metres(ground.inside(_foot(knots.edge)))
+    sure = np.isfinite(place[:, 0])
+    knots, place = knots.only(sure), place[sure]
+    first = pieces(ground, knots, place)
+    owner = np.searchsorted(knots.first, first[:-1], side="right") - 1
+    of_piece = _piece_of(knots, first, owner, track, t)
+    order = np.argsort(of_piece, kind="stable")
+    asked_of = np.searchsorted(of_piece[order], np.arange(len(owner) + 1))
+    path, speed = np.empty((len(knots.t), 2)), np.full((len(t), 6), np.nan)
+    size, cov, misfit = np.empty((len(owner), SIZE)), np.empty((len(owner), SIZE, SIZE)), np.empty(len(owner))
+    pose = ground.pose()
+    up = np.zeros(3) if pose is None else pose.up
+    fit(
+        first, knots.t, _straight(ground, knots.edge), knots.rows, place, ground.homography, up,
+        asked_of, t[order], path, size, cov, misfit, speed,
+    )  # fmt: skip
+    result = np.empty((3, len(t)))
+    result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
+    result[2, order] = _by_shared(ground, knots.t, path, speed)
+    return result, _sizes(knots.t, first, owner, path, size, cov, misfit)
+
+
+def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats:
+    """(W,) m/s; standard deviation of speeds (W, 6) by the calibration: it moves the two ends of a step apart."""
+    sigma = np.full(len(speed), np.nan)
+    known = np.flatnonzero(np.isfinite(speed[:, 0]))
+    i, j = speed[known, 4].astype(int), speed[known, 5].astype(int)
+    apart = ground.by_shared_error(path[j]) - ground.by_shared_error(path[i])
+    along = np.einsum("wi,wik->wk", speed[known, 2:4], apart) / (t[j] - t[i])[:, None]
+    sigma[known] = np.linalg.norm(along, axis=1)
+    return sigma
+
+
+def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats) -> _Sizes:
+    """By the piece of each track that tells most; without what was known beforehand."""
+    worth = np.nan_to_num(np.diff(first) / misfit)
+    order = np.lexsort((worth, owner))
+    best = order[np.diff(owner[order], append=-1) != 0]
+    best = best[worth[best] > 0]
+    begin, end = first[best], first[best + 1] - 1
+    known = np.diag(1 / SIGMA[:3] ** 2)
+    inverse = np.linalg.inv(cov[best, :3, :3])
+    vector = np.einsum("tij,tj->ti", inverse, size[best, :3]) - known @ MEAN[:3]
+    return _Sizes(
+        owner[best],
+        (inverse - known) / misfit[best, None, None],
+        vector / misfit[best, None],
+        np.linalg.norm(path[end] - path[begin], axis=1) / (t[end] - t[begin]),
+    )
+
+
+def _classes(told: _Sizes, tracks: int) -> Classified:
+    """The classes of all tracks; NaN for those that tell nothing."""
+    found = classified(told.information, told.vector, told.speed)
+    parts = found.probability, found.size, found.sigma
+    result = [np.full((tracks, part.shape[1]), np.nan) for part in parts]
+    for whole, part in zip(result, parts, strict=True):
+        whole[told.track] = part
+    return Classified(*result)
+
+
+def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) -> Ints:
+    """(W,) the piece of a track (W,) that a time (W,) lies in or after; len(owner) where there is none."""
+    begin = np.append(knots.t, np.inf)[first[:-1]]
+    day = 2 * (max(np.abs(knots.t).max(initial=0), np.abs(t).max(initial=0)) + 1)  # longer than all times
+    at = np.searchsorted(begin + day * owner, t + day * track, side="right") - 1
+    return np.where(np.append(owner, -1)[at] == track, at, len(owner))
+
+
+def _foot(edge: Floats) -> Floats:
+    """(N, 2) middles of the lower edges [px]; of one whose side the border cuts, its other corner."""
+    left, _, right, bottom = edge.T
+    left, right = np.where(np.isnan(left), right, left), np.where(np.isnan(right), left, right)
+    return np.column_stack([(left + right) / 2, bottom])
+
+
+def _straight(ground: Ground, edge: Floats) -> Floats:
+    """(K, 4) edges without the lens's distortion, each at its middle."""
+    if ground.lens is None:
+        return edge
+    left, top, right, bottom = edge.T
+    x, y = (left + right) / 2, (top + bottom) / 2
+    points = ((left, y, 0), (x, top, 1), (right, y, 0), (x, bottom, 1))
+    return np.column_stack([ground.straight(np.column_stack([a, b]))[:, axis] for a, b, axis in points])
