@@ -65,6 +65,8 @@ Examples:
 def command(options: SiteOptions) -> None:
     """Draw gates, zones, sections, movements and calibration points over the tracks of RUN, in a browser.
 
+    RUN may still go on: vidtrack live --site uses what Save writes from then on.
+
     The address of the page is printed; it works in a browser on this machine, until Ctrl-C. Counts follow the gates
     while they are drawn, with the rules of vidtrack measure. Only Save in the page writes the site's file.
     """
