@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from vidtrack.errors import Error
 from vidtrack.output.linefile import Every
 from vidtrack.traffic.metres import used_site
 
@@ -42,7 +41,7 @@ class FollowedSite:
         self._read = mark
         try:
             found = used_site(self._path, *self._size)
-        except (Error, OSError, ValueError, ArithmeticError) as error:
+        except Exception as error:  # whatever is in the file, the results go on
             self._tell(f"{_first_line(error)}; the run goes on with the site that it has")
             return False
         same = found.text == self.used.text
