@@ -18,7 +18,7 @@ from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
-from vidtrack.run.live.parts import Part
+from vidtrack.run.live.part import Part, columns_of
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.measures.runs import site_of
 from vidtrack.traffic.metres import footprints_of
@@ -143,8 +143,9 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
     blank = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     text = (road / "site.toml").read_text()
     subject = Subject("camera", Settings(), (HEIGHT, WIDTH), 25.0, lambda: blank, dict, None, prints, text)
-    part = Part(folder, subject, decisions=False, columns=(*VIDEO, *ROAD))
-    part.write([make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])], "")
+    part = Part(folder, subject, decisions=False)
+    steps = [make_step(0, [(1, "c", 640.0, 400.0)]), make_step(1, [(1, "c", 642.0, 400.0)])]
+    part.write(steps, steps, track_rows(steps, columns_of(subject), prints))
     part.finish()
     rows = rows_of(folder / "tracks.csv")
     assert list(rows[0]) == [column.name for column in (*VIDEO, *ROAD)]

@@ -90,7 +90,9 @@ Examples:
 @click.option(
     "--every-frame", is_flag=True, default=None, help="Track every frame, and fall behind rather than drop one."
 )
-@click.option("--roll", metavar="TIME", help="Results go on in a new sub-folder after 10m, 1h, 1d, ...")
+@click.option(
+    "--roll", metavar="TIME", help="Results go on in a new sub-folder after 10m, 1h, 1d, ...  [with --keep, --site: 1h]"
+)
 @click.option(
     "--keep",
     "keeps",

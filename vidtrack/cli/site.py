@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +17,8 @@ from vidtrack.cli.options import receives, start_log
 if TYPE_CHECKING:
     from vidtrack.serve.site.app import Desk, Picture
     from vidtrack.traffic.site import Site
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +65,8 @@ Examples:
 def command(options: SiteOptions) -> None:
     """Draw gates, zones, sections, movements and calibration points over the tracks of RUN, in a browser.
 
+    RUN may still go on: vidtrack live --site uses what Save writes from then on.
+
     The address of the page is printed; it works in a browser on this machine, until Ctrl-C. Counts follow the gates
     while they are drawn, with the rules of vidtrack measure. Only Save in the page writes the site's file.
     """
@@ -92,7 +98,6 @@ def command(options: SiteOptions) -> None:
 def desk_of(options: SiteOptions) -> Desk:
     """What the options ask for. Raises an Error for a run, a site or a picture that does not fit."""
     from vidtrack.errors import SourceError
-    from vidtrack.recording.retention import parts_of
     from vidtrack.serve.site.app import Desk
     from vidtrack.serve.site.file import SiteFile
     from vidtrack.serve.site.plan import read_world
@@ -100,7 +105,7 @@ def desk_of(options: SiteOptions) -> Desk:
     from vidtrack.traffic.site import Site
 
     run = options.run.resolve()
-    parts = parts_of(run) or [options.run]
+    parts = _with_tracks(run) or [options.run]
     recount = Recount([str(part) for part in parts])
     file = SiteFile(options.site or _tracked_with(parts[-1]) or run.with_name(f"{run.name}-site.toml"))
     if not file.path.parent.is_dir():
@@ -114,8 +119,30 @@ def desk_of(options: SiteOptions) -> Desk:
     if options.plan is not None:
         read_world(options.plan)  # refuses what is none
         plan = options.plan, _encoded(str(options.plan), None)
-    scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts[-1])
+    scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts)
     return Desk(run.name, recount, file, new, scene, plan)
+
+
+def _with_tracks(run: Path) -> list[Path]:
+    """The parts of a live run that can be drawn over, oldest first; the run may go on. Empty for any other run.
+
+    Raises SourceError where a live run has no such part.
+    """
+    from vidtrack.errors import SourceError
+    from vidtrack.recording.retention import parts_of
+    from vidtrack.traffic.measures.runs import open_day
+
+    parts, opened = parts_of(run), []
+    for part in parts:
+        with suppress(SourceError):  # it has just begun, or only its counts are kept
+            open_day([str(part)], None)
+            opened.append(part)
+    if parts and not opened:
+        raise SourceError(
+            f"no part of {run} has tracks to draw over: wait until the camera delivers; with output.level=tracks until "
+            "the first part has ended; with output.level=counts there are none"
+        )
+    return opened
 
 
 def _tracked_with(run: Path) -> Path | None:
@@ -130,14 +157,16 @@ def _name(folder: str) -> str:
     return re.sub(r"[^\w .-]+", "_", folder).strip("_ .-")[:64].strip() or "site"
 
 
-def _scene(run: Path) -> Picture | None:
-    """The run's scene; of a run without one, its paths over it."""
+def _scene(runs: list[Path]) -> Picture | None:
+    """The newest scene; of a run without one, its paths over it. A part of a live run has one when it has ended."""
     from vidtrack.output.scene import SCENE
     from vidtrack.serve.site.app import Picture
 
-    for name, kind in ((SCENE, "image/jpeg"), ("tracks.png", "image/png")):
-        if (run / name).is_file():
-            return Picture(name, (run / name).read_bytes(), kind)
+    for run in reversed(runs):
+        for name, kind in ((SCENE, "image/jpeg"), ("tracks.png", "image/png")):
+            if (run / name).is_file():
+                return Picture(name, (run / name).read_bytes(), kind)
+    log.warning("%s has no picture yet, so the page is grey; give one with --picture", runs[-1])
     return None
 
 

@@ -19,9 +19,22 @@ class Group(BaseModel):
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """Read a TOML file; `what` names its content in messages. Raises ConfigError if it cannot be read."""
+    return parse_toml(read_toml_text(path, what), path)
+
+
+def read_toml_text(path: Path, what: str) -> str:
+    """The text of a TOML file. Raises ConfigError if it cannot be read."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"cannot read {what} {path}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path} is not valid TOML: {error}") from None
+
+
+def parse_toml(text: str, path: Path) -> dict[str, Any]:
+    """The content of a TOML file with this text. Raises ConfigError."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise ConfigError(f"{path} is not valid TOML: {error}") from None

@@ -21,7 +21,7 @@ class LiveSettings(Group):
     retry_first: bool = False
     """a camera that cannot be opened at the start is tried without limit; false: three times. Several cameras: true"""
     roll_s: float | None = Field(None, gt=0)
-    """s; length of a sub-folder of results, aligned to the clock; None: one folder, or hourly if live.keep_* is set"""
+    """s; length of a sub-folder of results, aligned to the clock; None: one folder; 3600 with keep_* or output.site"""
     keep_s: float | None = Field(None, gt=0)
     """s; older tracks and recordings are deleted, and their counts stay; None: no limit"""
     keep_bytes: float | None = Field(None, ge=1e6)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +28,7 @@ from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
-from vidtrack.traffic.metres import footprints_of, site_text
+from vidtrack.traffic.metres import UsedSite, used_site
 from vidtrack.video.frame import Image
 from vidtrack.video.source import Source
 
@@ -49,6 +49,7 @@ class Subject:
     counter   line counter; None without counting lines
     road      positions on the road; None without a calibrated site
     site      text of the site's file; None without a site
+    classes   low and high length of each class [m]; empty without a calibrated site
     """
 
     source: str
@@ -60,6 +61,11 @@ class Subject:
     counter: LineCounter | None
     road: Footprints | None
     site: str | None = None
+    classes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def at(self, site: UsedSite) -> Subject:
+        """The same source, seen at this site."""
+        return replace(self, road=site.road, site=site.text, classes=site.classes)
 
     @property
     def lines(self) -> Sequence[Line]:
@@ -103,9 +109,9 @@ def file_subject(
         }
 
     counter = line_counter(settings, source.width, source.height)
-    road = footprints_of(settings.output.site, source.width, source.height)
-    site = site_text(settings.output.site)
-    return Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, road, site)
+    subject = Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, None)
+    site = settings.output.site
+    return subject if site is None else subject.at(used_site(site, source.width, source.height))
 
 
 def file_sinks(

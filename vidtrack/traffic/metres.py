@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,21 +14,40 @@ SITE_COPY = "site.toml"
 """Name of the copy of a site in the folder of a run."""
 
 
-def footprints_of(site: Path | None, width: int, height: int) -> Footprints | None:
-    """Where vehicles stand on the road of the site in a file; None without a site, or without a calibration in it.
+@dataclass(frozen=True, slots=True)
+class UsedSite:
+    """What a run takes from the file of a site, all of one reading.
+
+    text     of the file
+    road     where vehicles stand on the road; None without a calibration
+    classes  low and high length of each class [m]; empty without a calibration
+    """
+
+    text: str
+    road: Footprints | None
+    classes: Mapping[str, tuple[float, float]]
+
+
+def used_site(site: Path, width: int, height: int) -> UsedSite:
+    """Read the site in a file.
 
     width, height  px of the pictures. Raises ConfigError for a bad file, or pictures of another shape than the site's.
     """
-    if site is None:
-        return None
+    from vidtrack.config.group import read_toml_text
     from vidtrack.traffic.calibration.calibrate import calibrated  # loads SciPy's optimisers
     from vidtrack.traffic.footprint import Footprints
-    from vidtrack.traffic.site import read_site
+    from vidtrack.traffic.site import parse_site
 
-    drawn = read_site(site).scaled(width, height)
-    return None if drawn.calibration is None else Footprints(calibrated(drawn), (width, height))
+    text = read_toml_text(site, "site")
+    drawn = parse_site(text, site).scaled(width, height)
+    if drawn.calibration is None:
+        return UsedSite(text, None, {})
+    return UsedSite(text, Footprints(calibrated(drawn), (width, height)), drawn.classes)
 
 
-def site_text(site: Path | None) -> str | None:
-    """The text of a site's file; None without one. It was read by `footprints_of`."""
-    return None if site is None else site.read_text(encoding="utf-8")
+def footprints_of(site: Path | None, width: int, height: int) -> Footprints | None:
+    """Where vehicles stand on the road of the site in a file; None without a site, or without a calibration in it.
+
+    Raises ConfigError as `used_site` does.
+    """
+    return None if site is None else used_site(site, width, height).road

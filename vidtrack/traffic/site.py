@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import AfterValidator, AwareDatetime, BaseModel, Field, ValidationError, ValidationInfo, field_validator
 from pydantic import model_validator as whole
 
-from vidtrack.config.group import Group, read_toml
+from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.polyline import crosses_itself
 
@@ -279,7 +279,12 @@ def read_site(path: str | Path) -> Site:
     spreadsheet or a browser could take for more than a name.
     """
     path = Path(path)
-    tree = read_toml(path, "site")
+    return parse_site(read_toml_text(path, "site"), path)
+
+
+def parse_site(text: str, path: Path) -> Site:
+    """The site in a file with this text. Raises ConfigError as `read_site` does."""
+    tree = parse_toml(text, path)
     try:
         return Site.model_validate(tree)
     except ValidationError as error:

@@ -16,6 +16,7 @@ from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
+from vidtrack.traffic.measures.rows import blocks
 
 BEGAN = "2026-06-01T05:00:00.000+00:00"
 TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks", "conflicts"}
@@ -243,6 +244,15 @@ def test_a_damaged_table_is_told(tmp_path):
     (run / "tracks.parquet").write_bytes(b"PAR1 and then nothing")
     with pytest.raises(FormatError, match="is damaged"):
         measured([str(run)], site())
+
+
+def test_a_line_that_is_being_written_is_not_read(tmp_path):
+    text = "time_s,status,track_id\n"
+    for rows in ("", "0.0,confirmed,1\n", "0.0,confirmed,1\n0.04,confirmed,12\n"):
+        for rest in ("", "0.08", "0.08,confirmed,3"):
+            (tmp_path / "tracks.csv").write_text(text + rows + rest)
+            read = [row for table in blocks(tmp_path, ("time_s", "track_id")) for row in table["track_id"].to_pylist()]
+            assert read == [1, 12][: rows.count("\n")]
 
 
 def test_a_run_without_a_summary_or_tables(tmp_path):

@@ -16,9 +16,9 @@ import os
 import shutil
 import time
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from datetime import UTC, datetime
 from math import isnan
 from pathlib import Path
@@ -87,6 +87,7 @@ class CountBook:
         self._zone = zone_of(plan.zone)
         self._waiting: deque[Passage] = deque(maxlen=_MOST)
         self._watched: list[tuple[float, float]] = []
+        self._planned = True
         self._due = Every(_SPAN_S)
         self._period = int(time.time() // _TABLES_S)
         with writing(folder):
@@ -108,6 +109,11 @@ class CountBook:
             begin_s = self._watched.pop()[0]
         self._watched.append((begin_s, end_s))
 
+    def use(self, classes: Mapping[str, tuple[float, float]]) -> None:
+        """Sort lengths by other classes from now on, and of the day so far; `save` writes it."""
+        self._plan = replace(self._plan, classes=classes)
+        self._planned = False
+
     def save(self, keep_s: float | None = None) -> None:
         """Write what waits, and delete days older than keep_s [s].
 
@@ -116,6 +122,9 @@ class CountBook:
         if self._waiting or self._due():
             self._write_crossings()
             self._write_watched()
+        if not self._planned:
+            replace_text(self._folder / PLAN, self._plan.to_json())
+            self._planned = True
         if (period := int(time.time() // _TABLES_S)) != self._period:
             self._period = period
             if keep_s is not None:

@@ -15,7 +15,6 @@ from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lengths import length_sums, mean_length
 from vidtrack.traffic.lines import Crossing, LineCounter
-from vidtrack.traffic.site import read_site
 
 COUNTS = "intervals"
 """Folder of the counts by interval"""
@@ -114,6 +113,11 @@ class Counting:
         self._tell_watched(self._late_s)
         return crossings
 
+    def use(self, classes: Mapping[str, tuple[float, float]]) -> None:
+        """Go on with the classes of another site, on whose road nothing is known of the vehicles yet."""
+        self._book.use(classes)
+        self._readings = RoadReadings()
+
     def save(self) -> None:
         """Write the counts by interval. Raises StoppedEarly."""
         self._book.save(self._keep_s)
@@ -175,11 +179,8 @@ def counting_of(subject: Subject, folder: Path, began_s: Callable[[], float]) ->
     """
     counter, settings = subject.counter, subject.settings
     assert counter is not None
-    classes: Mapping[str, tuple[float, float]] = {}
-    if subject.road is not None and settings.output.site is not None:
-        classes = read_site(settings.output.site).classes
     gates = {line.name: line.directions for line in counter.lines}
-    book = CountBook(folder, Plan(gates, classes, settings.live.zone))
+    book = CountBook(folder, Plan(gates, subject.classes, settings.live.zone))
     counter.resume(totals(folder))
     coast_s, hidden_s = settings.tracker.coast_s, settings.tracker.hidden_s
     late_s = max(coast_s, hidden_s) + _MARGIN_S

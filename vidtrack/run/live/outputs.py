@@ -18,6 +18,7 @@ from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.run.live.background_writer import BackgroundWriter
 from vidtrack.run.live.counting import Counting
 from vidtrack.run.live.parts import Parts
+from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.run import Extras
 from vidtrack.run.sinks import Subject, picture_sinks
 
@@ -57,12 +58,13 @@ class Outputs:
         retention: Retention,
         counting: Counting | None,
         tell: Callable[[str], None],
+        site: FollowedSite | None,
     ) -> None:
         self._counting = counting
         self._writers = [BackgroundWriter.of(name, sink, tell) for name, sink in picture_sinks(subject, extras)]
         # Opened last: if an extra above cannot be opened, the folder stays empty.
         reserve = Reserve(subject.settings.live.reserve_bytes)
-        parts = Parts(folder, subject, extras.decisions, roll_s, retention, counting, reserve)
+        parts = Parts(folder, subject, extras.decisions, roll_s, retention, counting, reserve, site)
         tables = BackgroundWriter("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH, tell)
         self.sinks: list[Sink] = [*self._writers, Confirmed(tables, hold_s=LIVE_HOLD_S)]
         self._writers.append(tables)

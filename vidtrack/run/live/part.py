@@ -16,7 +16,7 @@ from vidtrack.output.linefile import LineFile, sort_rows
 from vidtrack.output.sink import Step
 from vidtrack.output.site_copy import SiteCopy
 from vidtrack.output.summary import Summary
-from vidtrack.output.tables import Column
+from vidtrack.output.tables import ROAD, VIDEO, Column
 from vidtrack.run.live.track_files import TRACK_FILES, write_lines
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lines import Crossing
@@ -25,13 +25,11 @@ from vidtrack.traffic.lines import Crossing
 class Part:
     """One part: with output.level = all the same files as those of a run over a video.
 
-    columns  of its tracks
-
     Raises StoppedEarly on a write error.
     """
 
-    def __init__(self, folder: Path, subject: Subject, decisions: bool, columns: Sequence[Column]) -> None:
-        self._lines = subject.lines
+    def __init__(self, folder: Path, subject: Subject, decisions: bool) -> None:
+        self.subject = subject
         self._counted: Counter[tuple[str, str]] = Counter()
         with ExitStack() as stack:  # on a full disk, files already open are closed
             self._summary = subject.summary(folder, self._totals)
@@ -44,7 +42,7 @@ class Part:
             if decisions:
                 self._decisions = DecisionLog(folder / "decisions.csv")
                 stack.callback(self._decisions.close)
-            self._tracks = TRACK_FILES[subject.settings.output.level](folder, subject, columns)
+            self._tracks = TRACK_FILES[subject.settings.output.level](folder, subject, columns_of(subject))
             self._files = stack.pop_all()
 
     def write_crossings(self, crossings: Iterable[Crossing]) -> None:
@@ -83,7 +81,14 @@ class Part:
 
     def _totals(self) -> dict[str, dict[str, int]]:
         """The part's counts by line and direction."""
-        return {line.name: {way: self._counted[line.name, way] for way in line.directions} for line in self._lines}
+        return {
+            line.name: {way: self._counted[line.name, way] for way in line.directions} for line in self.subject.lines
+        }
+
+
+def columns_of(subject: Subject) -> Sequence[Column]:
+    """The columns of a part's tracks."""
+    return VIDEO if subject.road is None else (*VIDEO, *ROAD)
 
 
 def count(summary: Summary, steps: Sequence[Step]) -> None:

@@ -19,14 +19,16 @@ from vidtrack.output.folder import writing
 from vidtrack.output.linefile import Every
 from vidtrack.output.repair import is_unfinished, repair
 from vidtrack.output.sink import Step
-from vidtrack.output.tables import ROAD, VIDEO, track_rows
+from vidtrack.output.tables import track_rows
 from vidtrack.output.thinned import Pace
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.live.counting import Counting
-from vidtrack.run.live.part import Part, count
+from vidtrack.run.live.part import Part, columns_of, count
+from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lines import Crossing
+from vidtrack.traffic.metres import UsedSite
 
 log = logging.getLogger(__name__)
 
@@ -43,6 +45,7 @@ class Parts:
     roll_s     length of a part [s], aligned to the clock: 3600 begins parts at full hours; None: root is the only part
     counting   finds the crossings for each part's counts.csv; None without counting lines
     reserve    of the disk, which tracks leave to counts
+    site       whose every change begins a part; None without a site. It needs `roll_s`
 
     What matters more is written first, and whatever fails, the rest is tried: counts by interval, crossings, tracks.
     Unfinished parts of an earlier run are repaired in another thread.
@@ -57,11 +60,12 @@ class Parts:
         retention: Retention,
         counting: Counting | None,
         reserve: Reserve,
+        site: FollowedSite | None = None,
     ) -> None:
         self._root = root
         self._subject = subject
+        self._site = site
         self._decisions = decisions
-        self._columns = VIDEO if subject.road is None else (*VIDEO, *ROAD)
         self._roll_s = roll_s
         self._retention = retention
         self._counting = counting
@@ -81,9 +85,11 @@ class Parts:
 
     def write(self, steps: Sequence[Step]) -> None:
         """Write a batch. Raises StoppedEarly on a write error; a later batch may succeed."""
+        if self._site is not None and self._site.changed():
+            self._use(self._site.used)
         filled = [step for step in steps if len(step.tracks)]
         needed = self._subject.road is not None or self._subject.settings.output.level != "counts"
-        rows = track_rows(filled, self._columns, self._subject.road) if filled and needed else None
+        rows = track_rows(filled, columns_of(self._subject), self._subject.road) if filled and needed else None
         if self._whole is not None:
             count(self._whole, steps)
         with ExitStack() as stack:  # called from the last to the first
@@ -128,23 +134,32 @@ class Parts:
             self._crossings.clear()
 
     def _roll(self) -> None:
-        """End the current part if its period is over or it is too large."""
+        """End the current part if its period is over, it is too large, or the site has changed."""
         large = False
         if self._look():
             self._retention.prune()
             limit = self._retention.tracks_part
             large = self._roll_s is not None and limit is not None and size_of(self._folder) > limit
-        if self._part is not None and (large or self._period() != self._number):
+        if self._part is None:
+            return
+        if large or self._period() != self._number or self._part.subject is not self._subject:
             ended, self._part = self._part, None
             self._ended.append(ended)
             ended.end()
+
+    def _use(self, site: UsedSite) -> None:
+        """Go on at another site; the next part is its first."""
+        self._subject = self._subject.at(site)
+        if self._counting is not None:
+            self._counting.use(site.classes)
+        log.info("the site has changed; a new part begins with it")
 
     def _begin(self) -> Part:
         self._number = self._period()
         with writing(self._root):
             self._folder = self._root if self._roll_s is None else new_part(self._root)
         try:
-            self._part = Part(self._folder, self._subject, self._decisions, self._columns)
+            self._part = Part(self._folder, self._subject, self._decisions)
         except StoppedEarly:
             if self._folder != self._root:
                 shutil.rmtree(self._folder, ignore_errors=True)

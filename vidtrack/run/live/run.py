@@ -23,11 +23,11 @@ from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpoin
 from vidtrack.run.live.counting import COUNTS, counting_of
 from vidtrack.run.live.limits import part_sizes, retention_of
 from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
+from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.run import recorded
 from vidtrack.run.sinks import Subject, line_counter
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
-from vidtrack.traffic.metres import footprints_of, site_text
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection
@@ -71,11 +71,11 @@ class LiveRun:
         refuse_link(settings.output, "live runs")
         if live.replace_state and extras.state is None:
             raise ConfigError("setting live.replace_state has no effect without --state")
-        self._settings = settings
+        self._settings = settings = _from_anywhere(settings)
         self._address = parse_address(address, live.timeout_s)
         self.name = self._address.name
         stats = stats or LiveStats()
-        roll_s = live.roll_s or (_HOUR_S if live.limited else None)
+        roll_s = live.roll_s or (_HOUR_S if live.limited or settings.output.site else None)
         retention = retention_of(live)
         self._outputs: Outputs | None = None
         self._until_s: float | None = None  # monotonic time of the end; None: not stopped
@@ -106,12 +106,12 @@ class LiveRun:
             retention.results.append(self.folder)
             zone = zone_of(live.zone)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
-            road = footprints_of(settings.output.site, source.width, source.height)
-            site, shape = site_text(settings.output.site), source.like.shape
-            subject = Subject(shown, settings, shape, source.fps, scene, self._reading, counter, road, site)
+            subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, None)
+            site = self._followed(stats.warn)
+            subject = subject if site is None else subject.at(site.used)
             self.counts = None if counter is None else extras.counts or self.folder / COUNTS
             counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s)
-            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn)
+            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn, site)
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 
     def __iter__(self) -> Iterator[Step]:
@@ -163,6 +163,11 @@ class LiveRun:
             connect=connect,
             stats=stats,
         )
+
+    def _followed(self, tell: Callable[[str], None]) -> FollowedSite | None:
+        """The site of the run, whose file may change; None without one. Raises ConfigError."""
+        site, source = self._settings.output.site, self._source
+        return None if site is None else FollowedSite(site, source.width, source.height, tell)
 
     def _restored(self, explain: bool) -> Checkpoint:
         """Detector and tracker, restored from the saved state of an earlier run if there is one."""
@@ -237,3 +242,11 @@ class LiveRun:
     def _account(self) -> Account:
         stats = self._source.stats
         return Account(stats.state, self._reading(), list(stats.problems), self._failing())
+
+
+def _from_anywhere(settings: Settings) -> Settings:
+    """The settings with the whole path of the site, which is looked for in the run's summary.json."""
+    if settings.output.site is None:
+        return settings
+    output = settings.output.model_copy(update={"site": settings.output.site.absolute()})
+    return settings.model_copy(update={"output": output})

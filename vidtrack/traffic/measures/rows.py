@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,8 @@ _STATE = (
 EDGE_COLUMNS = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
 """What is read of a run with metres, besides the edges."""
+_LONGEST_LINE = 1 << 16
+"""Bytes; no line of a table is as long."""
 _NOT_SEEN = "coasting"
 
 
@@ -270,16 +273,26 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
 
 
 def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
+    """Of the whole lines: a live run may be writing the last one."""
     kinds = {name: pa.float64() for name in columns} | {"track_id": pa.int64(), "status": pa.string()}
     convert = pyarrow.csv.ConvertOptions(
         column_types={name: kinds[name] for name in columns}, include_columns=list(columns)
     )
     try:
-        with pyarrow.csv.open_csv(path, convert_options=convert) as reader:
+        whole = pa.OSFile(str(path)).get_stream(0, _whole_lines(path))
+        with pyarrow.csv.open_csv(whole, convert_options=convert) as reader:
             for batch in reader:
                 yield pa.Table.from_batches([batch])
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
+
+
+def _whole_lines(path: Path) -> int:
+    """Bytes of a table to the end of its last whole line."""
+    with path.open("rb") as file:
+        begin = max(0, file.seek(0, SEEK_END) - _LONGEST_LINE)
+        file.seek(begin)
+        return begin + file.read(_LONGEST_LINE).rfind(b"\n") + 1
 
 
 def _columns(folder: Path) -> set[str]:

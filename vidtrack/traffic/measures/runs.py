@@ -140,7 +140,10 @@ def site_of(runs: Sequence[str]) -> Path:
             raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
     for other in copies[1:]:
         if other.read_bytes() != copies[0].read_bytes():
-            raise ConfigError(f"{copies[0]} and {other} are not the same site; give --site SITE.toml")
+            raise ConfigError(
+                f"{copies[0]} and {other} are not the same site; give --site SITE.toml for all of them, "
+                "or measure those of each site alone"
+            )
     return copies[0]
 
 
