@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from vidtrack.config.load import load
+from vidtrack.doctor.advice import judge
 from vidtrack.doctor.examine import examine
-from vidtrack.doctor.judge import judge
 from vidtrack.formats import read
 from vidtrack.run.files import run_file
 from vidtrack.score import evaluate

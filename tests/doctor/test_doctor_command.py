@@ -9,8 +9,8 @@ from command_line import SAMPLES
 
 from vidtrack.cli import cli
 from vidtrack.config.load import load
+from vidtrack.doctor.advice import judge
 from vidtrack.doctor.findings import Findings, Reception, Speed
-from vidtrack.doctor.judge import judge
 
 
 def doctor(*arguments):

@@ -164,13 +164,13 @@ def test_each_kind_has_a_limit_of_its_own(tmp_path):
     ages_s = [400, 300, 100, 50]
     make_parts(tmp_path / "out", [10] * 4, ages_s)
     make_parts(tmp_path / "tape", [1000] * 4, ages_s)
-    retention = Retention(Limits(350), tracks=Limits(1e9), recordings=Limits(None, 2500))
+    retention = Retention(Limits(350), tracks=Limits(1e9), recordings=Limits(None, 2700))
     retention.results.append(tmp_path / "out")
     retention.recorded.append(tmp_path / "tape")
     retention.prune()
     assert left(tmp_path / "out") == [0, 1, 2, 3]
     assert left(tmp_path / "tape") == [2, 3]
-    assert (retention.tracks_part, retention.recordings_part) == (None, 2500 / 8)
+    assert (retention.tracks_part, retention.recordings_part) == (None, 2700 / 8)
 
 
 @pytest.mark.parametrize(

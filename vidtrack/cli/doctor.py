@@ -57,8 +57,8 @@ def command(options: DoctorOptions) -> int:
     run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it gives no pictures.
     """
     from vidtrack.cli.hide import hide_arguments
+    from vidtrack.doctor.advice import judge
     from vidtrack.doctor.examine import examine
-    from vidtrack.doctor.judge import judge
     from vidtrack.doctor.opening import kind_of
     from vidtrack.video.live.address import secrets
 

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 SHARE = 1 / 8  # of the byte limit: largest size of one part
 _ROOM = 2  # least size of a part, in what it takes at least
-_FULL = 1 - SHARE  # of the byte limit: parts grow between two checks
+_FULL = 1 - 2 * SHARE  # of the byte limit: between two checks a part of tracks and one of a recording grow
 _TIME = "%Y-%m-%dT%H-%M-%S"
 _PART = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ(-\d+)?")
 _COUNTS, _OF_COUNTS = "counts.csv", {"counts.csv", "summary.json"}

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from vidtrack.cli import cli
 from vidtrack.config.load import load
 from vidtrack.doctor import examine, opening
-from vidtrack.doctor.judge import judge
+from vidtrack.doctor.advice import judge
 from vidtrack.errors import SourceError
 from vidtrack.video.live.source import LiveSource
 
