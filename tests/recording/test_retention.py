@@ -28,11 +28,11 @@ def left(root):
 
 def test_by_size(tmp_path):
     make_parts(tmp_path, [1000] * 10)
-    retention = Retention(Limits(None, 5000))
+    retention = Retention(Limits(None, 5400))
     retention.results.append(tmp_path)
     retention.prune()
     assert left(tmp_path) == [6, 7, 8, 9]
-    assert size_of(tmp_path) <= 5000
+    assert size_of(tmp_path) <= 5400
 
 
 def test_by_age(tmp_path):
@@ -54,7 +54,7 @@ def test_the_newest_part_stays_however_large(tmp_path):
 def test_results_and_recordings_share_the_bound(tmp_path):
     make_parts(tmp_path / "out", [1000] * 5)
     make_parts(tmp_path / "tape", [4000] * 5)
-    retention = Retention(Limits(None, 12_000))
+    retention = Retention(Limits(None, 13_500))
     retention.results.append(tmp_path / "out")
     retention.recorded.append(tmp_path / "tape")
     retention.prune()
@@ -65,7 +65,7 @@ def test_what_is_no_part_is_nobodys_business(tmp_path):
     (tmp_path / "holiday").mkdir()
     (tmp_path / "holiday" / "film").write_bytes(bytes(9000))
     make_parts(tmp_path, [1000] * 3)
-    retention = Retention(Limits(None, 5000))
+    retention = Retention(Limits(None, 5400))
     retention.results.append(tmp_path)
     retention.prune()
     assert (tmp_path / "holiday" / "film").exists()
@@ -154,7 +154,7 @@ def test_a_size_limit_counts_what_it_may_delete(tmp_path):
     parts = counted_parts(tmp_path, 10)
     for part in parts:
         (part / "counts.csv").write_bytes(bytes(9000))
-    retention = Retention(Limits(None, 5000))
+    retention = Retention(Limits(None, 5400))
     retention.results.append(tmp_path)
     retention.prune()
     assert [("tracks.csv" in files_of(part)) for part in parts] == [False] * 6 + [True] * 4

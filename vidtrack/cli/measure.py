@@ -51,11 +51,14 @@ def command(options: MeasureOptions) -> None:
     from vidtrack.output.folder import open_folder, replacing
     from vidtrack.recording.retention import parts_of
     from vidtrack.traffic.measures.measure import measured
-    from vidtrack.traffic.measures.runs import site_of
+    from vidtrack.traffic.measures.runs import parts_with_tracks, site_of
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)
-    runs = [part for run in options.runs for part in ([str(part) for part in parts_of(Path(run))] or [run])]
+    runs = []
+    for run in options.runs:
+        parts = parts_with_tracks(Path(run), parts_of(Path(run)))
+        runs += [str(part) for part in parts] or [run]
     source = site_of(runs) if options.site is None else options.site
     site, text = read_site(source), source.read_bytes()
     found = measured(runs, site)

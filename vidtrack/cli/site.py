@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import logging
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -98,14 +97,16 @@ def command(options: SiteOptions) -> None:
 def desk_of(options: SiteOptions) -> Desk:
     """What the options ask for. Raises an Error for a run, a site or a picture that does not fit."""
     from vidtrack.errors import SourceError
+    from vidtrack.recording.retention import parts_of
     from vidtrack.serve.site.app import Desk
     from vidtrack.serve.site.file import SiteFile
     from vidtrack.serve.site.plan import read_world
     from vidtrack.traffic.measures.recount import Recount
+    from vidtrack.traffic.measures.runs import parts_with_tracks
     from vidtrack.traffic.site import Site
 
     run = options.run.resolve()
-    parts = _with_tracks(run) or [options.run]
+    parts = parts_with_tracks(run, parts_of(run)) or [options.run]
     recount = Recount([str(part) for part in parts])
     file = SiteFile(options.site or _tracked_with(parts[-1]) or run.with_name(f"{run.name}-site.toml"))
     if not file.path.parent.is_dir():
@@ -121,28 +122,6 @@ def desk_of(options: SiteOptions) -> Desk:
         plan = options.plan, _encoded(str(options.plan), None)
     scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts)
     return Desk(run.name, recount, file, new, scene, plan)
-
-
-def _with_tracks(run: Path) -> list[Path]:
-    """The parts of a live run that can be drawn over, oldest first; the run may go on. Empty for any other run.
-
-    Raises SourceError where a live run has no such part.
-    """
-    from vidtrack.errors import SourceError
-    from vidtrack.recording.retention import parts_of
-    from vidtrack.traffic.measures.runs import open_day
-
-    parts, opened = parts_of(run), []
-    for part in parts:
-        with suppress(SourceError):  # it has just begun, or only its counts are kept
-            open_day([str(part)], None)
-            opened.append(part)
-    if parts and not opened:
-        raise SourceError(
-            f"no part of {run} has tracks to draw over: wait until the camera delivers; with output.level=tracks until "
-            "the first part has ended; with output.level=counts there are none"
-        )
-    return opened
 
 
 def _tracked_with(run: Path) -> Path | None:

@@ -106,14 +106,15 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
         )
     if settings.output.smooth and radar.estimator == "alpha-beta":
         raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
+    sharing = _sharing(radar, found.dim)
     return Tracker(
         model=motion(radar, found.dim),
         estimator=estimator(radar, found, seed),
-        associate=rule(common, unresolved=radar.unresolved),
+        associate=rule(common, unresolved=isinstance(sharing, Unresolved)),
         gate=gate(common, radar.euclidean_radius_m, adaptive=True),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         picture=NoPicture(),
-        sharing=_sharing(radar, found.dim),
+        sharing=sharing,
         detection_probability=radar.detection_probability,
         clutter_density=radar.clutter_density,
         surveyed=surveyed(found),

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from threading import Condition, Event, Thread
 from time import monotonic
 
-from vidtrack.errors import Error, StoppedEarly
+from vidtrack.errors import Error
 from vidtrack.output.sink import Sink, Step
 
 log = logging.getLogger(__name__)
@@ -21,7 +21,7 @@ class BackgroundWriter:
     """Sink that queues steps and writes them in batches in its own thread.
 
     name     of the output, for messages
-    write    writes a batch; after it raises StoppedEarly it is called again with the next batch
+    write    writes a batch; after it raises an Error it is called again with the next batch
     finish   called after the last batch
     every_s  time between two batches [s]; 0: no pause
     depth    largest number of queued steps
@@ -108,7 +108,7 @@ class BackgroundWriter:
             self._waiting.clear()
         try:
             self._write(steps)
-        except (StoppedEarly, OSError) as error:
+        except (Error, OSError) as error:
             self.failing = str(error)
             self._lose(len(steps), self.failing)
         else:

@@ -12,7 +12,7 @@ from vidtrack.associate.problem import VANISHING, Problem
 from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.kernels import TURN
 from vidtrack.estimate.sensor import POSITION, Sensor, still
-from vidtrack.tracking.unresolved.cell import SIZES, PolarCell
+from vidtrack.tracking.unresolved.cell import SIZES, TINY, PolarCell
 from vidtrack.tracking.unresolved.correlations import Correlations
 from vidtrack.tracking.unresolved.joint import Joint
 
@@ -64,7 +64,7 @@ def claims(
         joint = correlations.joint(ids[pair], placed.x[pair], placed.P[pair])
         R = placed.R[np.linalg.norm(placed.z - joint.middle, axis=1).argmin()]
         p_by_size = cell.shared(joint, 0, 1, R, SIZES)
-        p = float(cell.probability @ p_by_size)
+        p = min(float(cell.probability @ p_by_size), 1 - TINY)
         if p < LEAST:
             continue
         one = _one(problem, i, placed, cell.confined(joint, R))

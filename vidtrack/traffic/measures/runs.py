@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
@@ -129,6 +130,24 @@ def measured_run(run: Mapping[str, Any]) -> Recording:
     return replace(alone, session=run["run"], offset_s=offset, begin_s=run["begin_s"], end_s=run["end_s"])
 
 
+def parts_with_tracks(run: Path, parts: Sequence[Path]) -> list[Path]:
+    """The parts of a live run that can be measured; the run may go on. Empty for any other run, which has no parts.
+
+    Raises SourceError where a live run has no such part.
+    """
+    opened = []
+    for part in parts:
+        with suppress(SourceError):  # it has just begun, or only its counts are kept
+            open_day([str(part)], None)
+            opened.append(part)
+    if parts and not opened:
+        raise SourceError(
+            f"no part of {run} has tracks: wait until the camera delivers; with output.level=tracks until the first "
+            "part has ended; with output.level=counts there are none"
+        )
+    return opened
+
+
 def site_of(runs: Sequence[str]) -> Path:
     """The site that runs were tracked with: the copy in their folders, each written as for `open_day`.
 
@@ -136,7 +155,7 @@ def site_of(runs: Sequence[str]) -> Path:
     """
     copies = [_split(run)[0] / SITE_COPY for run in runs]
     for copy in copies:
-        if not copy.is_file():
+        if not copy.is_file() or not _had_site(copy.parent):
             raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
     for other in copies[1:]:
         if other.read_bytes() != copies[0].read_bytes():
@@ -145,6 +164,15 @@ def site_of(runs: Sequence[str]) -> Path:
                 "or measure those of each site alone"
             )
     return copies[0]
+
+
+def _had_site(folder: Path) -> bool:
+    """Whether the run was tracked with a site; a folder that is used again may hold that of another run."""
+    try:
+        output = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["settings"]["output"]
+    except (OSError, KeyError, TypeError, ValueError):
+        return True  # another check says what is wrong with the folder
+    return output.get("site") is not None
 
 
 def _sessions(found: list[_Found]) -> list[int]:

@@ -154,8 +154,12 @@ def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) ->
 def _foot(edge: Floats) -> Floats:
     """(N, 2) middles of the lower edges [px]; of one whose side the border cuts, its other corner."""
     left, _, right, bottom = edge.T
-    left, right = np.where(np.isnan(left), right, left), np.where(np.isnan(right), left, right)
-    return np.column_stack([(left + right) / 2, bottom])
+    return np.column_stack([_middle(left, right), bottom])
+
+
+def _middle(a: Floats, b: Floats) -> Floats:
+    """(N,) middles of a and b; where one of them is not known, the other."""
+    return (np.where(np.isnan(a), b, a) + np.where(np.isnan(b), a, b)) / 2
 
 
 def _straight(ground: Ground, edge: Floats) -> Floats:
@@ -163,6 +167,6 @@ def _straight(ground: Ground, edge: Floats) -> Floats:
     if ground.lens is None:
         return edge
     left, top, right, bottom = edge.T
-    x, y = (left + right) / 2, (top + bottom) / 2
+    x, y = _middle(left, right), _middle(top, bottom)
     points = ((left, y, 0), (x, top, 1), (right, y, 0), (x, bottom, 1))
     return np.column_stack([ground.straight(np.column_stack([a, b]))[:, axis] for a, b, axis in points])

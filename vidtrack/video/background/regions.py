@@ -46,8 +46,8 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
     A blob is a ghost if the picture matches the scene as it was before the object was absorbed. It is also a ghost if
     the object's edge is in the scene only: along the blob's border the scene has more contrast (luminance differences
     over +-3 px, horizontal and vertical) than the frame, and has been covered for settled_s on average. Under known
-    vehicles no cover is counted: a track can end on the mark of another vehicle. There the contrast must be clearly
-    more, while the cover has not changed for _UNMOVED_S.
+    vehicles no cover is counted, but a track can end on the mark of another vehicle: clearly more contrast, while the
+    cover has not changed for _UNMOVED_S, makes a ghost anywhere.
     """
     h, w = mask.shape
     row, start, stop = find_runs(mask, False)
