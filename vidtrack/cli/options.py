@@ -116,6 +116,22 @@ def settings_options(function: Function) -> Function:
     )(function)
 
 
+def page_options(function: Function) -> Function:
+    """--port, --quiet and --verbose, for commands that serve a page."""
+    for option in (
+        click.option("-v", "--verbose", count=True, help="Say more; twice: everything."),
+        click.option("-q", "--quiet", is_flag=True, help="Only errors and the address of the page."),
+        click.option(
+            "--port",
+            type=click.IntRange(0, 65535),
+            default=0,
+            help="Serve the page at this port.  [default: any free one]",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
 def seed_option(function: Function) -> Function:
     """--seed, for commands with random numbers."""
     return click.option(

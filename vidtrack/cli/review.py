@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from vidtrack.cli.options import receives, start_log
+from vidtrack.cli.options import page_options, receives, start_log
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,11 +37,7 @@ Examples:
     "--sample", type=click.IntRange(min=1), metavar="N", help="N events in random order: a fair sample for a precision."
 )
 @click.option("--video", metavar="SOURCE", help="Where the tracked video is now.")
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Serve the page at this port.  [default: any free one]"
-)
-@click.option("-q", "--quiet", is_flag=True, help="Only errors and the address of the page.")
-@click.option("-v", "--verbose", count=True, help="Say more; twice: everything.")
+@page_options
 @receives(ReviewOptions)
 def command(options: ReviewOptions) -> None:
     """Serve a page on this machine with one row for each counted crossing in RUN, until Ctrl-C.

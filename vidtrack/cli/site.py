@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vidtrack.cli.options import receives, start_log
+from vidtrack.cli.options import page_options, receives, start_log
 
 if TYPE_CHECKING:
     from vidtrack.serve.site.app import Desk, Picture
@@ -55,11 +55,7 @@ Examples:
     metavar="IMAGE",
     help="A plan or aerial picture, north up, to take metres from; its world file is used.",
 )
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Serve the page at this port.  [default: any free one]"
-)
-@click.option("-q", "--quiet", is_flag=True, help="Only errors and the address of the page.")
-@click.option("-v", "--verbose", count=True, help="Say more; twice: everything.")
+@page_options
 @receives(SiteOptions)
 def command(options: SiteOptions) -> None:
     """Draw gates, zones, sections, movements and calibration points over the tracks of RUN, in a browser.

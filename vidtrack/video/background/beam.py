@@ -19,7 +19,8 @@ _OPEN = 4  # least number of pixels over which a beam fades into the scene
 
 def lamps_light(luma: Image, scene: Levels, black: np.float32) -> bool:
     """Whether lamps light the scene (h, w): it is dark, and they are seen in the picture's luma (h, w)."""
-    dark = np.median(scene[::_EVERY, ::_EVERY]) < black + _DARK
+    looked_at = scene[::_EVERY, ::_EVERY]
+    dark = 2 * np.count_nonzero(looked_at < black + _DARK) > looked_at.size  # a median takes six times as long
     return bool(dark and luma.max() > black + _LAMP)
 
 
