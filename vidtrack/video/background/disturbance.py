@@ -64,7 +64,7 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
+        self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), math.inf
         self._sunlight = Sunlight()
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
@@ -112,6 +112,8 @@ class Disturbance:
             mask, weak, strength = self._map(picture, known, dt)
         if not self._camera.trusted:
             mask = np.zeros_like(mask)
+        if self._changed_s == 0 and self._is_new_second(dt):
+            self._judge_light(picture)
         place, motion = self._camera.place, self._camera.motion
         anew = self._changed_s > self._settings.relearn_s
         elsewhere = anew and self._camera.lost_s > 0
@@ -156,10 +158,7 @@ class Disturbance:
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
         self._learn(picture, scene, mask, hit, dt, span)
-        if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
-            self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
-            haze = veil(picture.luma)
-            self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
+        if self._is_new_second(dt):
             self._absorb(picture, scene, hit)
         return mask, weak, strength
 
@@ -177,13 +176,27 @@ class Disturbance:
         self._camera.restart()
         scene = start(picture)
         self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
-        self._veil = veil(picture.luma) or 0.0
+        haze = veil(picture.luma)
+        self._veil = math.inf if haze is None else haze
         return scene
+
+    def _is_new_second(self, dt: float) -> bool:
+        """For what is often enough once a second."""
+        return math.floor(self._time_s) != math.floor(self._time_s - dt)
+
+    def _judge_light(self, picture: Picture) -> None:
+        """Contrast and haze of the scene in view; a canvas has black rims where nothing was seen."""
+        moves = self._camera.moves
+        in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
+        self._contrast, self._hazy = contrast(in_view.luma), haziness(in_view.luma)
+        haze = veil(picture.luma)
+        self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
 
     @property
     def _black(self) -> np.float32:
         """Luminance of black as it is seen: haze lifts it where it blurs the scene."""
-        return np.float32(self._view.black + self._hazy * max(0.0, self._veil - self._view.black))
+        lift = 0.0 if math.isinf(self._veil) else max(0.0, self._veil - self._view.black)
+        return np.float32(self._view.black + self._hazy * lift)
 
     @property
     def _unsure(self) -> bool:
