@@ -79,7 +79,7 @@ def test_after_a_sway_in_the_preview_the_first_frame_is_the_place_of_the_tracks(
     def sway(t):
         return affine.shift(6 * np.sin(2 * t) + 3, 2 * np.sin(3 * t))
 
-    detector, found = first_foreground(frames(6, drives_off, sway))
+    _, found = first_foreground(frames(6, drives_off, sway))
     assert found.motion is None
     row, column = np.nonzero(found.mask)
     assert abs(column.min() - 63) <= 3  # the camera begins 3 px to the side
@@ -107,10 +107,10 @@ def test_the_opening_is_the_frames_of_the_span_and_tells_no_warning_twice(tmp_pa
     for k in range(12):
         picture = np.full((48 if k < 9 else 96, 64 if k < 9 else 128), 10 * k, np.uint8)
         cv2.imwrite(str(tmp_path / f"{k:03d}.png"), picture)
-    with caplog.at_level(logging.WARNING):
-        with open_source(str(tmp_path), SourceSettings(start_s=0.12, end_s=0.44)) as source:
-            ahead = list(source.opening(0.3))
-            whole = list(source)
+    caplog.set_level(logging.WARNING)
+    with open_source(str(tmp_path), SourceSettings(start_s=0.12, end_s=0.44)) as source:
+        ahead = list(source.opening(0.3))
+        whole = list(source)
     assert [frame.time_s for frame in ahead] == pytest.approx([frame.time_s for frame in whole if frame.time_s < 0.43])
     assert all(np.array_equal(a.y, b.y) for a, b in zip(ahead, whole, strict=False))
     assert sum("carries no time" in record.message for record in caplog.records) == 1

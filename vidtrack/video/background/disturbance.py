@@ -64,7 +64,7 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), math.inf
+        self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
         self._sunlight = Sunlight()
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
@@ -176,8 +176,7 @@ class Disturbance:
         self._camera.restart()
         scene = start(picture)
         self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
-        haze = veil(picture.luma)
-        self._veil = math.inf if haze is None else haze
+        self._veil = veil(picture.luma) or 0.0
         return scene
 
     def _is_new_second(self, dt: float) -> bool:
@@ -195,8 +194,7 @@ class Disturbance:
     @property
     def _black(self) -> np.float32:
         """Luminance of black as it is seen: haze lifts it where it blurs the scene."""
-        lift = 0.0 if math.isinf(self._veil) else max(0.0, self._veil - self._view.black)
-        return np.float32(self._view.black + self._hazy * lift)
+        return np.float32(self._view.black + self._hazy * max(0.0, self._veil - self._view.black))
 
     @property
     def _unsure(self) -> bool:
