@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 import click
 
-from vidtrack.cli.options import announce_compiling, common, receives, seed_option, settings_options, start_log
+from vidtrack.cli.options import (
+    announce_compiling,
+    common,
+    radar_position_option,
+    receives,
+    seed_option,
+    settings_options,
+    start_log,
+)
 from vidtrack.cli.tracking import TrackingOptions, association_options, choice, finish, smooth_option
 from vidtrack.config import names
 
@@ -21,6 +29,7 @@ class RadarOptions(TrackingOptions):
     estimator: str | None
     model: str | None
     skip_bad_rows: bool | None
+    radar_position: tuple[float, float, float] | None
 
 
 @click.command(
@@ -46,6 +55,7 @@ Examples:
 @click.option(
     "--skip-bad-rows", is_flag=True, default=None, help="Leave out rows that cannot be right, and count them."
 )
+@radar_position_option("Place of x = y = 0 in WGS84, degrees and metres: for positions in degrees, and for CAT 062.")
 @receives(RadarOptions)
 def command(options: RadarOptions) -> None:
     """Track the targets in PLOTS, a CSV or Parquet table with one row per plot.

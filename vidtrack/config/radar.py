@@ -9,7 +9,6 @@ from pydantic import Field
 from vidtrack.config.group import Group
 from vidtrack.config.names import Estimator, Life, Model, Resampling
 
-
 Latitude = Annotated[float, Field(ge=-90, le=90)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
 

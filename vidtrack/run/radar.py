@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config.radar import RadarSettings
@@ -66,7 +67,7 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
     found = measurements(plots, settings.radar)
     refuse_link(settings.output, "radar runs")
     tracker = build_radar_tracker(settings, found, explain=extras.explain, seed=seed)
-    account = {"plots": len(plots), "bad_rows": plots.bad_rows, **plots.losses, "truncated": False}
+    account: dict[str, Any] = {"plots": len(plots), "bad_rows": plots.bad_rows, **plots.losses, "truncated": False}
     if plots.plane is not None:
         account["origin"] = [plots.plane.latitude, plots.plane.longitude, plots.plane.height]
 

@@ -45,7 +45,7 @@ class Decoder:
     """
 
     def __init__(self, losses: Losses) -> None:
-        self._losses = losses
+        self.losses = losses
         self._layouts = layouts()
         self._clock_s: dict[int, float] = {}
 
@@ -55,7 +55,7 @@ class Decoder:
         while at < len(payload):
             size = int.from_bytes(payload[at + 1 : at + _HEAD], "big")
             if size <= _HEAD or at + size > len(payload):
-                self._losses.damaged += 1
+                self.losses.damaged += 1
                 at = next((k for k in range(at + 1, len(payload) - _HEAD) if looks_like(payload, k)), len(payload))
             elif payload[at] in self._layouts:
                 yield from self._block(payload[at], payload[at + _HEAD : at + size])
@@ -72,7 +72,7 @@ class Decoder:
                 source = _whole(body, place["010"], 2) if "010" in place else source
                 message = read(body, place, self._clock_s.get(source, NAN))
             except (Damaged, IndexError):
-                self._losses.damaged += 1
+                self.losses.damaged += 1
                 return
             if message is not None:
                 if message.clock_s == message.clock_s:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats
 from vidtrack.radar.feeds.messages import Losses, Messages
 
 DAY_S = 86400.0
@@ -62,5 +61,3 @@ class Clock:
 def _within_a_day(step: float) -> float:
     """The same step between two times of day, in -12 to 12 hours."""
     return step - DAY_S * round(step / DAY_S)
-
-

@@ -1,7 +1,6 @@
 """Where the items of an ASTERIX record lie, by the tables of libasterix.
 
-The tables are libasterix's; the walk over them is our own, because its parser makes an object of every field, which takes
-thirty times as long.
+The tables are libasterix's; the walk over them is our own, because its parser makes an object of every field.
 """
 
 from __future__ import annotations
@@ -85,7 +84,7 @@ def layouts() -> Mapping[int, Mapping[str, Layout]]:
 def library() -> Any:
     """The module `asterix.generated` of libasterix. Raises ConfigError if it is not installed."""
     try:
-        import asterix.base  # noqa: F401
+        import asterix.base
         import asterix.generated
     except ImportError:
         raise ConfigError(
@@ -119,7 +118,9 @@ def _extent(rule: Any) -> Extent:
         return partial(_repeated, kind.cv_rep_bytes, bits // 8)
     if issubclass(kind, Compound):
         items = kind.cv_items_list
-        inner = Layout([item and item.cv_name for item in items], [_extent(item.cv_rule) if item else 0 for item in items])
+        inner = Layout(
+            [item and item.cv_name for item in items], [_extent(item.cv_rule) if item else 0 for item in items]
+        )
         return lambda body, at: inner.places(body, at)[1]
     raise TypeError(kind)
 

@@ -40,7 +40,7 @@ class Decoder:
     """
 
     def __init__(self, losses: Losses) -> None:
-        self._losses = losses
+        self.losses = losses
         self._clock_s = NAN
         self._heading = NAN
         self._readers: dict[bytes, Callable[[list[bytes]], Message | None]] = {b"TTM": self._ttm, b"TLL": self._tll}
@@ -55,7 +55,7 @@ class Decoder:
             try:
                 message = self._message(found.group(), stamp and int(stamp.group(1)))
             except (ValueError, IndexError, KeyError):
-                self._losses.damaged += 1
+                self.losses.damaged += 1
                 continue
             if message is not None:
                 yield message

@@ -43,9 +43,9 @@ class Pace(Protocol):
 class Turns:
     """Scans of a turning antenna: one a turn, from north to north.
 
-    A message at azimuth a in the n-th turn sees the antenna at n + a / 2 pi turns. The antenna's angle follows the times
-    and is pulled to the azimuths of marks and plots, so a plot just west of north stays in its scan however its time is
-    rounded, and lost marks do no harm.
+    A message at azimuth a in the n-th turn sees the antenna at n + a / 2 pi turns. The antenna's angle follows the
+    times and is pulled to the azimuths of marks and plots, so a plot just west of north stays in its scan however its
+    time is rounded, and lost marks do no harm.
 
     period_s  duration of a turn
     beamed    the times of plots are those at which the antenna passed them; else the antenna follows the marks alone,
@@ -105,15 +105,15 @@ class Rounds:
 def pace_of(messages: Messages, scan_s: float | None) -> Pace:
     """The pace of a feed, from its first messages.
 
-    scan_s  duration of a scan, None: from the marks of the antenna, else from the azimuths and times of the plots, else
+    scan_s  duration of a scan; None: from the marks of the antenna, else from the azimuths and times of the plots, else
             from how often targets report
     """
     plots = messages.only(~messages.marks)
-    stated = scan_s or _stated(messages)
-    period_s = stated or _found(plots)
-    if period_s is not None:
-        if np.all(plots.kind == Kind.POLAR) and (messages.marks.any() or _follows(plots, period_s) > ROTATES):
-            return Turns(period_s, beamed=_follows(plots, period_s) > ROTATES)
+    period_s = scan_s or _stated(messages) or _found(plots)
+    if period_s is not None and np.all(plots.kind == Kind.POLAR):
+        beamed = _follows(plots, period_s) > ROTATES
+        if beamed or messages.marks.any():
+            return Turns(period_s, beamed=beamed)
     period_s = period_s or _usual(plots)
     return Rounds(period_s, float(plots.time_s.min()) - period_s / 2)
 
@@ -156,7 +156,7 @@ def _follows(plots: Messages, period_s: float) -> float:
     """How well times follow azimuths, 0 to 1: the mean over turns of the resultant length of their differences."""
     if not len(plots):
         return 0.0
-    turn, member = np.unique(np.floor((plots.time_s - plots.time_s[0]) / period_s), return_inverse=True)
+    _, member = np.unique(np.floor((plots.time_s - plots.time_s[0]) / period_s), return_inverse=True)
     angle = np.exp(1j * (plots.v - 2 * np.pi * plots.time_s / period_s))
     count = np.bincount(member)
     length = np.hypot(np.bincount(member, angle.real), np.bincount(member, angle.imag))

@@ -53,7 +53,8 @@ def _pcap(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 
 def _pcapng(content: bytes) -> Iterator[tuple[int, bytes]]:
     """Link type and frame of each packet in enhanced and simple packet blocks."""
-    order, links, at = "<", [], 0
+    order, at = "<", 0
+    links: list[int] = []
     while at + 12 <= len(content):
         if content[at : at + 4] == _PCAPNG:
             order = "<" if content[at + 8 : at + 12] == b"\x4d\x3c\x2b\x1a" else ">"

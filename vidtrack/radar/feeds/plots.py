@@ -18,7 +18,7 @@ from vidtrack.radar.plots import Plots
 
 _log = logging.getLogger(__name__)
 _CATEGORIES = (48, 1, 62, 21, 0)
-"""What is tracked, if a feed has several: plots before tracks of others before what ships and aircraft say themselves."""
+"""What is tracked, if a feed has several: plots, others' tracks, what ships and aircraft say themselves."""
 _KINDS = (Kind.POLAR, Kind.GEODETIC, Kind.CARTESIAN)
 _NAMES = {48: "CAT 048", 1: "CAT 001", 62: "CAT 062", 21: "CAT 021", 0: "NMEA"}
 
@@ -58,7 +58,7 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
     chosen = positions.only(positions.category == category)
     sources = Counter(chosen.source.tolist())
     if len(sources) > 1:
-        listed = ", ".join(f"{s >> 8}/{s & 255} ({count} plots)" for s, count in sources.most_common(8))
+        listed = ", ".join(f"{_sender(one)} ({count} plots)" for one, count in sources.most_common(8))
         raise PlotFormatError(
             f"{name} holds the plots of {len(sources)} radars (SAC/SIC): {listed}; choose one with --set radar.sac=... "
             "--set radar.sic=..."
@@ -73,8 +73,13 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
 
 def _contents(messages: Messages) -> str:
     positions = messages.only(~messages.marks)
-    found = Counter((_NAMES[c], f"{s >> 8}/{s & 255}") for c, s in zip(positions.category, positions.source, strict=True))
-    return ", ".join(f"{count} of {name} from {source}" for (name, source), count in found.most_common(8)) or "none"
+    found = Counter(zip(positions.category.tolist(), positions.source.tolist(), strict=True)).most_common(8)
+    return ", ".join(f"{n} of {_NAMES[category]} from {_sender(source)}" for (category, source), n in found) or "none"
+
+
+def _sender(source: int) -> str:
+    """SAC/SIC."""
+    return f"{source >> 8}/{source & 255}"
 
 
 def plots_of(messages: Messages, scan: Ints, settings: RadarSettings, plane: Plane | None, losses: Losses) -> Plots:
@@ -91,7 +96,9 @@ def plots_of(messages: Messages, scan: Ints, settings: RadarSettings, plane: Pla
     polar = bool(len(messages)) and messages.kind[0] == Kind.POLAR
     doppler = polar and bool(np.isfinite(messages.doppler_m_s).all())
     z = _positions(messages, plane)
-    sigmas = [settings.sigma_range_m, np.radians(settings.sigma_azimuth_deg)] if polar else [settings.sigma_position_m] * 2
+    sigmas = [settings.sigma_position_m] * 2
+    if polar:
+        sigmas = [settings.sigma_range_m, np.radians(settings.sigma_azimuth_deg)]
     if doppler:
         z, sigmas = np.column_stack([z, messages.doppler_m_s]), [*sigmas, settings.sigma_doppler_m_s]
     sigma = np.broadcast_to(np.array(sigmas, dtype=float), z.shape)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -22,6 +22,8 @@ from vidtrack.radar.plots import Plots
 _log = logging.getLogger(__name__)
 _LOOKED_AT = 1 << 20
 """Octets of a file from which its format is told."""
+_LOOKED_AT_AGAIN = 1 << 16
+"""Octets of a payload from which a decoder learns the time of day."""
 _PAYLOADS = 50
 """Payloads of a capture from which the format is told: other things may be in it."""
 
@@ -64,11 +66,20 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
     kind = _kind(content[:_LOOKED_AT])
     if kind is None:
         raise PlotFormatError(f"{path} is neither ASTERIX (raw, pcap, FINAL) nor NMEA")
-    decoder = kind(losses)
+    decoder = _informed(kind, content)
+    decoder.losses = losses
     found = [message for payload in payloads(content) for message in decoder.messages(payload)]
     if not found:
         raise PlotFormatError(f"{path} holds no message of a radar; {losses.damaged} damaged ones")
     return Messages.of(found)
+
+
+def _informed(kind: type[Decoder], content: bytes) -> Decoder:
+    """A decoder that has read the beginning: some messages need a time of day that others say later."""
+    decoder = kind(Losses())
+    for payload in islice(payloads(content), _PAYLOADS):
+        deque(decoder.messages(payload[:_LOOKED_AT_AGAIN]), maxlen=0)
+    return decoder
 
 
 def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
