@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Messages
 
 FASTEST_S, SLOWEST_S = 0.4, 20.0
@@ -36,8 +36,8 @@ class Pace(Protocol):
 
     period_s: float
 
-    def number(self, messages: Messages) -> Ints:
-        """(N,) the scan of each message."""
+    def progress(self, messages: Messages) -> Floats:
+        """(N,) scans that had passed at each message; its integer part is the number of the message's scan."""
 
 
 class Turns:
@@ -58,22 +58,22 @@ class Turns:
         self._turn: float | None = None
         self._time = 0.0
 
-    def number(self, messages: Messages) -> Ints:
-        """(N,) the turn of each message."""
+    def progress(self, messages: Messages) -> Floats:
+        """(N,) turns at each message."""
         azimuth = messages.v / (2 * math.pi) % 1
-        numbers = np.empty(len(messages), np.int64)
+        turns = np.empty(len(messages))
         for k, (time, part, mark) in enumerate(
             zip(messages.time_s.tolist(), azimuth.tolist(), messages.marks.tolist(), strict=True)
         ):
-            numbers[k] = self._advance(time, part, mark)
-        return numbers
+            turns[k] = self._advance(time, part, mark)
+        return turns
 
-    def _advance(self, time: float, part: float, mark: bool) -> int:
-        """The turn of a message at `part` of a turn; moves the antenna to its time."""
+    def _advance(self, time: float, part: float, mark: bool) -> float:
+        """The turns at a message at `part` of a turn; moves the antenna to its time."""
         follows = mark or self._beamed
         if self._turn is None:
             if not follows:
-                return 0  # before the first mark
+                return 0.0  # before the first mark
             self._turn, self._time = part + 1, time
         turn = self._turn + (time - self._time) / self.period_s
         self._time = time
@@ -84,7 +84,7 @@ class Turns:
             self._turn = turn + PULL * min(max(nearest - turn, -FARTHEST), FARTHEST)
         else:
             self._turn = turn
-        return math.floor(nearest if follows else turn + FARTHEST)
+        return nearest if follows else turn + FARTHEST
 
 
 class Rounds:
@@ -97,9 +97,9 @@ class Rounds:
         self.period_s = period_s
         self._start_s = start_s
 
-    def number(self, messages: Messages) -> Ints:
-        """(N,) how many durations after the start each message is."""
-        return np.floor((messages.time_s - self._start_s) / self.period_s).astype(np.int64)
+    def progress(self, messages: Messages) -> Floats:
+        """(N,) durations since the start at each message."""
+        return np.asarray((messages.time_s - self._start_s) / self.period_s)
 
 
 def pace_of(messages: Messages, scan_s: float | None) -> Pace:

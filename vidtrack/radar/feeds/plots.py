@@ -41,16 +41,22 @@ class Choice:
         return messages.only(self.holds(messages))
 
 
-def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
-    """What is tracked of a feed.
-
-    Raises PlotFormatError for a feed without positions, or with several radars of which none is chosen.
-    """
+def wanted(messages: Messages, settings: RadarSettings) -> Messages:
+    """The positions from the sender that the settings name, or from all."""
     positions = messages.only(~messages.marks)
     if settings.sac is not None:
         positions = positions.only(positions.source >> 8 == settings.sac)
     if settings.sic is not None:
         positions = positions.only(positions.source & 255 == settings.sic)
+    return positions
+
+
+def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
+    """What is tracked of a feed.
+
+    Raises PlotFormatError for a feed without positions, or with several radars of which none is chosen.
+    """
+    positions = wanted(messages, settings)
     if not len(positions):
         whose = "" if settings.sac is None and settings.sic is None else " of the radar with this sac and sic"
         raise PlotFormatError(f"{name} holds no plots{whose}; it has {_contents(messages)}")
@@ -64,11 +70,14 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
             "--set radar.sic=..."
         )
     kind = next(one for one in _KINDS if (chosen.kind == one).any())
-    choice = Choice(chosen.source[0].item(), category, kind)
+    return Choice(chosen.source[0].item(), category, kind)
+
+
+def warn_of_others(choice: Choice, messages: Messages, name: str) -> None:
+    """A warning says what of a feed is not tracked."""
     others = messages.only(~choice.holds(messages))
     if not others.marks.all():
         _log.warning("%s: tracked are %s; not %s", name, _contents(choice.of(messages)), _contents(others))
-    return choice
 
 
 def _contents(messages: Messages) -> str:

@@ -8,6 +8,8 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
@@ -15,7 +17,7 @@ from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
 from vidtrack.radar.feeds.pace import pace_of
 from vidtrack.radar.feeds.packets import payloads
-from vidtrack.radar.feeds.plots import Choice, choose, plots_of, warn_of_assumed_errors
+from vidtrack.radar.feeds.plots import Choice, choose, plots_of, warn_of_assumed_errors, warn_of_others
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
 
@@ -92,12 +94,13 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     losses, name = Losses(), str(path)
     messages = read_messages(path, losses)
     choice = choose(messages, settings, name)
+    warn_of_others(choice, messages, name)
+    warn_of_assumed_errors(choice, settings, name)
     messages = Clock(losses).on_one_clock(choice.of(messages))
     plane = plane_of(choice, messages, settings, name)
     if messages.marks.all():
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
-    scan = pace_of(messages, settings.scan_s).number(messages)
-    warn_of_assumed_errors(choice, settings, name)
+    scan = np.floor(pace_of(messages, settings.scan_s).progress(messages)).astype(np.int64)
     plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
     if str(losses):
         _log.warning("%s: left out: %s", name, losses)
