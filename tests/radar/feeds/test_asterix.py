@@ -2,6 +2,7 @@
 
 import csv
 import logging
+import sys
 
 import numpy as np
 import pytest
@@ -109,7 +110,9 @@ def test_a_clock_that_is_set_back_goes_on(tmp_path):
 
 
 def test_several_radars_are_refused_until_one_is_chosen(tmp_path):
-    blocks = [block(plot(4 * k, 20000 + 1000 * n, 1.0, radar)) for k in range(4) for n, radar in enumerate([RADAR, OTHER])]
+    blocks = [
+        block(plot(4 * k, 20000 + 1000 * n, 1.0, radar)) for k in range(4) for n, radar in enumerate([RADAR, OTHER])
+    ]
     path = recorded(tmp_path, mark(0.0, turn_s=4.0), *blocks)
     with pytest.raises(PlotFormatError, match=r"2 radars \(SAC/SIC\): 25/201 \(4 plots\), 25/202 \(4 plots\); choose"):
         seconds(path)
@@ -211,7 +214,7 @@ def test_records_end_where_the_library_says(category):
 
 def test_without_the_library_the_message_says_what_to_install(tmp_path, monkeypatch):
     path = recorded(tmp_path, mark(0.0), mark(4.0))
-    monkeypatch.setitem(__import__("sys").modules, "asterix.generated", None)
+    monkeypatch.setitem(sys.modules, "asterix.generated", None)
     layout.layouts.cache_clear()
     with pytest.raises(ConfigError, match=r"pip install 'vidtrack\[asterix\]'"):
         seconds(path)

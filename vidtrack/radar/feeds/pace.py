@@ -16,7 +16,7 @@ ROTATES = 0.8
 """Mean resultant length from which the azimuths follow a turning antenna."""
 UNLIKELY = 6.0
 """Negative logarithm of the probability that azimuths at random seem to follow an antenna."""
-LOOKED_AT = 4000
+LOOKED_AT = 1000
 """Plots from which the duration of a turn is found."""
 PULL, FARTHEST = 0.2, 0.05
 """Share of the deviation of an azimuth by which the antenna's angle is corrected, and the largest deviation used, in
@@ -139,7 +139,7 @@ def _found(plots: Messages) -> float | None:
     """
     if len(plots) < 2 or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
         return None
-    begin = plots.only(plots.time_s <= plots.time_s.min() + 10 * SLOWEST_S)
+    begin = plots.only(plots.time_s <= plots.time_s.min() + 3 * SLOWEST_S)
     begin = begin.only(np.arange(min(len(begin), LOOKED_AT)))
     span = max(float(np.ptp(begin.time_s)), FASTEST_S)
     rate = np.arange(1 / SLOWEST_S, 1 / FASTEST_S, min(1 / SLOWEST_S, 0.2 / span))
