@@ -87,6 +87,8 @@ def command(options: RadarOptions) -> None:
         feed = run_feed(
             options.plots, settings, stop.is_set, options.output, extras, force=options.force, seed=options.seed
         )
+        if not options.quiet:
+            click.echo(f"vidtrack: listening at {options.plots} until Ctrl-C", err=True)
         finish_feed(feed, stop.set, options.quiet)
         return
     run = run_plots(options.plots, settings, options.output, extras, force=options.force, seed=options.seed)

@@ -49,7 +49,7 @@ def open_radar_run(folder: Path, position: tuple[float, float, float] | None = N
     table = folder / "tracks.parquet"
     try:
         summary: dict[str, Any] = json.loads((folder / "summary.json").read_text())
-        radar = summary["settings"]["radar"]
+        radar = summary["settings"].get("radar", {})
         names, rows = set(pq.read_schema(table).names), pq.read_metadata(table).num_rows
     except (OSError, pa.ArrowInvalid, ValueError, KeyError, TypeError) as error:
         raise FormatError(f"{folder} is not a finished run: {error}; vidtrack repair {folder} may help") from None
