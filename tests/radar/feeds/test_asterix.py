@@ -200,6 +200,8 @@ def test_records_end_where_the_library_says(category):
             body = rng.integers(0, 256, 60, dtype=np.uint8).tobytes()
             body = bytes([body[0] & 0xFE]) + body[1:] if rng.random() < 0.7 else body
             parsed = record.parse(ParsingMode.StrictParsing, Bits.from_bytes(body))
+            if isinstance(parsed, ValueError) and "Last FX bit" in str(parsed):
+                continue  # a longer item of a later edition, which is walked over
             try:
                 _, end = layout.layouts()[category][name].places(body, 0)
             except layout.Damaged:
