@@ -102,6 +102,7 @@ def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:
         state=extras.state and _file(extras.state, camera),
         masks=extras.masks and extras.masks / camera.name,
         record=extras.record and extras.record / camera.name,
+        receivers=replace(extras.receivers, camera=camera.name) if extras.receivers else extras.receivers,
     )
 
 

@@ -141,9 +141,10 @@ class Supervisor:
         self._restart_s = None
         self.summaries.append(self.summary())
         self.restarts += 1
+        why = self._why()
         with self._requesting:
             self._channel.close()
-            self._start(_continued(self._first, self.restarts + 1))
+            self._start(replace(_continued(self._first, self.restarts + 1), after=why))
 
     def _pause_s(self) -> float:
         if monotonic() - self._started_s > self._first.settings.live.backoff_longest_s:
@@ -194,14 +195,14 @@ def _continued(job: Job, start: int) -> Job:
             video=extras.video and _numbered(extras.video, start),
             rerun=extras.rerun and str(_numbered(Path(extras.rerun), start)),
             masks=extras.masks and _numbered(extras.masks, start),
-            counts=counts_of(job),
+            lasting=job.extras.lasting or job.folder,
         ),
     )
 
 
 def counts_of(job: Job) -> Path:
     """The folder of the counts by interval, which all processes of a camera share."""
-    return job.extras.counts or job.folder / COUNTS
+    return (job.extras.lasting or job.folder) / COUNTS
 
 
 def _free(folder: Path) -> Path:
