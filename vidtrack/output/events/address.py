@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from urllib.parse import SplitResult, unquote, urlsplit
+from urllib.parse import SplitResult, quote, unquote, urlsplit
 
 from vidtrack.errors import ConfigError
-from vidtrack.video.live.address import HIDDEN, escaped, redact, secrets
+from vidtrack.video.live.address import HIDDEN, redact, secrets
 
 _MQTT = {"mqtt": 1883, "mqtts": 8883}
 _WEB = {"http": 80, "https": 443}
@@ -49,9 +49,16 @@ class Hook:
 
 
 def parse_broker(address: str) -> Broker:
-    """The broker of mqtt[s]://[USER:PASSWORD@]HOST[:PORT][/PREFIX]. Raises ConfigError."""
+    """The broker of mqtt[s]://[USER:PASSWORD@]HOST[:PORT][/PREFIX]. Raises ConfigError.
+
+    A password may contain any characters; % is written as %25.
+    """
     shown = redact(address)
-    parts = _split(address, shown, _MQTT, "mqtt://USER:PASSWORD@HOST/PREFIX or mqtts://...")
+    scheme, mark, rest = address.partition("://")
+    login, at, place = rest.rpartition("@")
+    user, colon, password = login.partition(":")
+    whole = f"{scheme}{mark}{quote(user, safe='%')}{colon}{quote(password, safe='%')}{at}{place}"
+    parts = _split(whole, shown, _MQTT, "mqtt://USER:PASSWORD@HOST/PREFIX or mqtts://...")
     prefix = unquote(parts.path).strip("/") or _PREFIX
     if parts.query or parts.fragment or set(prefix) & set("+#\0"):
         raise ConfigError(f"--mqtt {shown}: the path is the first part of the topics and may not contain ? # +")
@@ -82,7 +89,7 @@ def secret_parts(mqtt: str | None, webhook: str | None) -> list[str]:
 def _split(address: str, shown: str, ports: dict[str, int], example: str) -> SplitResult:
     option = "--mqtt" if ports is _MQTT else "--webhook"
     try:
-        parts = urlsplit(escaped(address))
+        parts = urlsplit(address)
         good = parts.scheme in ports and parts.hostname and parts.port != 0
     except ValueError:  # the port is no number below 65536, or a bracket is missing
         good = False

@@ -13,6 +13,7 @@ import re
 import secrets
 import ssl
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from threading import Event as Flag
 from time import monotonic
@@ -140,9 +141,8 @@ class Mqtt:
             return
         if client.is_connected():
             goodbye = client.publish(f"{self._topic}/available", "offline", _QOS, retain=True)
-            until_s = monotonic() + _GOODBYE_S
-            while not goodbye.is_published() and client.is_connected() and monotonic() < until_s:
-                goodbye.wait_for_publish(0.05)
+            with suppress(RuntimeError):
+                goodbye.wait_for_publish(_GOODBYE_S)
         client.disconnect()
         client.loop_stop()
 
@@ -160,13 +160,16 @@ class Mqtt:
         """Wait until the broker has confirmed all of them."""
         assert self._client is not None
         until_s = monotonic() + self._timeout_s
-        for message in published:
-            while not message.is_published():
-                if not self._client.is_connected():
-                    raise Unreachable(f"the connection to {self.shown} is lost")
-                if monotonic() > until_s:
-                    raise Unreachable(f"{self.shown} does not confirm events within {self._timeout_s:g} s")
-                message.wait_for_publish(0.2)
+        try:
+            for message in published:
+                while not message.is_published():
+                    if not self._client.is_connected():
+                        raise Unreachable(f"the connection to {self.shown} is lost")
+                    if monotonic() > until_s:
+                        raise Unreachable(f"{self.shown} does not confirm events within {self._timeout_s:g} s")
+                    message.wait_for_publish(0.2)
+        except RuntimeError:  # it was not even given to the connection
+            raise Unreachable(f"the connection to {self.shown} is lost") from None
 
 
 def topic_level(name: str) -> str:

@@ -106,7 +106,7 @@ class Sender:
                         break
                     self._outbox.wait(_LOOK_S)
                     last = self._ending.is_set()
-            except (Error, OSError) as error:
+            except Exception as error:  # whatever happens, the events wait and are tried again
                 self._failed(error)
             finally:
                 self._receiver.close()

@@ -60,7 +60,7 @@ def parse_address(source: str, timeout_s: float) -> Address:
     if scheme.startswith("rtsp"):
         # TCP: lost UDP packets become grey smears that look like vehicles.
         options = {"rtsp_transport": "tcp", "timeout": microseconds, "allowed_media_types": "video"}
-    url = escaped(source)
+    url = _escaped(source)
     return Address(url, shown, _host(url, shown), None, options)
 
 
@@ -86,7 +86,7 @@ def _host(url: str, shown: str) -> str:
     return visible.netloc.rpartition("@")[2] or visible.scheme
 
 
-def escaped(address: str) -> str:
+def _escaped(address: str) -> str:
     """The address with "/", "?" and "#" in the password escaped for FFmpeg."""
     return _USER.sub(lambda found: "://" + quote(found[1], safe=_MAY_STAY), address, count=1)
 
