@@ -27,11 +27,16 @@ class Page:
         listener = listen(place, token)
         self._server = Server(listener)
         self._token = token
+        self._answers: Answers | None = None
         self.url = url_of(listener)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
-        """Start to respond; until then clients wait."""
-        self._server.start(protected(Answers(cameras).app(), self._token))
+        """Start to respond; until then clients wait. Called again, show these cameras instead."""
+        if self._answers is None:
+            self._answers = Answers(cameras)
+            self._server.start(protected(self._answers.app(), self._token))
+        else:
+            self._answers.show(cameras)
 
     def close(self) -> None:
         """Close all connections and the port."""

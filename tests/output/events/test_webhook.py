@@ -97,7 +97,7 @@ def test_the_user_of_an_address_is_sent_as_basic_authorization(tmp_path):
     [
         (parse_hook, "ftp://u:geheim@host/geheim", "--webhook ftp://***: write it as"),
         (parse_hook, "https://host:x/geheim", "--webhook https://***"),
-        (parse_broker, "host", "--mqtt host: write it as mqtt://"),
+        (parse_broker, "host", "--mqtt ***: write it as mqtt://"),
         (parse_broker, "mqtt://u:geheim@", "--mqtt mqtt://***@: write it as"),
         (parse_broker, "mqtt://u:geheim@host/a/+", "may not contain"),
     ],

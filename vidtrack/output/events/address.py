@@ -53,7 +53,7 @@ def parse_broker(address: str) -> Broker:
 
     A password may contain any characters; % is written as %25.
     """
-    shown = redact(address)
+    shown = redact(address) if "://" in address else HIDDEN
     scheme, mark, rest = address.partition("://")
     login, at, place = rest.rpartition("@")
     user, colon, password = login.partition(":")

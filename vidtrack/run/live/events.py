@@ -25,7 +25,7 @@ from vidtrack.output.events.webhook import Webhook, tls_context
 from vidtrack.output.intervals.book import Passage, Totals
 from vidtrack.output.sink import Step
 from vidtrack.recording.event_pictures import EventPictures
-from vidtrack.run.live.road_events import RoadEvents
+from vidtrack.run.live.road_events import RoadEvents, prepare
 from vidtrack.run.sinks import Subject
 
 log = logging.getLogger(__name__)
@@ -130,6 +130,8 @@ class LiveEvents:
         self._counts = subject.counter.totals if subject.counter else dict
         self._pictures, self._began_s = pictures, began_s
         self._coast_s = subject.settings.tracker.coast_s
+        if subject.settings.output.site is not None:
+            prepare()
         self.use(subject)
 
     def use(self, subject: Subject) -> None:

@@ -13,7 +13,7 @@ from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.measures.conflicts import PET, TTC, Conflicts, Meeting
-from vidtrack.traffic.measures.rows import rows_of
+from vidtrack.traffic.measures.rows import Rows, rows_of
 from vidtrack.traffic.measures.staying import outlines_of
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import parse_site
@@ -78,6 +78,36 @@ class RoadEvents:
         self._last_s = float(seen.t[-1])
         self._meeting.add(seen)
         yield from _told(self._meeting.settled())
+
+
+def prepare() -> None:
+    """Compile what looks for conflicts, which on the first use takes longer than results can wait."""
+    time_s = np.repeat(np.arange(0.0, 2.0, 0.1), 2)
+    track = np.tile([0, 1], len(time_s) // 2)
+    v = np.where(track[:, None] == 0, [10.0, 0.0], [0.0, 10.0])
+    xy = (time_s[:, None] - 1.0) * v
+    yes, one = np.ones(len(track), bool), np.ones(len(track))
+    sides, spread = (4 * one, one / 4, 2 * one), np.tile([0.01, 0.01, 0.0], (len(track), 1))
+    meeting = Meeting()
+    meeting.add(
+        Rows(
+            track,
+            time_s,
+            yes,
+            ~yes,
+            xy,
+            one,
+            one,
+            v,
+            one / 9,
+            one / 9,
+            *sides,
+            v / 10,
+            spread,
+            np.full((len(track), 4), np.nan),
+        )
+    )
+    meeting.settled()
 
 
 def _told(found: Conflicts) -> Iterator[tuple[float, dict[str, Any]]]:
