@@ -180,17 +180,25 @@ def command(options: LiveOptions) -> int:
 
 def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> None:
     from vidtrack.cli.signals import stopping
+    from vidtrack.output.status import is_stuck
     from vidtrack.run.live.run import LiveRun
     from vidtrack.run.live.view import View
     from vidtrack.serve.camera import Camera
+    from vidtrack.service.notify import Reports
     from vidtrack.video.live.address import parse_address
 
     stale_s = 2 * settings.live.timeout_s
     address = parse_address(options.sources[0], settings.live.timeout_s)
     view = View(address.shown)
+    camera = Camera(view.status, view.picture, lambda: view.counts, stale_s)
     if page is not None:
-        page.show({address.name: Camera(view.status, view.picture, lambda: view.counts, stale_s)})
+        page.show({address.name: camera})
+
+    def report() -> tuple[bool, str]:
+        return not is_stuck(view.status(), stale_s) and (page is None or page.answers()), camera.words()
+
     with (
+        Reports(report),
         LiveRun(
             options.sources[0], settings, options.output, options.extras(), force=options.force, stats=view.stats
         ) as run,

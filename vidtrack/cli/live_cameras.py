@@ -39,13 +39,18 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     from vidtrack.output.folder import open_run, usable
     from vidtrack.run.live.followed_file import FollowedFile
     from vidtrack.run.live.supervisors import Supervisors
+    from vidtrack.service.notify import Reports
 
     listing = FollowedFile(Path(options.sources[0])) if len(options.sources) == 1 else None
     jobs_in = partial(_jobs, options, partial(start_log, options.verbose, options.quiet))
     jobs_in(Path())  # what is wrong is told before there is a folder
     folder = open_run(None, "live", options.force) if options.output is None else usable(options.output)
     jobs = jobs_in(folder, force=options.force)
-    with Supervisors(jobs, folder) as supervisors, stopping(supervisors.stop):
+    with (
+        Supervisors(jobs, folder) as supervisors,
+        stopping(supervisors.stop),
+        Reports(partial(_report, supervisors, page)),
+    ):
         if page is not None:
             page.show(_cameras(supervisors))
         reported_s = time.monotonic()
@@ -105,6 +110,13 @@ def _change(supervisors: Supervisors, jobs: Callable[[], list[Job]], path: Path)
         log.warning("%s; the cameras go on as they are", str(error).partition("\n")[0])
         return
     log.warning("%s: %s", path, ", ".join(changes) or "no camera has changed")
+
+
+def _report(supervisors: Supervisors, page: Page | None) -> tuple[bool, str]:
+    """Whether all works that a restart could mend, and the state of the cameras in words."""
+    working = [supervisor.works() for supervisor in list(supervisors.by_camera.values())]
+    words = ", ".join(f"{name}: {camera.words()}" for name, camera in _cameras(supervisors).items())
+    return all(working) and (page is None or page.answers()), words
 
 
 def _cameras(supervisors: Supervisors) -> dict[str, Camera]:

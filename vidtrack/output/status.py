@@ -170,6 +170,12 @@ def trouble_of(status: Mapping[str, Any], stale_s: float) -> str | None:
     return "; ".join(failing) or None
 
 
+def is_stuck(status: Mapping[str, Any], stale_s: float) -> bool:
+    """Whether pictures come and are not tracked, `stale_s` after frames were tracked; the first one may take longer."""
+    age_s = status.get("frame_age_s")
+    return status["state"] == "running" and age_s is not None and age_s > stale_s
+
+
 def as_rows(tracks: Tracks) -> list[dict[str, Any]]:
     """The confirmed tracks as JSON objects: track_id, status, x_px, y_px, vx_px_s, vy_px_s, box_px."""
     shown = tracks.status != Status.TENTATIVE

@@ -35,6 +35,10 @@ class Camera:
         """Why the camera does not deliver, see `trouble_of`."""
         return trouble_of(status, self.stale_s)
 
+    def words(self) -> str:
+        """The camera's trouble now, or that there is none."""
+        return self.trouble(self.status()) or "delivers"
+
 
 class Shared(Generic[Value]):
     """A value computed in a thread, at most every `least_s` seconds, and shared by all requests."""

@@ -16,6 +16,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
+from vidtrack.output.status import is_stuck
 from vidtrack.recording.retention import parts_of
 from vidtrack.run.live.counting import COUNTS
 from vidtrack.run.live.view import waiting_for
@@ -129,6 +130,16 @@ class Supervisor:
             return None
         return self._why()
 
+    def works(self) -> bool:
+        """Whether a restart of the whole run would mend nothing: the process answers, and tracks what comes.
+
+        One that is gone is restarted alone; one that starts has not answered yet.
+        """
+        if self.exit_code is not None or not self._answered:
+            return True
+        answer = self._request(STATUS)
+        return answer is not None and not is_stuck(json.loads(answer), 2 * self.asked.settings.live.timeout_s)
+
     def stop(self) -> None:
         """Stop the process. Does not wait."""
         self._restart_s = self._next = None
@@ -152,7 +163,7 @@ class Supervisor:
     def _start(self, job: Job) -> None:
         self.job = job
         self._last = waiting_for(self._shown, "connecting", [])
-        self._begun = self._final_status_came = False
+        self._begun = self._final_status_came = self._answered = False
         self._started_s = monotonic()
         self._stopped, self._kill_s = False, None
         self._processes += 1
@@ -210,6 +221,7 @@ class Supervisor:
                         self._last = json.loads(content)
                         self._final_status_came = True
                     elif tag == number:  # other numbers answer requests that timed out
+                        self._answered = True
                         return content
             except (EOFError, OSError):
                 self._channel.close()
