@@ -43,7 +43,8 @@ from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
 
 _HOUR_S = 3600.0
-_END_S = 1.6  # from `stop` to the end of the run
+_END_S = 1.3  # from `stop` to the end of the run
+_GOODBYE_S = 0.3  # least time to send the last events
 _LEAST_S = 0.5  # least time to finish after the last frame
 
 
@@ -193,7 +194,7 @@ class LiveRun:
             return None
         locks.enter_context(exclusive(usable(place / OUTBOX)))
         events = LiveEvents(extras.receivers, self.name, place, self._settings, self._trouble, after, self._stats.warn)
-        locks.callback(lambda: events.close(max(self._until_s or 0.0, monotonic() + _LEAST_S)))
+        locks.callback(lambda: events.close(max(self._until_s or 0.0, monotonic() + _GOODBYE_S)))
         return events
 
     def _event_pictures(self, root: Path, subject: Subject) -> EventPictures | None:

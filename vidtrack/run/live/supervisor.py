@@ -26,7 +26,7 @@ from vidtrack.video.live.backoff import Backoff
 
 log = logging.getLogger(__name__)
 
-END_S = 1.8
+END_S = 1.6
 """s; a process that was stopped and still runs then is killed; its files stay valid"""
 
 _ANSWER_S = 1.0

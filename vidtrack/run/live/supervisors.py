@@ -38,6 +38,8 @@ class Supervisors:
     def __init__(self, jobs: Iterable[Job], folder: Path) -> None:
         self.folder = folder
         self._stopping = Event()
+        self._until_s: float | None = None  # monotonic time of the end; None: not stopped
+        self._final: dict[str, Any] | None = None
         self._lock = ExitStack()
         self._lock.enter_context(exclusive(folder))
         self.by_camera = {job.name: Supervisor(job) for job in jobs}
@@ -79,6 +81,7 @@ class Supervisors:
 
     def stop(self) -> None:
         """Stop all processes; `running` then returns False. Safe in any thread and in signal handlers."""
+        self._until_s = self._until_s or monotonic() + _END_S  # the time counts from the signal
         self._stopping.set()
         for supervisor in self._all:
             supervisor.stop()
@@ -89,6 +92,8 @@ class Supervisors:
 
     def summary(self) -> dict[str, Any]:
         """The summaries of all cameras, with the sums of their counts; `error` for a camera that failed."""
+        if self._final is not None:
+            return self._final
         cameras = {name: _summary(supervisor) for name, supervisor in self.by_camera.items()}
         cameras |= {name: _summary(supervisor) | {"removed": True} for name, supervisor in self._removed.items()}
         totals = {key: sum(camera.get(key, 0) for camera in cameras.values()) for key in (*_COUNTED, "restarts")}
@@ -105,13 +110,14 @@ class Supervisors:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
-        until_s = monotonic() + _END_S
+        until_s = self._until_s or 0.0
         while (alive := _alive(self._all)) and monotonic() < until_s:
-            wait([supervisor.sentinel for supervisor in alive], until_s - monotonic())
+            wait([supervisor.sentinel for supervisor in alive], max(0.0, until_s - monotonic()))
         for supervisor in alive:
             supervisor.kill()
         try:
-            replace_text(self.folder / "summary.json", json.dumps(self.summary(), indent=2) + "\n")
+            self._final = self.summary()
+            replace_text(self.folder / "summary.json", json.dumps(self._final, indent=2) + "\n")
         except StoppedEarly as failure:
             log.warning("%s", failure)
         self._lock.close()
