@@ -207,11 +207,10 @@ class LiveRun:
         return EventPictures(root, subject.lines, zone_of(live.zone), quality, limits, reserve)
 
     def _trouble(self) -> str | None:
-        """Why the camera does not deliver, with its last problem; None if it does."""
-        status = self._status()
+        """Why the camera does not deliver, with the last problem of a lost one; None if it does."""
+        status, problems = self._status(), list(self._stats.problems)
         trouble = trouble_of(status, self._stale_s)
-        problems = list(self._stats.problems)
-        return trouble if trouble is None or not problems else f"{trouble}: {problems[-1][1]}"
+        return f"{trouble}: {problems[-1][1]}" if problems and status["state"] != "running" else trouble
 
     def _followed(self, tell: Callable[[str], None]) -> FollowedSite | None:
         """The site of the run, whose file may change; None without one. Raises ConfigError."""

@@ -74,7 +74,7 @@ class Supervisor:
     @property
     def ended(self) -> bool:
         """Whether the process has ended and will not be restarted."""
-        return self.exit_code is not None and self._restart_s is None
+        return self.exit_code is not None and self._restart_s is None and self._next is None
 
     def restart_if_due(self) -> None:
         """Restart the process if it crashed and the pause is over, or another job is to follow it."""
