@@ -92,6 +92,16 @@ def test_a_full_disk_delays_events_and_drops_none(tmp_path, monkeypatch):
     assert taken(box) == [line(1), line(2)]
 
 
+def test_a_queue_as_the_first_version_wrote_it_is_continued(tmp_path):
+    """An update keeps what waits: these files are written by hand."""
+    (tmp_path / "00000003.jsonl").write_text('{"n": 1}\n{"n": 2}\n')
+    (tmp_path / "00000004.jsonl").write_text('{"n": 3}\n')
+    (tmp_path / "sent.json").write_text('{"version": 1, "file": 3, "offset": 9, "dropped": 7}\n')
+    box = Outbox(tmp_path, 1e6)
+    assert (box.waiting, box.dropped) == (2, 7)
+    assert taken(box) == ['{"n": 2}\n', '{"n": 3}\n']
+
+
 def test_a_queue_of_a_later_version_is_not_touched(tmp_path):
     Outbox(tmp_path, 1e6).add([line(1)])
     (tmp_path / "sent.json").write_text('{"version": 2, "file": 1, "offset": 0, "dropped": 0}')
