@@ -17,6 +17,7 @@ FLOORS = (
     "cli",
     "papers",
     "doctor",
+    "service",
     "run",
     "recording",
     "serve",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vidtrack.serve.page import Page
 
 _REPORT_S = 60.0
-_KINDS = ("", "tracks", "recordings", "counts")
+_KINDS = ("", "tracks", "recordings", "counts", "pictures")
 _SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
 _BYTES = {"MB": 1e6, "GB": 1e9, "TB": 1e12}
 
@@ -39,6 +39,9 @@ class LiveOptions(PictureOptions):
     record: Path | None
     http: str | None
     http_token: str | None
+    mqtt: str | None
+    webhook: str | None
+    webhook_token: str | None
 
     def given(self) -> list[str | tuple[str, Any]]:
         """The settings on the command line, with --roll and --keep in seconds or bytes. Raises click.BadParameter."""
@@ -49,16 +52,20 @@ class LiveOptions(PictureOptions):
 
     def extras(self) -> LiveExtras:
         """The optional outputs."""
+        from vidtrack.run.live.events import Receivers
         from vidtrack.run.live.outputs import LiveExtras
 
-        return LiveExtras(self.rerun, self.video, self.save_masks, self.decisions, self.state, self.record)
+        receivers = Receivers(self.mqtt, self.webhook, self.webhook_token)
+        return LiveExtras(
+            *(self.rerun, self.video, self.save_masks, self.decisions, self.state, self.record), receivers=receivers
+        )
 
 
 def kept(text: str) -> tuple[str, float]:
     """The setting and its value of --keep [KIND:]TIME|SIZE. Raises click.BadParameter."""
     kind, colon, value = text.rpartition(":")
     if kind not in _KINDS or (colon and not kind):
-        raise click.BadParameter(f"{text!r}: {kind!r} is not one of tracks, recordings, counts", param_hint="--keep")
+        raise click.BadParameter(f"{text!r}: {kind!r} is not one of {', '.join(_KINDS[1:])}", param_hint="--keep")
     units = {f"live.keep_{kind and f'{kind}_'}s": _SECONDS}
     if kind != "counts":  # they take next to nothing
         units[f"live.keep_{kind and f'{kind}_'}bytes"] = _BYTES
@@ -98,7 +105,8 @@ Examples:
     "keeps",
     multiple=True,
     metavar="[KIND:]TIME|SIZE",
-    help="Delete the oldest tracks and recordings: 7d or 10GB, or both; or of one KIND: tracks, recordings, counts.",
+    help="Delete the oldest tracks and recordings: 7d or 10GB, or both; or of one KIND: tracks, recordings, counts, "
+    "pictures.",
 )
 @click.option("--state", type=click.Path(path_type=Path), metavar="FILE", help="Go on from this file, and save to it.")
 @click.option("--record", type=click.Path(path_type=Path), metavar="DIR", help="Keep what the camera sends, to replay.")
@@ -109,6 +117,27 @@ Examples:
     envvar="VIDTRACK_TOKEN",
     show_envvar=True,
     help="The page's password; a must where other machines can see it.",
+)
+@click.option(
+    "--mqtt",
+    metavar="ADDRESS",
+    envvar="VIDTRACK_MQTT",
+    show_envvar=True,
+    help="Send events to a broker: mqtt[s]://[USER:PASSWORD@]HOST[:PORT][/PREFIX].",
+)
+@click.option(
+    "--webhook",
+    metavar="ADDRESS",
+    envvar="VIDTRACK_WEBHOOK",
+    show_envvar=True,
+    help="Post events as JSON to http[s]://[USER:PASSWORD@]HOST/PATH.",
+)
+@click.option(
+    "--webhook-token",
+    metavar="TOKEN",
+    envvar="VIDTRACK_WEBHOOK_TOKEN",
+    show_envvar=True,
+    help="Sent with each webhook as bearer token.",
 )
 @receives(LiveOptions)
 def command(options: LiveOptions) -> int:
@@ -128,10 +157,12 @@ def command(options: LiveOptions) -> int:
         from vidtrack.cli.hide import hide_arguments
         from vidtrack.cli.live_cameras import are_many, track_many
         from vidtrack.config.inputs import Input
+        from vidtrack.output.events.address import secret_parts
         from vidtrack.video.live.address import secrets
 
         hidden = [text for source in options.sources for text in secrets(source)]
-        hide_arguments([*hidden, *([options.http_token] if options.http_token else [])])
+        hidden += secret_parts(options.mqtt, options.webhook)
+        hide_arguments([*hidden, *filter(None, (options.http_token, options.webhook_token))])
         start_log(options.verbose, options.quiet)
         settings = options.settings(Input.CAMERA)
         announce_compiling(options.quiet)
@@ -149,17 +180,25 @@ def command(options: LiveOptions) -> int:
 
 def _track_one(options: LiveOptions, settings: Settings, page: Page | None) -> None:
     from vidtrack.cli.signals import stopping
+    from vidtrack.output.status import is_stuck
     from vidtrack.run.live.run import LiveRun
     from vidtrack.run.live.view import View
     from vidtrack.serve.camera import Camera
+    from vidtrack.service.notify import Reports
     from vidtrack.video.live.address import parse_address
 
     stale_s = 2 * settings.live.timeout_s
     address = parse_address(options.sources[0], settings.live.timeout_s)
     view = View(address.shown)
+    camera = Camera(view.status, view.picture, lambda: view.counts, stale_s)
     if page is not None:
-        page.show({address.name: Camera(view.status, view.picture, lambda: view.counts, stale_s)})
+        page.show({address.name: camera})
+
+    def report() -> tuple[bool, str]:
+        return not is_stuck(view.status(), stale_s) and (page is None or page.answers()), camera.words()
+
     with (
+        Reports(report),
         LiveRun(
             options.sources[0], settings, options.output, options.extras(), force=options.force, stats=view.stats
         ) as run,

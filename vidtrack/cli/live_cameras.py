@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,11 @@ from vidtrack.cli.options import start_log
 if TYPE_CHECKING:
     from vidtrack.cli.live import LiveOptions
     from vidtrack.run.live.supervisors import Supervisor, Supervisors
+    from vidtrack.run.live.worker import Job
+    from vidtrack.serve.camera import Camera
     from vidtrack.serve.page import Page
+
+log = logging.getLogger(__name__)
 
 _REPORT_S = 60.0
 _LOOK_S = 0.2
@@ -32,8 +37,49 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     """Track all cameras until a signal; the exit code is 0 unless every camera failed."""
     from vidtrack.cli.signals import stopping
     from vidtrack.output.folder import open_run, usable
-    from vidtrack.run.live.cameras import extras_of, listed, named, refuse_shared_site, settings_of
+    from vidtrack.run.live.followed_file import FollowedFile
     from vidtrack.run.live.supervisors import Supervisors
+    from vidtrack.service.notify import Reports
+
+    listing = FollowedFile(Path(options.sources[0])) if len(options.sources) == 1 else None
+    jobs_in = partial(_jobs, options, partial(start_log, options.verbose, options.quiet))
+    jobs_in(Path())  # what is wrong is told before there is a folder
+    folder = open_run(None, "live", options.force) if options.output is None else usable(options.output)
+    jobs = jobs_in(folder, force=options.force)
+    with (
+        Supervisors(jobs, folder) as supervisors,
+        stopping(supervisors.stop),
+        Reports(partial(_report, supervisors, page)),
+    ):
+        if page is not None:
+            page.show(_cameras(supervisors))
+        reported_s = time.monotonic()
+        while supervisors.running(_LOOK_S):
+            if listing is not None and listing.changed():
+                _change(supervisors, partial(jobs_in, folder, checked=True), listing.path)
+                if page is not None:
+                    page.show(_cameras(supervisors))
+            if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
+                reported_s = time.monotonic()
+                for name, supervisor in supervisors.by_camera.items():
+                    click.echo(f"{name}: {_line(supervisor)}", err=True)
+    if not options.quiet:
+        _print_table(supervisors)
+    click.echo(folder)
+    codes = [supervisor.exit_code or 0 for supervisor in supervisors.by_camera.values() if supervisor.error]
+    return max(1, *codes) if len(codes) == len(supervisors.by_camera) else 0
+
+
+def _jobs(
+    options: LiveOptions, prepare: Callable[[str], None], folder: Path, *, force: bool = False, checked: bool = False
+) -> list[Job]:
+    """The jobs of all cameras, as they are listed now.
+
+    checked  raise an error, too, for what otherwise ends the process of its camera alone
+
+    Raises ConfigError.
+    """
+    from vidtrack.run.live.cameras import extras_of, listed, named, refuse_shared_site, refuse_unusable, settings_of
     from vidtrack.run.live.worker import Job
 
     for_all: Mapping[str, Any] = {}
@@ -44,39 +90,45 @@ def track_many(options: LiveOptions, page: Page | None) -> int:
     wanted = [settings_of(camera, for_all, options.config_file, options.given()) for camera in cameras]
     refuse_shared_site(cameras, wanted)
     own = [extras_of(camera, options.extras()) for camera in cameras]
-    folder = open_run(None, "live", options.force) if options.output is None else usable(options.output)
-    log = partial(start_log, options.verbose, options.quiet)
-    jobs = [
-        Job(camera.name, camera.address, settings, folder / camera.name, extras, options.force, log)
+    for camera, settings, extras in zip(cameras, wanted, own, strict=True):
+        extras.receivers.check(settings, options.output)
+        if checked:
+            refuse_unusable(camera, settings)
+    return [
+        Job(camera.name, camera.address, settings, folder / camera.name, extras, force, prepare)
         for camera, settings, extras in zip(cameras, wanted, own, strict=True)
     ]
-    with Supervisors(jobs, folder) as supervisors, stopping(supervisors.stop):
-        if page is not None:
-            _show(page, supervisors)
-        reported_s = time.monotonic()
-        while supervisors.running(_LOOK_S):
-            if not options.quiet and time.monotonic() - reported_s > _REPORT_S:
-                reported_s = time.monotonic()
-                for name, supervisor in supervisors.by_camera.items():
-                    click.echo(f"{name}: {_line(supervisor)}", err=True)
-    if not options.quiet:
-        _print_table(supervisors)
-    click.echo(folder)
-    codes = [supervisor.exit_code or 0 for supervisor in supervisors.by_camera.values() if supervisor.error]
-    return max(1, *codes) if len(codes) == len(jobs) else 0
 
 
-def _show(page: Page, supervisors: Supervisors) -> None:
+def _change(supervisors: Supervisors, jobs: Callable[[], list[Job]], path: Path) -> None:
+    """Track the cameras that are listed now; a list with a mistake changes nothing."""
+    from vidtrack.errors import Error
+
+    try:
+        changes = supervisors.use(jobs())
+    except Error as error:
+        log.warning("%s; the cameras go on as they are", str(error).partition("\n")[0])
+        return
+    log.warning("%s: %s", path, ", ".join(changes) or "no camera has changed")
+
+
+def _report(supervisors: Supervisors, page: Page | None) -> tuple[bool, str]:
+    """Whether all works that a restart could mend, and the state of the cameras in words."""
+    working = [supervisor.works() for supervisor in list(supervisors.by_camera.values())]
+    words = ", ".join(f"{name}: {camera.words()}" for name, camera in _cameras(supervisors).items())
+    return all(working) and (page is None or page.answers()), words
+
+
+def _cameras(supervisors: Supervisors) -> dict[str, Camera]:
+    """The cameras as the page needs them."""
     from vidtrack.serve.camera import Camera
 
-    page.show(
-        {
-            name: Camera(
-                supervisor.status, supervisor.picture, supervisor.counts, 2 * supervisor.job.settings.live.timeout_s
-            )
-            for name, supervisor in supervisors.by_camera.items()
-        }
-    )
+    return {
+        name: Camera(
+            supervisor.status, supervisor.picture, supervisor.counts, 2 * supervisor.asked.settings.live.timeout_s
+        )
+        for name, supervisor in supervisors.by_camera.items()
+    }
 
 
 def _line(supervisor: Supervisor) -> str:

@@ -18,7 +18,7 @@ class Input(StrEnum):
 
 _OWN = {
     Input.VIDEO: ("detector", "blobs"),
-    Input.CAMERA: ("detector", "blobs", "live"),
+    Input.CAMERA: ("detector", "blobs", "live", "events"),
     Input.DETECTIONS: ("detections",),
     Input.RADAR: ("radar",),
 }
@@ -31,15 +31,15 @@ _OF_PICTURES = (
     *("source.scale", "source.mask", "output.video_crf", "output.jpeg_quality"),
 )
 _UNREAD = {
-    Input.VIDEO: ("detections", "radar", "live", "tracker.redundant"),
+    Input.VIDEO: ("detections", "radar", "live", "events", "tracker.redundant"),
     Input.CAMERA: ("detections", "radar", "tracker.redundant", "detector.disturbance.preview_s"),
     Input.DETECTIONS: (
-        *("detector", "blobs", "radar", "live"),
+        *("detector", "blobs", "radar", "live", "events"),
         *_OF_PICTURES,
         *("tracker.confirm_hits", "tracker.confirm_window"),
     ),
     Input.RADAR: (
-        *("detector", "blobs", "detections", "live", "source"),
+        *("detector", "blobs", "detections", "live", "events", "source"),
         *_OF_PICTURES,
         *("tracker.accel", "tracker.cross", "tracker.hold_s", "tracker.speed"),
         *("tracker.life", "tracker.coast_s", "tracker.clutter_density", "tracker.euclidean_radius_px"),
@@ -87,6 +87,8 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.cell_range_m": ("radar.unresolved", (True,)),
     "radar.cell_azimuth_deg": ("radar.unresolved", (True,)),
     "radar.cell_elevation_deg": ("radar.unresolved", (True,)),
+    "live.keep_pictures_s": ("events.pictures", (True,)),
+    "live.keep_pictures_bytes": ("events.pictures", (True,)),
     "output.every_s": ("output.level", ("tracks", "all")),
     "output.smooth_lag_s": ("output.smooth", (True,)),
 }

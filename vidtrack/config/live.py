@@ -36,6 +36,10 @@ class LiveSettings(Group):
     """bytes; limit of recordings; None: only live.keep_bytes"""
     keep_counts_s: float | None = Field(None, gt=0)
     """s; older counts are deleted; None: they stay for ever"""
+    keep_pictures_s: float | None = Field(None, gt=0)
+    """s; older pictures of events are deleted; None: no limit"""
+    keep_pictures_bytes: float | None = Field(None, ge=1e6)
+    """bytes; limit of pictures of events; None: no limit"""
     reserve_bytes: float | None = Field(None, ge=0)
     """bytes of a disk that recordings leave free, tracks a fifth of them; None: 5 % of the disk, at most 1 GB"""
     replace_state: bool = False
@@ -57,8 +61,9 @@ class LiveSettings(Group):
 
     @property
     def limited(self) -> bool:
-        """Whether anything is deleted, so that results must be in parts."""
-        return any(getattr(self, name) is not None for name in type(self).model_fields if name.startswith("keep_"))
+        """Whether results are deleted, which must be in parts then; pictures of events are none."""
+        keeps = {name for name in type(self).model_fields if name.startswith("keep_")}
+        return any(getattr(self, name) is not None for name in keeps - {"keep_pictures_s", "keep_pictures_bytes"})
 
     @field_validator("ffmpeg")
     @classmethod

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from vidtrack.config.events import EventSettings
 from vidtrack.config.group import Group
 from vidtrack.config.live import LiveSettings
 from vidtrack.config.names import Distance, Level, Life, Method
@@ -163,3 +164,4 @@ class Settings(Group):
     radar: RadarSettings = RadarSettings()
     output: OutputSettings = OutputSettings()
     live: LiveSettings = LiveSettings()
+    events: EventSettings = EventSettings()

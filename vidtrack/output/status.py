@@ -10,11 +10,10 @@ from datetime import datetime, tzinfo
 from threading import Condition
 from typing import Any
 
-import cv2
 import numpy as np
 
 from vidtrack.config.settings import OutputSettings
-from vidtrack.output.draw import Pen, draw_clock, draw_lines, draw_tracks, moved_lines
+from vidtrack.output.annotated_picture import annotated_jpeg
 from vidtrack.output.sink import Step
 from vidtrack.tracks import Status, Tracks
 from vidtrack.traffic.lines import LineCounter
@@ -119,14 +118,9 @@ class StatusBoard:
         step = self._newest
         if step is None or step.frame is None:
             return None
-        picture = step.frame.bgr()
-        pen = Pen(picture)
-        if self._counter is not None:
-            draw_lines(pen, moved_lines(self._counter.lines, step.motion), self._counter.totals())
-        draw_tracks(pen, step.shown)
+        lines, totals = ([], None) if self._counter is None else (self._counter.lines, self._counter.totals())
         wall = datetime.fromtimestamp(time.time() - self._latency_s(step.time_s), self._zone)
-        draw_clock(pen, f"{wall:%Y-%m-%d %H:%M:%S}")
-        return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, self._quality])[1].tobytes()
+        return annotated_jpeg(step, lines, totals, wall, self._quality)
 
     def latency_ms(self) -> dict[str, float]:
         """Latency from capture to tracks in the last frames [ms]: p50, p95, p99, max; empty before the first frame."""
@@ -159,6 +153,27 @@ class StatusBoard:
             tracks=[] if step is None or not fresh else as_rows(step.shown),
             counts={} if self._counter is None else self._counter.totals(),
         )
+
+
+def trouble_of(status: Mapping[str, Any], stale_s: float) -> str | None:
+    """Why a camera does not deliver; None if it runs, its frames are tracked, and the results are written.
+
+    status   fields of `LiveStatus`, of which only `state` is required
+    stale_s  a camera whose last frame is older than this does not deliver [s]
+    """
+    age_s = status.get("frame_age_s")
+    if status["state"] != "running":
+        return str(status["state"])
+    if age_s is None or age_s > stale_s:
+        return "no frames"
+    failing = [f"{output}: {why}" for output, why in status.get("failing", {}).items()]
+    return "; ".join(failing) or None
+
+
+def is_stuck(status: Mapping[str, Any], stale_s: float) -> bool:
+    """Whether pictures come and are not tracked, `stale_s` after frames were tracked; the first one may take longer."""
+    age_s = status.get("frame_age_s")
+    return status["state"] == "running" and age_s is not None and age_s > stale_s
 
 
 def as_rows(tracks: Tracks) -> list[dict[str, Any]]:

@@ -33,10 +33,14 @@ class Answers:
     """
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
-        self._cameras = dict(cameras)
-        self._statuses = {name: Shared(camera.status, _STATUS_S) for name, camera in cameras.items()}
         self._counts = Counts(cameras)
+        self.show(cameras)
+
+    def show(self, cameras: Mapping[str, Camera]) -> None:
+        """Show these cameras from now on."""
+        self._counts.show(cameras)
         self._pictures = [Shared(camera.picture, _PICTURE_S) for camera in cameras.values()]
+        self._cameras = [(name, camera, Shared(camera.status, _STATUS_S)) for name, camera in cameras.items()]
 
     def app(self) -> Starlette:
         """The ASGI application."""
@@ -90,19 +94,19 @@ class Answers:
 
     async def _looks(self) -> list[tuple[str, Status, str | None]]:
         """Name, status and trouble of each camera."""
-        statuses = await asyncio.gather(*(shared.get() for shared in self._statuses.values()))
+        cameras = self._cameras
+        statuses = await asyncio.gather(*(shared.get() for _, _, shared in cameras))
         return [
-            (name, status, camera.trouble(status))
-            for (name, camera), status in zip(self._cameras.items(), statuses, strict=True)
+            (name, status, camera.trouble(status)) for (name, camera, _), status in zip(cameras, statuses, strict=True)
         ]
 
     async def _lines(self) -> AsyncIterator[str]:
         """Always the newest frame: a slow client misses frames, and no queue grows."""
-        sent = dict.fromkeys(self._cameras, -1)
+        sent: dict[str, int] = {}
         while True:
             for name, status, _ in await self._looks():
                 frame = status.get("frame", -1)
-                if frame > sent[name]:
+                if frame > sent.get(name, -1):
                     sent[name] = frame
                     line = {"camera": name, **{key: status[key] for key in ("frame", "time_s", "tracks")}}
                     yield json.dumps(line, allow_nan=False) + "\n"

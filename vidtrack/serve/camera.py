@@ -9,6 +9,8 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Generic, TypeVar
 
+from vidtrack.output.status import trouble_of
+
 Status = Mapping[str, Any]
 Value = TypeVar("Value")
 
@@ -30,14 +32,12 @@ class Camera:
     stale_s: float = 10.0
 
     def trouble(self, status: Status) -> str | None:
-        """Why the camera does not deliver; None if it runs, its frames are tracked, and the results are written."""
-        age_s = status.get("frame_age_s")
-        if status["state"] != "running":
-            return str(status["state"])
-        if age_s is None or age_s > self.stale_s:
-            return "no frames"
-        failing = [f"{output}: {why}" for output, why in status.get("failing", {}).items()]
-        return "; ".join(failing) or None
+        """Why the camera does not deliver, see `trouble_of`."""
+        return trouble_of(status, self.stale_s)
+
+    def words(self) -> str:
+        """The camera's trouble now, or that there is none."""
+        return self.trouble(self.status()) or "delivers"
 
 
 class Shared(Generic[Value]):

@@ -30,8 +30,13 @@ class Counts:
     """Routes to the counts of `cameras`, which are read from their files: a camera that is down has them too."""
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
-        self._cameras = list(cameras.values())
         self._last: dict[tuple[int, str], Shared[dict[str, Any]]] = {}
+        self.show(cameras)
+
+    def show(self, cameras: Mapping[str, Camera]) -> None:
+        """Answer for these cameras from now on."""
+        self._cameras = list(cameras.values())
+        self._last.clear()
 
     def routes(self) -> list[Route]:
         """The routes."""

@@ -70,6 +70,16 @@ def _lost(status: Status) -> Iterator[Sample]:
         yield {"output": output}, frames
 
 
+def _events(name: str) -> Callable[[Status], Iterator[Sample]]:
+    """A number of the events for each receiver."""
+
+    def samples(status: Status) -> Iterator[Sample]:
+        for receiver, numbers in status.get("reading", {}).get("events", {}).items():
+            yield {"receiver": receiver}, numbers[name]
+
+    return samples
+
+
 def _crossings(status: Status) -> Iterator[Sample]:
     for line, ways in status.get("counts", {}).items():
         for direction, count in ways.items():
@@ -84,7 +94,9 @@ _METRICS: dict[str, tuple[str, str, Callable[[Status], Iterator[Sample]]]] = {
     "reconnects_total": ("counter", "Connections made after the first.", _reading("reconnects")),
     "restarts_total": ("counter", "Processes started in place of one that crashed.", _field("restarts")),
     "stalls_total": ("counter", "Times that the camera was connected and nothing came.", _reading("stalls")),
-    "lost_total": ("counter", "Frames, packets and states that could not be written, by output.", _lost),
+    "lost_total": ("counter", "Frames, packets, states not written and events not sent, by output.", _lost),
+    "events_sent_total": ("counter", "Events that a receiver has taken.", _events("sent")),
+    "events_waiting": ("gauge", "Events that wait for a receiver.", _events("waiting")),
     "crossings_total": ("counter", "Tracks counted over a line, by direction.", _crossings),
     "input_frames_per_second": ("gauge", "Pictures that come, lately.", _reading("fps_in")),
     "tracked_frames_per_second": ("gauge", "Pictures tracked, lately.", _field("fps_out")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Mapping
 from types import TracebackType
 
@@ -10,6 +11,8 @@ from vidtrack.serve.app import Answers
 from vidtrack.serve.camera import Camera
 from vidtrack.serve.listener import listen, url_of
 from vidtrack.serve.server import Server
+
+_ANSWER_S = 5.0
 
 
 class Page:
@@ -24,14 +27,30 @@ class Page:
     """
 
     def __init__(self, place: str, token: str | None = None) -> None:
-        listener = listen(place, token)
+        self._listener = listener = listen(place, token)
         self._server = Server(listener)
         self._token = token
+        self._answers: Answers | None = None
         self.url = url_of(listener)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
-        """Start to respond; until then clients wait."""
-        self._server.start(protected(Answers(cameras).app(), self._token))
+        """Start to respond; until then clients wait. Called again, show these cameras instead."""
+        if self._answers is None:
+            self._answers = Answers(cameras)
+            self._server.start(protected(self._answers.app(), self._token))
+        else:
+            self._answers.show(cameras)
+
+    def answers(self) -> bool:
+        """Whether the page answers a request within seconds."""
+        host, port = self._listener.getsockname()[:2]
+        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+        try:
+            with socket.create_connection((host, port), _ANSWER_S) as client:
+                client.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                return client.recv(8) == b"HTTP/1.1"
+        except OSError:
+            return False
 
     def close(self) -> None:
         """Close all connections and the port."""

@@ -10,7 +10,7 @@ from starlette.types import ASGIApp
 
 from vidtrack.serve.connection import Connection
 
-_END_S = 0.5
+_END_S = 0.2
 
 
 class Server:

@@ -113,7 +113,7 @@ class Footprints:
     """
 
     def __init__(self, ground: Ground, size: tuple[int, int]) -> None:
-        self._ground = ground
+        self.ground = ground
         self._size = size
         self._heading: dict[int, Floats] = {}
         self._pace = Pace()
@@ -135,7 +135,7 @@ class Footprints:
 
     def _paced(self, stand: Stand, track: Ints, seen: Seen) -> Stand:
         """The same with velocities that were filtered on the road, where their errors are smaller."""
-        ground, (left, _, right, bottom) = self._ground, uncut(seen.edge, self._size).T
+        ground, (left, _, right, bottom) = self.ground, uncut(seen.edge, self._size).T
         foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
         v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
         cov = cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
@@ -150,7 +150,7 @@ class Footprints:
         )
 
     def _stand(self, xy: Floats, u: Floats, P: Floats, box: Floats, e: Floats, e_sigma: Floats) -> Stand:
-        ground = self._ground
+        ground = self.ground
         middle, sides = footprint(ground, box, e, _SLENDER)
         middle = ground.inside(middle)
         sides[np.isnan(middle[:, 0])] = np.nan
@@ -191,8 +191,8 @@ class Footprints:
         """(N, 3) unit vectors along the vehicles, and the angle's standard deviation; NaN for those that have not
         moved yet."""
         with np.errstate(invalid="ignore"):
-            middle, _ = footprint(self._ground, box, np.full((len(box), 2), np.nan), _SLENDER)
-            v, M = velocity(self._ground, xy, middle, u)
+            middle, _ = footprint(self.ground, box, np.full((len(box), 2), np.nan), _SLENDER)
+            v, M = velocity(self.ground, xy, middle, u)
             speed = np.linalg.norm(v, axis=1)
             e = v / speed[:, None]
             n = np.column_stack([-e[:, 1], e[:, 0]])

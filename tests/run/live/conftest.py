@@ -13,6 +13,7 @@ def unhurried(monkeypatch):
     """A slow machine gets the time that it needs to answer and to end a run: what is tested is what comes then."""
     monkeypatch.setattr("vidtrack.run.live.run._END_S", 60.0)
     monkeypatch.setattr("vidtrack.run.live.supervisors._END_S", 60.0)
+    monkeypatch.setattr("vidtrack.run.live.supervisor.END_S", 60.0)
     monkeypatch.setattr("vidtrack.run.live.supervisor._ANSWER_S", 60.0)
     monkeypatch.setattr("vidtrack.video.live.source._END_S", 10.0)
 

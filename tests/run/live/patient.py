@@ -9,7 +9,8 @@ from cameras import HANG_S
 _CODE = """
 import vidtrack.cli.signals as signals, vidtrack.video.live.source as source
 import vidtrack.run.live.supervisors as supervisors, vidtrack.run.live.run as run
-signals._PATIENCE_S = supervisors._END_S = run._END_S = 60.0
+import vidtrack.run.live.supervisor as supervisor
+signals._PATIENCE_S = supervisor.END_S = supervisors._END_S = run._END_S = 60.0
 source._END_S = 10.0
 from vidtrack.__main__ import main
 main()

@@ -50,7 +50,7 @@ def test_the_rate_of_pictures_ends_with_them():
 
 def test_the_picture_has_the_time_of_day_of_its_capture(board, monkeypatch):
     written = []
-    monkeypatch.setattr(status, "draw_clock", lambda pen, clock: written.append(clock))
+    monkeypatch.setattr("vidtrack.output.annotated_picture.draw_clock", lambda pen, clock: written.append(clock))
     unix_s = datetime(2026, 11, 22, 12, 0, 1, tzinfo=ZoneInfo("UTC")).timestamp()
     monkeypatch.setattr(status.time, "time", lambda: unix_s)
     assert board.picture().startswith(b"\xff\xd8")

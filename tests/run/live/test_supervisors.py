@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import sys
+import urllib.request
 from dataclasses import replace
 from pathlib import Path
 
@@ -271,3 +272,50 @@ def test_a_site_is_of_one_camera(tmp_path):
     own = settings_of(cameras[1], {}, None, [("output.site", tmp_path / "other.toml")])
     refuse_shared_site(cameras, [alone, own])
     refuse_shared_site(cameras, [alone, settings_of(cameras[1], {}, None, [])])
+
+
+def test_cameras_are_added_changed_and_removed_while_the_others_go_on(camera, other, tmp_path):
+    """By editing the list. One with a mistake changes nothing, and the page shows those that there are."""
+    listing, out = tmp_path / "cameras.toml", tmp_path / "out"
+    north = f'[camera.north]\naddress = "{camera.url(login=SECRET)}"\n'
+    south = f'[camera.south]\naddress = "{other.url(login=SECRET)}"\n'
+
+    def put(*tables):
+        new = listing.with_suffix(".new")
+        new.write_text("live.roll_s = 1e10\n" + "".join(tables))
+        os.replace(new, listing)
+
+    def enough(name, parts=1):
+        found = [part for part in (out / name).glob("*Z*") if rows(part) > 5]
+        return len(found) >= parts
+
+    put(north)
+    process = start("live", "cameras.toml", "-o", "out", "--http", "0", cwd=tmp_path)
+    url = re.search(r"http://\S+", line_with("the page is at", process))[0]
+
+    def names():
+        with urllib.request.urlopen(url + "status", timeout=HANG_S) as answer:
+            return [one["name"] for one in json.load(answer)]
+
+    wait_for(lambda: enough("north"))
+    put(north, south, "output.lines = ['broken:1,2,3']\n")
+    told = line_with("go on as they are", process)
+    assert "camera south: line 'broken:1,2,3'" in told
+    put(north, south)
+    assert "south is added" in line_with("cameras.toml", process)
+    wait_for(lambda: enough("south"))
+    assert names() == ["north", "south"]
+    put(north, south, "output.lines = ['gate:160,0,160,240']\n")
+    assert "south is changed" in line_with("cameras.toml", process)
+    wait_for(lambda: enough("south", parts=2))
+    put(south)
+    assert "north is removed, south is changed" in line_with("cameras.toml", process)
+    wait_for(lambda: names() == ["south"])
+    process.send_signal(signal.SIGTERM)
+    _, talk = process.communicate(timeout=HANG_S)
+    assert process.returncode == 0, talk
+    cameras = json.loads((out / "summary.json").read_text())["cameras"]
+    assert cameras["north"]["removed"]
+    assert cameras["north"]["restarts"] == cameras["south"]["restarts"] == 0
+    assert len(list((out / "north").glob("*Z*"))) == 1  # it was not stopped for what happened to the other one
+    assert "pass%40word" not in talk + told

@@ -62,6 +62,23 @@ def test_one_that_drives_up_to_another_closes_the_gap():
     assert found.speed.tolist() == [[10, 15]]
 
 
+def test_conflicts_of_tracks_that_go_on_are_told_once_when_they_are_over():
+    """In blocks of a second: the same as at the end, and nothing twice."""
+    rows = rows_of(*driven((0, 0, 10, 0), (30, -60, 0, 12), (0, 50, 15, 0), (40, 50.5, 10, 0), seconds=20))
+    whole, meeting, told = found_in(rows), Meeting(), []
+    for second in range(20):
+        meeting.add(rows.only((rows.t >= second) & (rows.t < second + 1)))
+        found = meeting.settled()
+        told += [(one, other, kind, t) for one, other, kind, t in listed(found) if second + 1 - t >= 5.0]
+    late = whole.t < 10  # the others may still go on
+    assert sorted(told) == sorted(one for one, over in zip(listed(whole), late, strict=True) if over)
+    assert told
+
+
+def listed(found):
+    return list(zip(found.first.tolist(), found.second.tolist(), found.kinds, found.t.tolist(), strict=True))
+
+
 def test_one_that_crosses_behind_another_comes_after_it_has_left():
     found = found_in(rows_of(*driven((0, 0, 10, 0), (30, -60, 0, 12))))
     # it leaves x = 31 with its rear at 33 / 10 s; the other one has its front at y = -1 after 57 / 12 s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
@@ -14,9 +15,11 @@ from vidtrack.config.group import read_toml
 from vidtrack.config.inputs import Input
 from vidtrack.config.load import load, merged
 from vidtrack.config.settings import Settings
-from vidtrack.errors import ConfigError
+from vidtrack.errors import ConfigError, Error
 from vidtrack.run.live.outputs import LiveExtras
-from vidtrack.video.live.address import redact
+from vidtrack.traffic.lines import parse_lines
+from vidtrack.traffic.site import read_site
+from vidtrack.video.live.address import parse_address, redact
 
 _CAMERAS, _ADDRESS = "camera", "address"
 _OF_MANY = {"live": {"retry_first": True}}
@@ -89,6 +92,18 @@ def refuse_shared_site(cameras: Iterable[Entry], settings: Iterable[Settings]) -
             )
 
 
+def refuse_unusable(camera: Entry, settings: Settings) -> None:
+    """Raise ConfigError or SourceError for what a camera's process would end with, as far as it can be known before."""
+    try:
+        parse_lines(settings.output.lines, sys.maxsize, sys.maxsize)
+        if settings.output.site is not None:
+            read_site(settings.output.site)
+        if "://" in camera.address:  # a device may be plugged in later
+            parse_address(camera.address, settings.live.timeout_s)
+    except Error as error:
+        raise ConfigError(f"camera {camera.name}: {error}") from None
+
+
 def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:
     """Output places of one camera: sub-folders with its name, files with its name before the extension."""
     if extras.rerun in ("spawn", "serve"):
@@ -102,6 +117,7 @@ def extras_of(camera: Entry, extras: LiveExtras) -> LiveExtras:
         state=extras.state and _file(extras.state, camera),
         masks=extras.masks and extras.masks / camera.name,
         record=extras.record and extras.record / camera.name,
+        receivers=replace(extras.receivers, camera=camera.name) if extras.receivers else extras.receivers,
     )
 
 

@@ -71,6 +71,7 @@ class Counting:
     gap_s    no crossings are counted over a longer time without frames
     late_s   crossings are decided within this time after they happened
     keep_s   older days are deleted; None: they stay
+    tell     called with each batch of crossings; None: nobody else wants them
 
     A time is watched if frames were tracked in it and their crossings are decided.
     """
@@ -83,7 +84,9 @@ class Counting:
         gap_s: float,
         late_s: float,
         keep_s: float | None = None,
+        tell: Callable[[Sequence[Passage]], None] | None = None,
     ) -> None:
+        self._tell = tell
         self._counter = counter
         self._book = book
         self._began_s = began_s
@@ -134,7 +137,7 @@ class Counting:
         self._book.close()
 
     def _note(self, crossings: Sequence[Crossing]) -> None:
-        self._book.add(
+        passages = [
             Passage(
                 self._offset_s + crossing.time_s,
                 crossing.line,
@@ -143,7 +146,10 @@ class Counting:
                 *self._readings.of(crossing.track_id),
             )
             for crossing in crossings
-        )
+        ]
+        self._book.add(passages)
+        if self._tell is not None:
+            self._tell(passages)
 
     def _set_clock(self) -> None:
         """Follow the wall clock; what was watched before it was set has the times of then."""
@@ -172,7 +178,12 @@ class Counting:
         self._spans = [span for span in left[:-1] if span[0] < span[1]] + left[-1:]
 
 
-def counting_of(subject: Subject, folder: Path, began_s: Callable[[], float]) -> Counting:
+def counting_of(
+    subject: Subject,
+    folder: Path,
+    began_s: Callable[[], float],
+    tell: Callable[[Sequence[Passage]], None] | None,
+) -> Counting:
     """The counting of a run with counting lines, which goes on from the counts in `folder`.
 
     Raises FormatError, StoppedEarly.
@@ -184,7 +195,7 @@ def counting_of(subject: Subject, folder: Path, began_s: Callable[[], float]) ->
     counter.resume(totals(folder))
     coast_s, hidden_s = settings.tracker.coast_s, settings.tracker.hidden_s
     late_s = max(coast_s, hidden_s) + _MARGIN_S
-    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s)
+    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell)
 
 
 def _reals(rows: pa.Table, name: str) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
@@ -13,10 +13,12 @@ from vidtrack.output.confirmed import LIVE_HOLD_S, Confirmed
 from vidtrack.output.folder import open_run, usable
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
+from vidtrack.recording.event_pictures import EventPictures
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.run.live.background_writer import BackgroundWriter
 from vidtrack.run.live.counting import Counting
+from vidtrack.run.live.events import OUTBOX, LiveEvents, Receivers
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.run import Extras
@@ -33,12 +35,15 @@ class LiveExtras(Extras):
 
     state   checkpoint file, from which the next run continues
     record  folder of the recording
-    counts  folder of the counts by interval; None: `intervals` in the folder of the results
+    lasting    folder of what outlasts a run: counts by interval, events that wait, their pictures; None: that of the
+               results
+    receivers  of events
     """
 
     state: Path | None = None
     record: Path | None = None
-    counts: Path | None = None
+    lasting: Path | None = None
+    receivers: Receivers = field(default_factory=Receivers)
 
 
 class Outputs:
@@ -59,14 +64,17 @@ class Outputs:
         counting: Counting | None,
         tell: Callable[[str], None],
         site: FollowedSite | None,
+        events: LiveEvents | None = None,
+        pictures: EventPictures | None = None,
     ) -> None:
         self._counting = counting
         self._writers = [BackgroundWriter.of(name, sink, tell) for name, sink in picture_sinks(subject, extras)]
         # Opened last: if an extra above cannot be opened, the folder stays empty.
         reserve = Reserve(subject.settings.live.reserve_bytes)
-        parts = Parts(folder, subject, extras.decisions, roll_s, retention, counting, reserve, site)
+        parts = Parts(folder, subject, extras.decisions, roll_s, retention, counting, reserve, site, events)
         tables = BackgroundWriter("results", parts.write, parts.finish, _WRITE_S, _ROWS_DEPTH, tell)
         self.sinks: list[Sink] = [*self._writers, Confirmed(tables, hold_s=LIVE_HOLD_S)]
+        self.sinks += [] if pictures is None else [pictures]
         self._writers.append(tables)
 
     @property
@@ -119,4 +127,5 @@ def _is_ours(folder: Path, extras: LiveExtras) -> bool:
     """Whether a folder contains at most this run's state file and recording."""
     kept = [extras.record] if extras.record else []
     kept += [extras.state, lock_file(extras.state)] if extras.state else []
+    kept += [folder / OUTBOX] if extras.receivers else []
     return all(any(path.resolve().is_relative_to(entry.resolve()) for path in kept) for entry in folder.iterdir())

@@ -24,6 +24,7 @@ from vidtrack.output.thinned import Pace
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, new_part, parts_of, size_of
 from vidtrack.run.live.counting import Counting
+from vidtrack.run.live.events import LiveEvents
 from vidtrack.run.live.part import Part, columns_of, count
 from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.sinks import Subject
@@ -46,6 +47,7 @@ class Parts:
     counting   finds the crossings for each part's counts.csv; None without counting lines
     reserve    of the disk, which tracks leave to counts
     site       whose every change begins a part; None without a site. It needs `roll_s`
+    events     are made of what is written; None: nobody is told of them
 
     What matters more is written first, and whatever fails, the rest is tried: counts by interval, crossings, tracks.
     Unfinished parts of an earlier run are repaired in another thread.
@@ -61,7 +63,9 @@ class Parts:
         counting: Counting | None,
         reserve: Reserve,
         site: FollowedSite | None = None,
+        events: LiveEvents | None = None,
     ) -> None:
+        self._events = events
         self._root = root
         self._subject = subject
         self._site = site
@@ -98,6 +102,9 @@ class Parts:
                 on_road = None if self._subject.road is None else rows
                 self._crossings.extend(self._counting.step(steps, on_road))
                 stack.callback(self._counting.save)
+            if self._events is not None:
+                self._events.step(steps, None if self._subject.road is None else rows)
+                stack.callback(self._events.save)
 
     def finish(self) -> None:
         """End the last part, and wait for parts that are being finished."""
@@ -111,6 +118,8 @@ class Parts:
                 self._crossings.extend(self._counting.end())
                 stack.callback(self._write_crossings)
                 stack.callback(self._counting.close)
+            if self._events is not None:
+                stack.callback(self._events.save)
         for thread in self._finishing:
             thread.join()
 
@@ -152,6 +161,8 @@ class Parts:
         self._subject = self._subject.at(site)
         if self._counting is not None:
             self._counting.use(site.classes)
+        if self._events is not None:
+            self._events.change(self._subject)
         log.info("the site has changed; a new part begins with it")
 
     def _begin(self) -> Part:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from time import monotonic
@@ -13,14 +14,19 @@ from typing import Any
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, FormatError
+from vidtrack.output.folder import usable
 from vidtrack.output.intervals.days import zone_of
 from vidtrack.output.linked import refuse_link
+from vidtrack.output.lock import exclusive
 from vidtrack.output.sink import Step
-from vidtrack.output.status import Account, StatusBoard
+from vidtrack.output.status import Account, StatusBoard, trouble_of
+from vidtrack.recording.event_pictures import EventPictures
 from vidtrack.recording.recorder import NoRecorder, Recorder
 from vidtrack.recording.reserve import Reserve
+from vidtrack.recording.retention import Limits
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
 from vidtrack.run.live.counting import COUNTS, counting_of
+from vidtrack.run.live.events import OUTBOX, LiveEvents
 from vidtrack.run.live.limits import part_sizes, retention_of
 from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
 from vidtrack.run.live.site import FollowedSite
@@ -37,7 +43,8 @@ from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
 
 _HOUR_S = 3600.0
-_END_S = 1.6  # from `stop` to the end of the run
+_END_S = 1.3  # from `stop` to the end of the run
+_GOODBYE_S = 0.3  # least time to send the last events
 _LEAST_S = 0.5  # least time to finish after the last frame
 
 
@@ -54,6 +61,7 @@ class LiveRun:
     Raises SourceError, ConfigError, FormatError, OutputError at the start.
 
     stats  of the camera, which other threads may read before the first picture; None: of the run alone
+    after  why the process before this one ended, which is told as an event; None: it did not crash
     """
 
     def __init__(
@@ -66,22 +74,27 @@ class LiveRun:
         force: bool = False,
         connect: Callable[[], Connection] | None = None,
         stats: LiveStats | None = None,
+        after: str | None = None,
     ) -> None:
         extras, live = extras or LiveExtras(), settings.live
         refuse_link(settings.output, "live runs")
+        extras.receivers.check(settings, output)
         if live.replace_state and extras.state is None:
             raise ConfigError("setting live.replace_state has no effect without --state")
         self._settings = settings = _from_anywhere(settings)
         self._address = parse_address(address, live.timeout_s)
         self.name = self._address.name
-        stats = stats or LiveStats()
+        self._stats = stats = stats or LiveStats()
         roll_s = live.roll_s or (_HOUR_S if live.limited or settings.output.site else None)
         retention = retention_of(live)
         self._outputs: Outputs | None = None
         self._until_s: float | None = None  # monotonic time of the end; None: not stopped
+        self._stale_s = 2 * live.timeout_s
         self._in_work = False  # during a frame the checkpoint is inconsistent and must not be saved
         with ExitStack() as locks, ExitStack() as stack:  # on an error below, everything already open is closed
             lock_extras(extras, output, locks)
+            self._status: Callable[[], Mapping[str, Any]] = lambda: {"state": stats.state}
+            self._events = self._open_events(extras, output, after, locks)
             self._checkpoint_file = (
                 NoCheckpointFile()
                 if extras.state is None
@@ -106,12 +119,20 @@ class LiveRun:
             retention.results.append(self.folder)
             zone = zone_of(live.zone)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
+            self._status = lambda: asdict(self.board.now())
             subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, None)
             site = self._followed(stats.warn)
             subject = subject if site is None else subject.at(site.used)
-            self.counts = None if counter is None else extras.counts or self.folder / COUNTS
-            counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s)
-            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn, site)
+            self.counts = None if counter is None else (extras.lasting or self.folder) / COUNTS
+            told = None if self._events is None else self._events.crossed
+            counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s, told)
+            pictures = None
+            if self._events is not None:
+                pictures = self._event_pictures(extras.lasting or self.folder, subject)
+                self._events.begin(subject, pictures, self._began_s)
+            self._outputs = Outputs(
+                self.folder, subject, extras, roll_s, retention, counting, stats.warn, site, self._events, pictures
+            )
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 
     def __iter__(self) -> Iterator[Step]:
@@ -139,7 +160,7 @@ class LiveRun:
     ) -> None:
         assert self._outputs is not None
         now_s = monotonic()
-        until_s = max(self._until_s or now_s + _END_S, now_s + _LEAST_S)
+        self._until_s = until_s = max(self._until_s or now_s + _END_S, now_s + _LEAST_S)
         with self._locks:
             self._open.close()
             self.board.close()
@@ -163,6 +184,33 @@ class LiveRun:
             connect=connect,
             stats=stats,
         )
+
+    def _open_events(
+        self, extras: LiveExtras, output: Path | None, after: str | None, locks: ExitStack
+    ) -> LiveEvents | None:
+        """The events and their senders, which end before `locks` does; None if nobody is to be told."""
+        place = extras.lasting or output
+        if not extras.receivers or place is None:
+            return None
+        locks.enter_context(exclusive(usable(place / OUTBOX)))
+        events = LiveEvents(extras.receivers, self.name, place, self._settings, self._trouble, after, self._stats.warn)
+        locks.callback(lambda: events.close(max(self._until_s or 0.0, monotonic() + _GOODBYE_S)))
+        return events
+
+    def _event_pictures(self, root: Path, subject: Subject) -> EventPictures | None:
+        """The pictures of events; None if they are not wanted."""
+        live = self._settings.live
+        if not self._settings.events.pictures:
+            return None
+        limits = Limits(live.keep_pictures_s, live.keep_pictures_bytes)
+        quality, reserve = self._settings.output.jpeg_quality, Reserve(live.reserve_bytes)
+        return EventPictures(root, subject.lines, zone_of(live.zone), quality, limits, reserve)
+
+    def _trouble(self) -> str | None:
+        """Why the camera does not deliver, with the last problem of a lost one; None if it does."""
+        status, problems = self._status(), list(self._stats.problems)
+        trouble = trouble_of(status, self._stale_s)
+        return f"{trouble}: {problems[-1][1]}" if problems and status["state"] != "running" else trouble
 
     def _followed(self, tell: Callable[[str], None]) -> FollowedSite | None:
         """The site of the run, whose file may change; None without one. Raises ConfigError."""
@@ -222,6 +270,7 @@ class LiveRun:
             **self._checkpoint.tracker.rates.as_dict(),
             "latency_ms": self.board.latency_ms(),
             "lost": self._lost(),
+            **({} if self._events is None else {"events": self._events.reading}),
         }
 
     def _began_s(self) -> float:
@@ -232,12 +281,14 @@ class LiveRun:
         """Why an output cannot be written now, by output."""
         outputs = {} if self._outputs is None else self._outputs.failing
         own = {"recording": self._recorder.failing, "state": self._checkpoint_file.failing}
-        return outputs | {name: why for name, why in own.items() if why is not None}
+        events = {} if self._events is None else self._events.failing
+        return outputs | {name: why for name, why in own.items() if why is not None} | events
 
     def _lost(self) -> dict[str, int]:
-        """Number of frames, packets and states not written, by output."""
+        """Number of frames, packets and states not written, and of events not sent, by output."""
         outputs = {} if self._outputs is None else self._outputs.lost
-        return outputs | {"recording": self._recorder.lost, "state": self._checkpoint_file.lost}
+        events = {} if self._events is None else self._events.lost
+        return outputs | {"recording": self._recorder.lost, "state": self._checkpoint_file.lost} | events
 
     def _account(self) -> Account:
         stats = self._source.stats

@@ -16,6 +16,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
+from vidtrack.output.status import is_stuck
 from vidtrack.recording.retention import parts_of
 from vidtrack.run.live.counting import COUNTS
 from vidtrack.run.live.view import waiting_for
@@ -25,6 +26,9 @@ from vidtrack.video.live.backoff import Backoff
 
 log = logging.getLogger(__name__)
 
+END_S = 1.6
+"""s; a process that was stopped and still runs then is killed; its files stay valid"""
+
 _ANSWER_S = 1.0
 _SPAWN = multiprocessing.get_context("spawn")  # fork would copy locks held by threads
 
@@ -32,9 +36,10 @@ _SPAWN = multiprocessing.get_context("spawn")  # fork would copy locks held by t
 class Supervisor:
     """Supervises a camera's process, and restarts it, after growing pauses, when it ends without a final status.
 
-    All methods but `restart_if_due` may be called from any thread.
+    All methods but `restart_if_due` and `change` may be called from any thread.
 
     job        of the current or last process
+    asked      the job as it was given last
     restarts   number of restarts
     summaries  of the earlier processes
     """
@@ -43,7 +48,10 @@ class Supervisor:
         live = job.settings.live
         self.restarts = 0
         self.summaries: list[dict[str, Any]] = []
-        self._first = job
+        self.asked = job
+        self._processes = 0
+        self._next: Job | None = None  # to follow when the process has ended
+        self._kill_s: float | None = None  # monotonic time at which a process that was stopped is killed
         self._shown = redact(job.address)
         self._backoff = Backoff(live.backoff_s, live.backoff_longest_s, Random())
         self._requesting = Lock()
@@ -66,11 +74,16 @@ class Supervisor:
     @property
     def ended(self) -> bool:
         """Whether the process has ended and will not be restarted."""
-        return self.exit_code is not None and self._restart_s is None
+        return self.exit_code is not None and self._restart_s is None and self._next is None
 
     def restart_if_due(self) -> None:
-        """Restart the process if it crashed and the pause is over."""
+        """Restart the process if it crashed and the pause is over, or another job is to follow it."""
         code = self.exit_code
+        if code is None and self._kill_s is not None and monotonic() > self._kill_s:
+            self.kill()
+        if code is not None and self._next is not None:
+            self._follow(self._next)
+            return
         if code is None or self._stopped:
             return
         if self._restart_s is not None:
@@ -80,7 +93,17 @@ class Supervisor:
             pause_s = self._pause_s()
             self._restart_s = monotonic() + pause_s
             self._crashes = [*self._crashes, (time.time(), f"{self._why()}; it is started again")][-5:]
-            log.warning("%s: %s; it is started again in %.1f s", self._first.name, self._why(), pause_s)
+            log.warning("%s: %s; it is started again in %.1f s", self.asked.name, self._why(), pause_s)
+
+    def change(self, job: Job) -> None:
+        """Stop the process, and go on with another job when it has ended; see `restart_if_due`."""
+        self.leave()
+        self.asked = self._next = job
+
+    def leave(self) -> None:
+        """Stop the process, and kill it if it has not ended soon. Does not wait."""
+        self.stop()
+        self._kill_s = monotonic() + END_S
 
     def status(self) -> Mapping[str, Any]:
         """The fields of `LiveStatus` known so far, and `restarts`; the last known ones when the process is gone."""
@@ -107,9 +130,19 @@ class Supervisor:
             return None
         return self._why()
 
+    def works(self) -> bool:
+        """Whether a restart of the whole run would mend nothing: the process answers, and tracks what comes.
+
+        One that is gone is restarted alone; one that starts has not answered yet.
+        """
+        if self.exit_code is not None or not self._answered:
+            return True
+        answer = self._request(STATUS)
+        return answer is not None and not is_stuck(json.loads(answer), 2 * self.asked.settings.live.timeout_s)
+
     def stop(self) -> None:
         """Stop the process. Does not wait."""
-        self._restart_s = None
+        self._restart_s = self._next = None
         if self.exit_code is None:
             self._stopped = True
             self._process.terminate()
@@ -130,8 +163,10 @@ class Supervisor:
     def _start(self, job: Job) -> None:
         self.job = job
         self._last = waiting_for(self._shown, "connecting", [])
-        self._begun = self._final_status_came = False
+        self._begun = self._final_status_came = self._answered = False
         self._started_s = monotonic()
+        self._stopped, self._kill_s = False, None
+        self._processes += 1
         self._channel, theirs = _SPAWN.Pipe()
         self._process = _SPAWN.Process(target=work, args=(job, theirs), name=job.name, daemon=True)
         self._process.start()
@@ -139,14 +174,24 @@ class Supervisor:
 
     def _restart(self) -> None:
         self._restart_s = None
-        self.summaries.append(self.summary())
         self.restarts += 1
+        self._go_on(replace(self.asked, after=self._why()))
+
+    def _follow(self, job: Job) -> None:
+        """Start the process of a job that takes the place of another one."""
+        self._next = None
+        self._shown = redact(job.address)
+        self._backoff.reset()
+        self._go_on(job)
+
+    def _go_on(self, job: Job) -> None:
+        self.summaries.append(self.summary())
         with self._requesting:
             self._channel.close()
-            self._start(_continued(self._first, self.restarts + 1))
+            self._start(_continued(job, self._processes + 1))
 
     def _pause_s(self) -> float:
-        if monotonic() - self._started_s > self._first.settings.live.backoff_longest_s:
+        if monotonic() - self._started_s > self.asked.settings.live.backoff_longest_s:
             self._backoff.reset()
         return self._backoff.next_s()
 
@@ -176,6 +221,7 @@ class Supervisor:
                         self._last = json.loads(content)
                         self._final_status_came = True
                     elif tag == number:  # other numbers answer requests that timed out
+                        self._answered = True
                         return content
             except (EOFError, OSError):
                 self._channel.close()
@@ -194,14 +240,14 @@ def _continued(job: Job, start: int) -> Job:
             video=extras.video and _numbered(extras.video, start),
             rerun=extras.rerun and str(_numbered(Path(extras.rerun), start)),
             masks=extras.masks and _numbered(extras.masks, start),
-            counts=counts_of(job),
+            lasting=job.extras.lasting or job.folder,
         ),
     )
 
 
 def counts_of(job: Job) -> Path:
     """The folder of the counts by interval, which all processes of a camera share."""
-    return job.extras.counts or job.folder / COUNTS
+    return (job.extras.lasting or job.folder) / COUNTS
 
 
 def _free(folder: Path) -> Path:

@@ -29,7 +29,10 @@ _SEND_S = 0.5  # to send the final status, while another answer may block
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """Arguments of a camera's process, which first calls `prepare` with the camera's name."""
+    """Arguments of a camera's process, which first calls `prepare` with the camera's name.
+
+    after  why the process before this one ended; None: there was none
+    """
 
     name: str
     address: str
@@ -38,6 +41,7 @@ class Job:
     extras: LiveExtras
     force: bool
     prepare: Callable[[str], None]
+    after: str | None = None
 
 
 class _Terminated(BaseException):
@@ -52,7 +56,9 @@ def work(job: Job, channel: Connection) -> None:
     view = View(redact(job.address))
     answers = _Answers(view, channel)
     try:
-        with LiveRun(job.address, job.settings, job.folder, job.extras, force=job.force, stats=view.stats) as run:
+        with LiveRun(
+            job.address, job.settings, job.folder, job.extras, force=job.force, stats=view.stats, after=job.after
+        ) as run:
             signal.signal(signal.SIGTERM, lambda *_: run.stop())
             view.board = run.board
             answers.begin()

@@ -4,6 +4,7 @@ const STATUS_MS = 1000;
 const PICTURE_MS = 200;
 const HERE = location.origin + location.pathname; // without the password that the address may hold: fetch refuses it
 const cards = [];
+let shownNames;
 const seen = new IntersectionObserver((entries) => {
   for (const entry of entries) entry.target.inSight = entry.isIntersecting;
 });
@@ -119,6 +120,9 @@ async function look() {
     const answer = await fetch(`${HERE}status`, { signal: AbortSignal.timeout(10000) });
     if (!answer.ok) throw new Error(answer.statusText);
     const cameras = await answer.json();
+    const names = JSON.stringify(cameras.map((camera) => camera.name));
+    if (shownNames !== undefined && names !== shownNames) location.reload(); // cameras were added or removed
+    shownNames = names;
     cameras.forEach((camera, place) => show(cards[place] ?? addCard(), camera));
     const up = cameras.filter((camera) => camera.up).length;
     summary.textContent = up === cameras.length ? "all cameras deliver" : `${up} of ${cameras.length} cameras deliver`;

@@ -88,6 +88,21 @@ class Meeting:
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
         return _joined(closed, encroached.only((span[0] == span[1]) & (encroached.rank > 0)))
 
+    def settled(self) -> Conflicts:
+        """What was found of tracks that have not come closer for PET_S, once; it is forgotten then."""
+        closed, encroached = Encounters.together(self._closed), Encounters.together(self._encroached)
+        both = Encounters.together([closed, encroached])
+        pairs, row = np.unique(both.pair, axis=0, return_inverse=True)
+        newest = np.full(len(pairs), -np.inf)
+        np.maximum.at(newest, row.ravel(), both.t)
+        over = (newest <= self._done - PET_S)[row.ravel()]
+        found = []
+        for one, done in zip((closed, encroached), np.split(over, [len(closed)]), strict=True):
+            done_ones = one.only(done & (one.first != one.second))
+            found.append(done_ones.only(done_ones.least()))
+        self._closed, self._encroached = [closed.only(~over[: len(closed)])], [encroached.only(~over[len(closed) :])]
+        return _joined(found[0], found[1].only(found[1].rank > 0))
+
 
 def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:
     """One row for each two vehicles: time and place of the encroachment, else of the closing."""

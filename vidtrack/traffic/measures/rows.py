@@ -132,11 +132,7 @@ class Reader:
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
         column = {name: _numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
         track = self._numbered(table, recording.session)
-        status = table["status"].combine_chunks().dictionary_encode()
-        words = status.dictionary.to_pylist()
-        code = status.indices.to_numpy(zero_copy_only=False)
-        seen = np.array([word != _NOT_SEEN for word in words], bool)[code]
-        merged = np.array([word == "merged" for word in words], bool)[code]
+        seen, merged = _states(table)
         t = column["time_s"] + recording.offset_s
         if ground is None:
             xy = np.column_stack([column["x_px"], column["y_px"]])
@@ -146,23 +142,46 @@ class Reader:
             return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
             column |= _stand(road, track, column)
-        xy, sigma = _positions(ground, column)
-        speed, heading = column["speed_kmh"] / 3.6, np.radians(column["heading_deg"])
-        ahead = np.column_stack([np.sin(heading), np.cos(heading)])
-        length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
-        margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
-        sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
         edge = (_edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
-        sides = length, column["length_sigma_m"], column["width_m"]
-        spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
-        state = xy, sigma, margin, speed[:, None] * ahead
-        return Rows(track, t, seen, merged, *state, *sigmas, *sides, ahead, spread, edge)
+        return _on_road(ground, column, track, t, seen, merged, edge)
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
         """(N,) numbers over the whole day."""
         ids = table["track_id"].combine_chunks().dictionary_encode()
         known = [self._numbers.setdefault((session, one), len(self._numbers)) for one in ids.dictionary.to_pylist()]
         return np.array(known, np.int64)[ids.indices.to_numpy(zero_copy_only=False)]
+
+
+def rows_of(table: pa.Table, ground: Ground) -> Rows:
+    """The rows of a table with ROAD_COLUMNS; the numbers of tracks are their ids, and no edges are known."""
+    column = {name: _numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
+    track, edge = table["track_id"].to_numpy(), np.full((len(table), 4), np.nan)
+    return _on_road(ground, column, track, column["time_s"], *_states(table), edge)
+
+
+def _states(table: pa.Table) -> tuple[Mask, Mask]:
+    """(N,) whether the picture shows the track, and whether it shares a blob with others."""
+    status = table["status"].combine_chunks().dictionary_encode()
+    words = status.dictionary.to_pylist()
+    code = status.indices.to_numpy(zero_copy_only=False)
+    seen = np.array([word != _NOT_SEEN for word in words], bool)[code]
+    return seen, np.array([word == "merged" for word in words], bool)[code]
+
+
+def _on_road(
+    ground: Ground, column: dict[str, Floats], track: Ints, t: Floats, seen: Mask, merged: Mask, edge: Floats
+) -> Rows:
+    """Rows with a calibration, from the columns of the road."""
+    xy, sigma = _positions(ground, column)
+    speed, heading = column["speed_kmh"] / 3.6, np.radians(column["heading_deg"])
+    ahead = np.column_stack([np.sin(heading), np.cos(heading)])
+    length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
+    margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
+    sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
+    sides = length, column["length_sigma_m"], column["width_m"]
+    spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
+    state = xy, sigma, margin, speed[:, None] * ahead
+    return Rows(track, t, seen, merged, *state, *sigmas, *sides, ahead, spread, edge)
 
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:

@@ -144,7 +144,7 @@ def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout
     if isinstance(error, PermissionError) and address.is_device:  # a server that is silent may give it as well
         return Refused(f"{start} permission denied; add your user to the group of the device, mostly video")
     if address.is_device:
-        return Refused(f"{start} it is no camera ({error.strerror})")
+        return _complaint_of_device(start, error)
     if error.errno == errno.ENOMEM:
         return SourceError(f"{start} {_TOO_LARGE}")
     if timed_out:
@@ -156,6 +156,19 @@ def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout
     if error.errno == errno.EIO or isinstance(error, av.error.InvalidDataError):
         return SourceError(f"{start} what comes is not a video stream")
     return SourceError(f"{start} {error.strerror}")
+
+
+def _complaint_of_device(start: str, error: av.FFmpegError) -> SourceError:
+    """What a camera of this machine says; where another attempt may help, it is not refused."""
+    if error.errno == errno.EBUSY:
+        return SourceError(f"{start} another program uses it; end that one")
+    if error.errno in (errno.ENODEV, errno.ENOENT, errno.ENXIO):
+        return SourceError(f"{start} it is not plugged in")
+    if error.errno in (errno.EIO, errno.EPROTO, errno.ETIMEDOUT, errno.ENOSPC, errno.EAGAIN):
+        return SourceError(f"{start} it fails ({error.strerror}); are its cable and its USB port good enough?")
+    if error.errno == errno.EINVAL:
+        return Refused(f"{start} it has no such size, rate or format; see live.ffmpeg, and v4l2-ctl --list-formats-ext")
+    return Refused(f"{start} it is no camera ({error.strerror})")
 
 
 def _resolves(url: str) -> bool:

@@ -1,0 +1,131 @@
+"""What vehicles do at a site while it is watched: they enter zones, and with a calibration come into conflict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from vidtrack.output.linefile import Every
+from vidtrack.output.sink import Step
+from vidtrack.run.sinks import Subject
+from vidtrack.traffic.measures.conflicts import PET, TTC, Conflicts, Meeting
+from vidtrack.traffic.measures.rows import Rows, rows_of
+from vidtrack.traffic.measures.staying import outlines_of
+from vidtrack.traffic.metres import SITE_COPY
+from vidtrack.traffic.site import parse_site
+from vidtrack.traffic.zone_entries import Entry, ZoneEntries
+
+_LOOK_S = 2.0  # between two looks for conflicts
+
+
+class RoadEvents:
+    """Zone entries and conflicts of a subject with a site, of confirmed tracks.
+
+    gap_s   all tracks end in a longer pause
+    metres  whether the site is calibrated
+
+    Raises ConfigError for a zone that is not on the road.
+    """
+
+    def __init__(self, subject: Subject, gap_s: float) -> None:
+        assert subject.site is not None
+        height, width = subject.shape
+        site = parse_site(subject.site, Path(SITE_COPY)).scaled(width, height)
+        self._ground = None if subject.road is None else subject.road.ground
+        self._zones = ZoneEntries(dict(zip(site.zones, outlines_of(site, self._ground), strict=True)))
+        self._gap_s = gap_s
+        self._meeting = Meeting()
+        self._unseen: list[pa.Table] = []
+        self._last_s: float | None = None
+        self._due = Every(_LOOK_S)
+
+    @property
+    def metres(self) -> bool:
+        """Whether the site is calibrated."""
+        return self._ground is not None
+
+    def entries(self, steps: Sequence[Step], rows: pa.Table | None) -> list[Entry]:
+        """The zone entries of these steps; `rows` of their tracks on the road."""
+        if self._ground is None:
+            found = [self._zones.step(step.time_s, step.tracks.id, step.tracks.xy) for step in steps]
+            return [entry for of_step in found for entry in of_step]
+        if rows is None or not len(rows):
+            return []
+        seen = rows_of(rows, self._ground)
+        first = np.flatnonzero(np.diff(seen.t, prepend=-np.inf))
+        found = [
+            self._zones.step(float(seen.t[low]), seen.track[low:high], seen.xy[low:high])
+            for low, high in zip(first, [*first[1:], len(seen)], strict=True)
+        ]
+        return [entry for of_moment in found for entry in of_moment]
+
+    def conflicts(self, rows: pa.Table | None) -> Iterator[tuple[float, dict[str, Any]]]:
+        """Time [s] and content of each conflict that is over; `rows` are new ones of tracks on the road."""
+        if self._ground is None:
+            return
+        if rows is not None and len(rows):
+            self._unseen.append(rows)
+        if not (self._unseen and self._due()):
+            return
+        seen = rows_of(pa.concat_tables(self._unseen), self._ground)
+        self._unseen = []
+        if self._last_s is not None and seen.t[0] - self._last_s > self._gap_s:
+            self._meeting = Meeting()  # nobody knows what happened meanwhile
+        self._last_s = float(seen.t[-1])
+        self._meeting.add(seen)
+        yield from _told(self._meeting.settled())
+
+
+def prepare() -> None:
+    """Compile what looks for conflicts, which on the first use takes longer than results can wait."""
+    time_s = np.repeat(np.arange(0.0, 2.0, 0.1), 2)
+    track = np.tile([0, 1], len(time_s) // 2)
+    v = np.where(track[:, None] == 0, [10.0, 0.0], [0.0, 10.0])
+    xy = (time_s[:, None] - 1.0) * v
+    yes, one = np.ones(len(track), bool), np.ones(len(track))
+    sides, spread = (4 * one, one / 4, 2 * one), np.tile([0.01, 0.01, 0.0], (len(track), 1))
+    meeting = Meeting()
+    meeting.add(
+        Rows(
+            track,
+            time_s,
+            yes,
+            ~yes,
+            xy,
+            one,
+            one,
+            v,
+            one / 9,
+            one / 9,
+            *sides,
+            v / 10,
+            spread,
+            np.full((len(track), 4), np.nan),
+        )
+    )
+    meeting.settled()
+
+
+def _told(found: Conflicts) -> Iterator[tuple[float, dict[str, Any]]]:
+    for row, kind in enumerate(found.kinds):
+        yield (
+            float(found.t[row]),
+            {
+                "conflict": kind,
+                "first_track_id": int(found.first[row]),
+                "second_track_id": int(found.second[row]),
+                "first_speed_kmh": 3.6 * float(found.speed[row, 0]),
+                "second_speed_kmh": 3.6 * float(found.speed[row, 1]),
+                "angle_deg": float(np.degrees(found.angle[row])),
+                **{
+                    f"{name}_{part}s": float(values[which, row])
+                    for name, which in (("ttc", TTC), ("pet", PET))
+                    for part, values in (("", found.value), ("sigma_", found.sigma))
+                },
+                "merged": bool(found.merged[row]),
+            },
+        )
