@@ -30,6 +30,7 @@ SETTING = {
     "scale": "source.scale",
     "mask": "source.mask",
     "fps": "source.fps",
+    "decoder": "source.decoder",
     "skip_bad_rows": "radar.skip_bad_rows",
     "smooth": "output.smooth",
     "link": "output.link",
