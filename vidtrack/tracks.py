@@ -90,12 +90,12 @@ class Tracks:
     @property
     def xy(self) -> Floats:
         """(T, d) positions."""
-        return self.x[:, list(self.position)]
+        return self.x.take(self.position, axis=1)
 
     @property
     def v(self) -> Floats:
         """(T, d) velocities per second."""
-        return self.x[:, list(self.velocity)]
+        return self.x.take(self.velocity, axis=1)
 
     @property
     def xy_cov(self) -> Floats:

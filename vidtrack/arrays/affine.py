@@ -82,7 +82,7 @@ def corners(width: float, height: float) -> Floats:
 
 
 @kernel
-def displacement(plane: Floats, width: float, height: float, since: Floats = IDENTITY) -> float:
+def displacement(plane: Floats, width: float, height: float, since: Floats) -> float:
     """px; largest displacement of a picture's corner between this map and `since`."""
     off = plane - since
     most = 0.0

@@ -40,7 +40,7 @@ class CameraAccount:
         self._frames += 1
         if step.motion is not None:
             height, width = step.frame.shape
-            px = affine.displacement(step.motion, width, height)
+            px = affine.displacement(step.motion, width, height, affine.IDENTITY)
             self._moved_s += dt
             self._largest_px = max(self._largest_px, px)
             self._squares += px * px

@@ -18,7 +18,7 @@ from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.foreground import Foreground
-from vidtrack.video.frame import Frame
+from vidtrack.video.frame import Frame, Image
 
 _HEIGHT, _WIDTH = 144, 192
 _FPS, _PICTURES = 10, 120
@@ -60,7 +60,15 @@ def _frames() -> Iterator[Frame]:
     for k in range(_PICTURES):
         at = 3 * (k / _FPS > _SHIFTED_S)
         picture = _drawn(ground[at : at + _HEIGHT, at : at + _WIDTH].copy(), k, 220)
-        yield Frame(k, k / _FPS, (picture + noise.normal(0, 1, picture.shape)).astype(np.uint8), grey, grey)
+        luma = (picture + noise.normal(0, 1, picture.shape)).astype(np.uint8)
+        yield Frame(k, k / _FPS, *(_decoded(plane, padded=bool(k % 2)) for plane in (luma, grey, grey)))
+
+
+def _decoded(plane: Image, padded: bool) -> Image:
+    """The plane as decoders give it: read-only, and its rows may be padded."""
+    rows = np.pad(plane, ((0, 0), (0, 8)))[:, : plane.shape[1]] if padded else plane.copy()
+    rows.flags.writeable = False
+    return rows
 
 
 def _drawn(picture: NDArray, k: int, level: int) -> NDArray:
