@@ -45,7 +45,9 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, ord
     orphans, boxes, n = np.empty(len(predicted), np.int64), np.empty_like(predicted), 0
     for t in range(len(predicted)):
         if confirmed[t] and taken[t] < 0:
-            orphans[n], boxes[n] = t, predicted[t]
+            orphans[n] = t
+            for side in range(4):
+                boxes[n, side] = predicted[t, side]
             n += 1
         elif confirmed[t]:
             claims[taken[t]] += 1
