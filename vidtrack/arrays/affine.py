@@ -54,14 +54,10 @@ def points(plane: Floats, xy: Floats) -> Floats:
     return xy @ plane[:, :2].T + plane[:, 2]
 
 
+@kernel
 def boxes(plane: Floats, box: Floats) -> Floats:
     """(N, 4) boxes left, top, width, height: centres are mapped, sides are scaled and stay axis-parallel."""
-    return _boxes(plane, box, scale(plane))
-
-
-@kernel
-def _boxes(plane: Floats, box: Floats, factor: float) -> Floats:
-    moved = np.empty((len(box), 4))
+    moved, factor = np.empty((len(box), 4)), scale(plane)
     for i in range(len(box)):
         x, y = box[i, 0] + (box[i, 2] - 1) / 2, box[i, 1] + (box[i, 3] - 1) / 2  # a box covers whole pixels
         for axis in range(2):
@@ -71,6 +67,7 @@ def _boxes(plane: Floats, box: Floats, factor: float) -> Floats:
     return moved
 
 
+@kernel
 def scale(plane: Floats) -> float:
     """The scale factor of lengths."""
     return math.sqrt(abs(plane[0, 0] * plane[1, 1] - plane[0, 1] * plane[1, 0]))
