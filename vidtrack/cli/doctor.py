@@ -38,8 +38,7 @@ class DoctorOptions(WithSettings):
     epilog="""\b
 Examples:
   vidtrack doctor traffic.avi
-  vidtrack doctor rtsp://USER:PASSWORD@192.168.1.20/stream --seconds 60
-  vidtrack doctor traffic.avi --scale 0.5 --json - | jq .advice
+  vidtrack doctor rtsp://USER:PASSWORD@192.168.1.20/stream --seconds 60 --json - | jq .advice
   vidtrack doctor --warm""",
 )
 @click.argument("source", required=False)
@@ -80,9 +79,11 @@ def command(options: DoctorOptions) -> int:
 
 
 def _warm(options: DoctorOptions) -> int:
-    """Compile ahead. Raises UsageError for a source beside --warm, or neither of them."""
-    if options.warm == (options.source is not None):
-        raise click.UsageError("give a SOURCE to look at, or --warm without one")
+    """Compile ahead. Raises UsageError for anything beside --warm, or for neither source nor --warm."""
+    if not options.warm:
+        raise click.UsageError("give a SOURCE to look at, or --warm")
+    if options.source is not None or options.given() or options.config_file or options.json_to or options.output:
+        raise click.UsageError("--warm looks at no source and reads no settings; give it alone")
     from time import perf_counter
 
     from vidtrack.compiled import CACHE
