@@ -6,8 +6,7 @@ Each round runs on each clip, one after the other: decoding alone; a whole run i
 makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components on
 the same pictures. All times are processor time in ms a frame, user and system, of all threads for decoding, run and
 MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from the caches that
-they share. Medians of the rounds. `beyond` is the run less decoding, and `scaled` the same on a machine on which MOG2
-takes 39.3 ms at 1920x1080 (in proportion at other sizes).
+they share. Medians of the rounds. `beyond` is the run less decoding.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import open_source
 
 STAGES = ("predict", "detect", "blobs", "track")
-REFERENCE_MS, REFERENCE_PX = 39.3, 1920 * 1080
 
 
 def used() -> float:
@@ -112,14 +110,12 @@ def main() -> None:
                 sizes[clip] = source.width, source.height
             row = {"decode": cost(decode, clip), "run": cost(whole_run, clip), "MOG2": cost(mog2, clip), **stages(clip)}
             rows.append({name: 1e3 * seconds / frames for name, seconds in row.items()})
-    names = ("decode", "run", *STAGES, "MOG2", "beyond", "scaled")
+    names = ("decode", "run", *STAGES, "MOG2", "beyond")
     print("ms a frame          " + "".join(f"{name:>9s}" for name in names))
     for clip, rows in found.items():
         width, height = sizes[clip]
-        share = REFERENCE_MS * width * height / REFERENCE_PX
         for row in rows:
             row["beyond"] = row["run"] - row["decode"]
-            row["scaled"] = row["beyond"] * share / row["MOG2"]
         cells = "".join(f"{median(row[name] for row in rows):9.2f}" for name in names)
         print(f"{clip.stem[:14]:14s} {width:4d}x{height:<4d}"[:20].ljust(20) + cells)
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from atexit import register
 from collections.abc import Iterator
+from itertools import islice
 from os import cpu_count
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Ints
 from vidtrack.compiled import CACHE
-from vidtrack.config.settings import Settings
+from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.video.blobs.explain import explain
@@ -41,6 +42,9 @@ def warm() -> None:
     tracker = build_blob_tracker(settings.tracker, (_WIDTH, _HEIGHT))
     for _ in video_steps(_frames(), build_detector(settings), tracker, settings):
         pass
+    halved = build_detector(Settings(source=SourceSettings(scale=0.5)))  # as 720 and 1080 rows are
+    for frame in islice(_frames(), 2):
+        halved.apply(frame, np.empty((0, 4)))
 
 
 def warm_beside() -> None:
