@@ -167,7 +167,7 @@ def announce_compiling(quiet: bool, video: bool = True) -> None:
     if not first_run():
         return
     if not quiet:
-        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+        click.echo("vidtrack: compiling for this machine, once; it takes up to half a minute", err=True)
     if video:
         from vidtrack.run.warm import warm_beside
 

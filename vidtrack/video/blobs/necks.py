@@ -84,8 +84,8 @@ def _deepest_first(depth: NDArray[np.float32]) -> Ints:
     count = np.zeros(deepest + 2, np.int64)
     for d in flat:
         count[deepest - int(d * _LEVELS) + 1] += 1
-    for d in range(1, len(count)):
-        count[d] += count[d - 1]
+    for bucket in range(1, len(count)):
+        count[bucket] += count[bucket - 1]
     order = np.empty(len(flat), np.int64)
     for p in range(len(flat)):
         bucket = deepest - int(flat[p] * _LEVELS)
