@@ -65,7 +65,8 @@ def _frames() -> Iterator[Frame]:
         at = 3 * (k / _FPS > _SHIFTED_S)
         picture = _drawn(ground[at : at + _HEIGHT, at : at + _WIDTH].copy(), k, 220)
         luma = (picture + noise.normal(0, 1, picture.shape)).astype(np.uint8)
-        yield Frame(k, k / _FPS, *(_decoded(plane, padded=bool(k % 2)) for plane in (luma, grey, grey)))
+        chroma = _decoded(grey, padded=bool(k % 2))
+        yield Frame(k, k / _FPS, _decoded(luma, padded=bool(k % 2)), chroma, chroma)
 
 
 def _decoded(plane: Image, padded: bool) -> Image:
