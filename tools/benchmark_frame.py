@@ -3,10 +3,10 @@
     python tools/benchmark_frame.py CLIP ... [--rounds 3]
 
 Each round runs on each clip, one after the other: decoding alone; a whole run into a folder, as `vidtrack track CLIP`
-makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components, in one
-thread, on the same pictures. All times are processor time in ms a frame, user and system, of all threads for decoding, run and
-MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from the caches that
-they share. Medians of the rounds. `beyond` is the run less decoding.
+makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components, in
+one thread, on the same pictures. All times are processor time in ms a frame, user and system, of all threads for
+decoding, run and MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from
+the caches that they share. Medians of the rounds. `beyond` is the run less decoding.
 """
 
 from __future__ import annotations
