@@ -27,12 +27,14 @@ from time import perf_counter
 
 import numpy as np
 from peers.environment import python_of
+from scipy.spatial import cKDTree
 
 from vidtrack import formats, score
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.detections.stored import open_detections
 from vidtrack.run.trackers import build_box_tracker
+from vidtrack.scan import Scan
 from vidtrack.tracks import Status
 
 FPS = 25.0
@@ -148,8 +150,14 @@ def run_ours(data: Traffic) -> Outcome:
         tracks = tracker.step(scan)
         seconds[frame] = perf_counter() - begin
         took = (tracks.status != Status.TENTATIVE) & (tracks.measurement >= 0)
-        rows.append((np.full(took.sum(), frame), tracks.id[took], tracks.measurement[took]))
+        detection = detections_of(scan, data.frames[frame])[tracks.measurement[took]]
+        rows.append((np.full(took.sum(), frame), tracks.id[took], detection))
     return Outcome(seconds, *(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def detections_of(scan: Scan, box: Floats) -> Ints:
+    """Index of each measurement's detection, of boxes (M, 4); those that show an object once more are in no scan."""
+    return np.asarray(cKDTree(box[:, :2] + box[:, 2:] / 2).query(scan.z)[1])
 
 
 def run_peer(name: str, data: Traffic, folder: Path) -> Outcome:

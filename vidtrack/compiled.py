@@ -110,6 +110,7 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return partial(kernel, **options)
+    options = {"no_cfunc_wrapper": True, **options}  # C calls none: an eighth less to compile
     compiled = njit(nogil=True, **options)(function)
     if CACHE:
         compiled._cache = KernelCache(function)

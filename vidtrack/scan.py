@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING
@@ -119,6 +118,8 @@ class Scan:
         """The scan with the lasting part of R multiplied by `inflation`, for a filter's update."""
         if self.lasting is None:
             return self
-        weak = copy(self)  # without validating it again
+        weak = object.__new__(Scan)  # without validating it again
+        for name in self.__slots__:
+            object.__setattr__(weak, name, getattr(self, name))
         object.__setattr__(weak, "R", self.R + (inflation - 1) * self.lasting)
         return weak

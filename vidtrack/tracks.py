@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
@@ -79,8 +79,8 @@ class Tracks:
 
     def only(self, rows: NDArray[Any]) -> Tracks:
         """The tracks selected by a mask or by indices."""
-        columns = {column.name: getattr(self, column.name) for column in fields(self)}
-        return replace(self, **{name: value[rows] for name, value in columns.items() if isinstance(value, np.ndarray)})
+        columns = (getattr(self, name) for name in self.__slots__)
+        return Tracks(*(column[rows] if isinstance(column, np.ndarray) else column for column in columns))
 
     @property
     def seen(self) -> Mask:
@@ -90,12 +90,12 @@ class Tracks:
     @property
     def xy(self) -> Floats:
         """(T, d) positions."""
-        return self.x[:, list(self.position)]
+        return self.x.take(self.position, axis=1)
 
     @property
     def v(self) -> Floats:
         """(T, d) velocities per second."""
-        return self.x[:, list(self.velocity)]
+        return self.x.take(self.velocity, axis=1)
 
     @property
     def xy_cov(self) -> Floats:

@@ -3,6 +3,7 @@
 import json
 import re
 
+import click
 import pytest
 from click.testing import CliRunner
 from command_line import SAMPLES
@@ -79,6 +80,12 @@ def test_what_cannot_be_opened_is_one_line_and_exit_code_3(source, message):
 def test_help_shows_three_examples():
     text = CliRunner().invoke(cli, ["doctor", "--help"]).output
     assert len(re.findall(r"^\s+vidtrack doctor ", text, re.M)) == 3
+
+
+@pytest.mark.parametrize("wrong", [(), ("--warm", "a.avi"), ("--warm", "--fps", 5), ("--warm", "--json", "-")])
+def test_a_source_or_warm_alone(wrong):
+    with pytest.raises(click.UsageError, match="--warm"):
+        doctor(*wrong)
 
 
 @pytest.mark.parametrize(

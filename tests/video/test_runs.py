@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidtrack.video.runs import find_runs
+from vidtrack.video.runs import OBJECTS, find_runs
 
 
 def runs_by_differences(chosen):
@@ -34,4 +34,4 @@ def test_runs_are_maximal_in_raster_order_and_end_with_their_row(shape, share, s
 def test_a_lone_pixel_in_a_large_picture_is_found(column):
     mask = np.zeros((240, 320), np.uint8)
     mask[239, column] = 255
-    assert np.column_stack(find_runs(mask, False)).tolist() == [[239, column, column + 1]]
+    assert np.column_stack(find_runs(mask, OBJECTS)).tolist() == [[239, column, column + 1]]

@@ -54,13 +54,20 @@ def points(plane: Floats, xy: Floats) -> Floats:
     return xy @ plane[:, :2].T + plane[:, 2]
 
 
+@kernel
 def boxes(plane: Floats, box: Floats) -> Floats:
     """(N, 4) boxes left, top, width, height: centres are mapped, sides are scaled and stay axis-parallel."""
-    size = box[:, 2:] * scale(plane)
-    centre = points(plane, box[:, :2] + (box[:, 2:] - 1) / 2)  # a box covers whole pixels around their centres
-    return np.hstack([centre - (size - 1) / 2, size])
+    moved, factor = np.empty((len(box), 4)), scale(plane)
+    for i in range(len(box)):
+        x, y = box[i, 0] + (box[i, 2] - 1) / 2, box[i, 1] + (box[i, 3] - 1) / 2  # a box covers whole pixels
+        for axis in range(2):
+            size = box[i, 2 + axis] * factor
+            centre = x * plane[axis, 0] + y * plane[axis, 1] + plane[axis, 2]
+            moved[i, axis], moved[i, 2 + axis] = centre - (size - 1) / 2, size
+    return moved
 
 
+@kernel
 def scale(plane: Floats) -> float:
     """The scale factor of lengths."""
     return math.sqrt(abs(plane[0, 0] * plane[1, 1] - plane[0, 1] * plane[1, 0]))
@@ -72,7 +79,7 @@ def corners(width: float, height: float) -> Floats:
 
 
 @kernel
-def displacement(plane: Floats, width: float, height: float, since: Floats = IDENTITY) -> float:
+def displacement(plane: Floats, width: float, height: float, since: Floats) -> float:
     """px; largest displacement of a picture's corner between this map and `since`."""
     off = plane - since
     most = 0.0

@@ -1,4 +1,4 @@
-"""Sparse entries sorted by row."""
+"""Sparse entries sorted by row, and rows found by name."""
 
 from __future__ import annotations
 
@@ -18,3 +18,17 @@ def starts(row: Ints, rows: int) -> Ints:
             b += 1
         start[t] = b
     return start
+
+
+@kernel
+def located(name: Ints, known: Ints) -> Ints:
+    """(N,) index of each name (N,) in `known` (K,), which ascends; -1 for none. Fast where the names ascend, too."""
+    place, k = np.full(len(name), -1), 0
+    for i in range(len(name)):
+        if i > 0 and name[i] < name[i - 1]:
+            k = 0
+        while k < len(known) and known[k] < name[i]:
+            k += 1
+        if k < len(known) and known[k] == name[i]:
+            place[i] = k
+    return place

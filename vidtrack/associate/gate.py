@@ -303,7 +303,9 @@ def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
     for p in range(len(row)):
         first[measurement[p] + 1] += 1
         begin[row[p] + 1] += 1
-    first, begin = np.cumsum(first), np.cumsum(begin)
+    for counts in (first, begin):
+        for c in range(1, len(counts)):
+            counts[c] += counts[c - 1]
     by_measurement, order = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
     for p in range(len(row)):
         by_measurement[first[measurement[p]]] = p

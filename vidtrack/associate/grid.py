@@ -19,12 +19,18 @@ def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floa
     axes = min(2, z.shape[1])
     origin, extent = np.zeros(2), np.zeros(2)
     for a in range(axes if len(z) else 0):
-        origin[a] = z[:, a].min()
-        extent[a] = z[:, a].max() - origin[a]
-    runs = 1 + (run.max() if len(run) else 0)
+        origin[a], last = z[0, a], z[0, a]
+        for j in range(len(z)):
+            origin[a], last = min(origin[a], z[j, a]), max(last, z[j, a])
+        extent[a] = last - origin[a]
+    runs = 1
+    for j in range(len(run)):
+        runs = max(runs, 1 + run[j])
     most = np.ceil(2 * np.sqrt(max(1, len(z)) / runs))
-    cell = np.maximum(np.maximum(_typical(reach), extent / most), 1e-9)
-    shape = (extent / cell).astype(np.int64) + 1
+    cell, shape = _typical(reach), np.empty(2, np.int64)
+    for a in range(2):
+        cell[a] = max(cell[a], extent[a] / most, 1e-9)
+        shape[a] = int(extent[a] / cell[a]) + 1
 
     key, order = np.zeros(len(z), np.int64), np.empty(len(z), np.int64)
     first = np.zeros(runs * shape[0] * shape[1] + 1, np.int64)
@@ -34,7 +40,8 @@ def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floa
             at = np.int64((z[j, a] - origin[a]) / cell[a]) if a < axes else 0
             key[j] = key[j] * shape[a] + min(at, shape[a] - 1)
         first[key[j] + 1] += 1
-    first = np.cumsum(first)
+    for c in range(1, len(first)):
+        first[c] += first[c - 1]
     place = first.copy()
     for j in range(len(z)):
         order[place[key[j]]] = j
@@ -51,4 +58,6 @@ def _typical(reach: Floats) -> Floats:
             total[0] += reach[t, 0]
             total[1] += reach[t, 1]
             count += 1
-    return total / count if count else np.ones(2)
+    for a in range(2):
+        total[a] = total[a] / count if count else 1.0
+    return total

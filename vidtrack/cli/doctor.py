@@ -23,7 +23,8 @@ _FAILED = 1
 class DoctorOptions(WithSettings):
     """Options of `vidtrack doctor`."""
 
-    source: str
+    source: str | None
+    warm: bool
     seconds: float
     scale: float | None
     mask: Path | None
@@ -37,10 +38,11 @@ class DoctorOptions(WithSettings):
     epilog="""\b
 Examples:
   vidtrack doctor traffic.avi
-  vidtrack doctor rtsp://USER:PASSWORD@192.168.1.20/stream --seconds 60
-  vidtrack doctor traffic.avi --scale 0.5 --json - | jq .advice""",
+  vidtrack doctor rtsp://USER:PASSWORD@192.168.1.20/stream --seconds 60 --json - | jq .advice
+  vidtrack doctor --warm""",
 )
-@click.argument("source")
+@click.argument("source", required=False)
+@click.option("--warm", is_flag=True, help="Only compile what runs over video need: once, as for a container image.")
 @click.option("--seconds", type=click.FloatRange(min=1), default=10.0, show_default=True, help="Look at so much of it.")
 @settings_options
 @click.option("--scale", type=float, metavar="F", help="As for track: detect in a reduced picture.")
@@ -56,6 +58,8 @@ def command(options: DoctorOptions) -> int:
     Measures rate, light, noise, flicker, shake, what moves, and whether this machine keeps up; says what will hurt a
     run with these settings, and what to set. Exit code 0: nothing will; 1: something will; 3: it gives no pictures.
     """
+    if options.warm or options.source is None:
+        return _warm(options)
     from vidtrack.cli.hide import hide_arguments
     from vidtrack.doctor.advice import judge
     from vidtrack.doctor.examine import examine
@@ -72,6 +76,27 @@ def command(options: DoctorOptions) -> int:
     if deliver(_content(findings, advice), options.json_to, folder and folder / "doctor.json", options.quiet):
         _print_report(findings, advice)
     return _FAILED if any(one.problem for one in advice) else 0
+
+
+def _warm(options: DoctorOptions) -> int:
+    """Compile ahead. Raises UsageError for anything beside --warm, or for neither source nor --warm."""
+    if not options.warm:
+        raise click.UsageError("give a SOURCE to look at, or --warm")
+    if options.source is not None or options.given() or options.config_file or options.json_to or options.output:
+        raise click.UsageError("--warm looks at no source and reads no settings; give it alone")
+    from time import perf_counter
+
+    from vidtrack.compiled import CACHE
+    from vidtrack.errors import Error
+    from vidtrack.run.warm import warm
+
+    if not CACHE:
+        raise Error("compiled kernels cannot be kept: no folder is writable; name one in NUMBA_CACHE_DIR")
+    begin = perf_counter()
+    warm()
+    if not options.quiet:
+        click.echo(f"ready for video after {perf_counter() - begin:.1f} s")
+    return 0
 
 
 def _content(findings: Findings, advice: Sequence[Advice]) -> dict[str, Any]:

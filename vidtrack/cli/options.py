@@ -30,6 +30,7 @@ SETTING = {
     "scale": "source.scale",
     "mask": "source.mask",
     "fps": "source.fps",
+    "decoder": "source.decoder",
     "skip_bad_rows": "radar.skip_bad_rows",
     "radar_position": "radar.geodetic",
     "smooth": "output.smooth",
@@ -183,9 +184,15 @@ def start_log(verbose: int, quiet: bool, who: str = "") -> None:
     logger.setLevel(min(level, logging.WARNING))
 
 
-def announce_compiling(quiet: bool) -> None:
-    """Report before the first run that it compiles the kernels."""
+def announce_compiling(quiet: bool, video: bool = True) -> None:
+    """Report before the first run that it compiles the kernels; of video on both sides of them at once."""
     from vidtrack.compiled import first_run
 
-    if not quiet and first_run():
-        click.echo("vidtrack: compiling for this machine, once; it takes about half a minute", err=True)
+    if not first_run():
+        return
+    if not quiet:
+        click.echo("vidtrack: compiling for this machine, once; it takes up to half a minute", err=True)
+    if video:
+        from vidtrack.run.warm import warm_beside
+
+        warm_beside()

@@ -80,7 +80,7 @@ def command(options: RadarOptions) -> None:
 
     start_log(options.verbose, options.quiet)
     settings = options.settings(Input.RADAR)
-    announce_compiling(options.quiet)
+    announce_compiling(options.quiet, video=False)
     extras = Extras(rerun=options.rerun, decisions=options.decisions)
     if is_address(options.plots):
         stop = Event()

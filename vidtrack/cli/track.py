@@ -55,8 +55,9 @@ def command(options: TrackOptions) -> None:
     start_log(options.verbose, options.quiet)
     source = options.source
     base = recorded_settings(source) if is_recording(source) else None
-    settings = options.settings(Input.DETECTIONS if is_detections(source) else Input.VIDEO, base)
-    announce_compiling(options.quiet)
+    stored = is_detections(source)
+    settings = options.settings(Input.DETECTIONS if stored else Input.VIDEO, base)
+    announce_compiling(options.quiet, video=not stored)
     extras = Extras(options.rerun, options.video, options.save_masks, options.decisions)
     run = run_file(source, settings, options.output, extras, force=options.force)
     finish(run, options.quiet, none="no tracks; vidtrack doctor SOURCE may say why")

@@ -41,6 +41,7 @@ class PictureOptions(TrackingOptions):
     end: float | None
     scale: float | None
     mask: Path | None
+    decoder: str | None
 
 
 def _recording(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
@@ -116,6 +117,9 @@ _OPTIONS = (
     click.option("--end", type=float, metavar="S", help="Stop at this time [s]."),
     click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 1/2, 1/3, ..."),
     click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="Only where this picture is white."),
+    click.option(
+        "--decoder", type=choice(names.Decoder), help="Hardware that decodes, if there is any.  [default: software]"
+    ),
 )
 
 

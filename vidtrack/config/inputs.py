@@ -28,7 +28,7 @@ _OF_PICTURES = (
     *("tracker.box_s", "tracker.confirm_s", "tracker.confirm_travel", "tracker.detection_probability"),
     *("tracker.idle_s", "tracker.idle_travel", "tracker.restless"),
     *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s"),
-    *("source.scale", "source.mask", "output.video_crf", "output.jpeg_quality"),
+    *("source.scale", "source.mask", "source.decoder", "output.video_crf", "output.jpeg_quality"),
 )
 _UNREAD = {
     Input.VIDEO: ("detections", "radar", "live", "events", "tracker.redundant"),

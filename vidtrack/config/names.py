@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+Decoder = Literal["auto", "software", "vaapi", "nvdec", "videotoolbox"]
 Detector = Literal["disturbance", "paper", "mog2", "knn"]
 Method = Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "split", "mht"]
 Distance = Literal["mahalanobis", "decoupled", "euclidean"]

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from vidtrack.config.events import EventSettings
 from vidtrack.config.group import Group
 from vidtrack.config.live import LiveSettings
-from vidtrack.config.names import Distance, Level, Life, Method
+from vidtrack.config.names import Decoder, Distance, Level, Life, Method
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.video import BlobSettings, DetectorSettings
 
@@ -28,6 +28,8 @@ class SourceSettings(Group):
     """processed over source size, rounded to 1, 1/2, 1/3, ...; None: the largest of these with at most 580 rows"""
     mask: Path | None = None
     """picture whose white part is tracked; None: everything"""
+    decoder: Decoder = "software"
+    """hardware that decodes video (Linux: vaapi, nvdec; macOS: videotoolbox); auto: the first found, else software"""
 
     @field_validator("end_s")
     @classmethod

@@ -12,6 +12,7 @@ from vidtrack.detections.stored import is_detections
 from vidtrack.recording.source import Recording, is_recording
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
+from vidtrack.video.live.connection import connection_to
 from vidtrack.video.live.source import LiveSource
 from vidtrack.video.source import Source, open_source
 
@@ -31,7 +32,8 @@ def kind_of(source: str) -> Input:
 def open_pictures(source: str, settings: Settings) -> Source | LiveSource | Recording:
     """A source of frames. Raises SourceError if it cannot be opened."""
     if is_live(source):
-        return LiveSource(parse_address(source, settings.live.timeout_s), settings.live)
+        address = parse_address(source, settings.live.timeout_s)
+        return LiveSource(address, settings.live, connect=connection_to(address, settings))
     if is_recording(source):
         return Recording(source)
     return open_source(source, settings.source)

@@ -40,7 +40,7 @@ class CameraAccount:
         self._frames += 1
         if step.motion is not None:
             height, width = step.frame.shape
-            px = affine.displacement(step.motion, width, height)
+            px = affine.displacement(step.motion, width, height, affine.IDENTITY)
             self._moved_s += dt
             self._largest_px = max(self._largest_px, px)
             self._squares += px * px
@@ -81,8 +81,8 @@ class Summary:
         self.interrupted = True
         self._path = path
         self._source = source
-        self._settings = settings.model_dump(mode="json")
-        self._versions = _versions()
+        given = {"settings": settings.model_dump(mode="json"), "versions": _versions()}
+        self._given = _entries(given)  # as text once: it takes nine tenths of the time, every second
         self._reading = reading
         self._counts = counts
         self._unit = unit
@@ -117,8 +117,8 @@ class Summary:
         """Write the final object."""
         self._write(self.interrupted)
 
-    def as_dict(self, interrupted: bool) -> dict[str, object]:
-        """Content of the file, times in seconds.
+    def _so_far(self) -> dict[str, object]:
+        """What changes from step to step, times in seconds.
 
         `seconds`: duration of the run; `media_s`: time of the last frame; `watched`: first and last frame of each span
         without a pause.
@@ -135,13 +135,16 @@ class Summary:
             "warnings": self._warnings,
             "seconds": round(time.monotonic() - self._start, 3),
             "stages": {stage: round(seconds, 4) for stage, seconds in self._stage_s.items()},
-            "settings": self._settings,
-            "versions": self._versions,
-            "interrupted": interrupted,
         }
 
     def _write(self, interrupted: bool) -> None:
-        replace_text(self._path, json.dumps(self.as_dict(interrupted), indent=2) + "\n")
+        parts = _entries(self._so_far()), self._given, _entries({"interrupted": interrupted})
+        replace_text(self._path, f"{{{','.join(parts)}\n}}\n")
+
+
+def _entries(content: Mapping[str, object]) -> str:
+    """The entries of an object as JSON, without its braces."""
+    return json.dumps(content, indent=2)[1:-2]
 
 
 @cache

@@ -62,18 +62,18 @@ def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, share: Floats)
             box[t, side] = seen[j, side] if jump else box[t, side] + share[t] * (seen[j, side] - box[t, side])
 
 
-@kernel(error_model="numpy")
 def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
-    """For each inner box (T, 4) the outer box (M, 4) that covers the largest share of it: index or -1, share.
+    """For each inner box (T, 4) the outer box (M, 4) that covers the largest share of it: index or -1, share."""
+    return covers(inner, outer, outer[:, 0].argsort(kind="stable"))
 
-    The outer boxes are swept in the order of their left edges.
-    """
+
+@kernel(error_model="numpy")
+def covers(inner: Floats, outer: Floats, order: Ints) -> tuple[Ints, Floats]:
+    """`best_cover` by a sweep over the outer boxes in the order (M,) of their left edges."""
     index, share = np.full(len(inner), -1), np.zeros(len(inner))
-    order = np.argsort(outer[:, 0])
-    left = outer[order, 0]
-    widest = 0.0
-    for j in range(len(outer)):
-        widest = max(widest, outer[j, 2])
+    left, widest = np.empty(len(outer)), 0.0
+    for k in range(len(outer)):
+        left[k], widest = outer[order[k], 0], max(widest, outer[k, 2])
     for t in range(len(inner)):
         area = inner[t, 2] * inner[t, 3]
         if not area > 0:

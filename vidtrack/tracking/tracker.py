@@ -119,6 +119,7 @@ class Tracker:
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
+        self._mixture = self.bank if isinstance(self.bank, Mixture) else None  # slow to ask in every step
         self.register = Register(self.model.dim, smooth)
         self.t: float | None = None
 
@@ -229,7 +230,7 @@ class Tracker:
         problem = Problem.gated(
             self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
-            modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
+            modes=None if self._mixture is None else self._mixture.modes(sensor),
         )  # fmt: skip
         if self.threshold is not None:
             problem = thresholded(problem, self.threshold)

@@ -9,10 +9,12 @@ from os import cpu_count
 from pathlib import Path
 
 import av
+from av.codec.hwaccel import HWAccel
 
 from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
+from vidtrack.video.decoder import accelerator
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
 from vidtrack.video.stats import SourceStats
 
@@ -32,7 +34,7 @@ class VideoFile:
         self._path = self.place = path
         self._settings = settings
         self._stats = stats
-        self._container = _open(path)
+        self._container = _open(path, accelerator(settings.decoder))
         self._stream = _video_stream(self._container, path)
         self._stream.thread_type = "AUTO"
         self._stream.codec_context.thread_count = max(_DECODERS, cpu_count() or 1)
@@ -179,14 +181,14 @@ class VideoFile:
         return round(duration / av.time_base * self.fps) if duration else None
 
 
-def _open(path: Path) -> av.container.InputContainer:
+def _open(path: Path, hardware: HWAccel | None) -> av.container.InputContainer:
     if not path.is_file():
         raise SourceError(f"cannot open {path}: it is neither a file nor a folder")
     if path.stat().st_size == 0:
         raise SourceError(f"cannot open {path}: the file is empty (0 bytes)")
     try:
         # "file:" keeps a colon in the name from being taken for a protocol; old recorders write names in any encoding
-        return av.open(f"file:{path}", metadata_errors="ignore")
+        return av.open(f"file:{path}", metadata_errors="ignore", hwaccel=hardware)
     except av.FFmpegError as error:
         missing = missing_bytes(path)
         cut = f"; it is cut short, {missing} bytes are missing at its end" if missing else ""

@@ -14,13 +14,18 @@ Runs = NDArray[np.int32]
 Words = NDArray[np.uint64]
 """Eight pixels in each."""
 
+OBJECTS, HOLES = np.False_, np.True_
+"""Runs of what is not 0, or of what is. A literal would make a kernel of its own of each, and of each that it calls."""
+SIDES, CORNERS = np.int64(0), np.int64(1)
+"""4-connected or 8-connected."""
+
 _HIGHS, _NONE = np.uint64(0x8080808080808080), np.uint64(0)  # the highest bit of each of eight bytes, or of none
 _BYTE, _LAST = np.uint64(8), np.uint64(56)  # bits up to the next byte, and up to the last one
 
 
 @kernel
-def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
-    """Maximal horizontal runs of pixels that are not 0 (for `background`: that are 0): row, start, stop.
+def find_runs(mask: Image, holes: np.bool_) -> tuple[Runs, Runs, Runs]:
+    """Maximal horizontal runs of pixels that are not 0 (OBJECTS), or that are 0 (HOLES): row, start, stop.
 
     mask (h, w) uint8; each (N,) int32 in raster order, stop excluded.
     """
@@ -29,8 +34,8 @@ def find_runs(mask: Image, background: bool) -> tuple[Runs, Runs, Runs]:
     row, start, stop = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     pixels = mask.ravel()
     words = pixels[: mask.size // 8 * 8].view(np.uint64)
-    outside = _HIGHS if background else _NONE
-    n = _find_runs(words, _rest(pixels, background), outside, w, row, start, stop)
+    outside = _HIGHS if holes else _NONE
+    n = _find_runs(words, _rest(pixels, holes), outside, w, row, start, stop)
     return row[:n], start[:n], stop[:n]
 
 
@@ -68,7 +73,7 @@ def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: R
 
 
 @kernel
-def _rest(pixels: Image, filler: bool) -> np.uint64:
+def _rest(pixels: Image, filler: np.bool_) -> np.uint64:
     """The last pixels, fewer than eight, as a padded word."""
     rest = np.full(8, filler, np.uint8)
     for x in range(len(pixels) // 8 * 8, len(pixels)):
@@ -113,10 +118,10 @@ def _all_zero(words: Words, k: int) -> bool:
 
 
 @kernel
-def connect(row: Runs, start: Runs, stop: Runs, diagonal: int) -> tuple[Ints, int]:
+def connect(row: Runs, start: Runs, stop: Runs, diagonal: np.int64) -> tuple[Ints, int]:
     """Component of each run and the number of components; overlapping runs of neighbouring rows are connected.
 
-    diagonal: 1 joins across corners (8-connected), 0 does not (4-connected). Components are numbered by their
+    diagonal: CORNERS joins across corners (8-connected), SIDES does not (4-connected). Components are numbered by their
     first run in raster order.
     """
     n = len(row)

@@ -1,12 +1,16 @@
 """Which regions are pieces of one vehicle, and which pixels of a region belong to which vehicle."""
 
+import itertools
+
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vidtrack.video.blobs.fragments import together
+from vidtrack.video.blobs.fragments import links, together
 from vidtrack.video.blobs.nearest import nearest_box
+from vidtrack.video.blobs.regions import Regions, find_regions
 
 CAR = (40.0, 20.0)
 NOBODY = np.empty((0, 4))
@@ -84,3 +88,26 @@ def test_boxes_that_the_region_does_not_fill_or_that_lie_on_another_have_no_part
     assert nearest_box(inside, box, np.array([left, [5.0, 0, 40, 20]]))[1] == 0
     assert nearest_box(inside, box, np.array([left, [5.0, 0, 40, 20], right]))[1] == 2
     assert nearest_box(inside, box, NOBODY)[1] == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_regions_in_one_weak_region_are_linked_unless_it_is_much_larger(seed):
+    rng = np.random.default_rng(seed)
+    speckle = cv2.GaussianBlur(rng.random((60, 80)), (0, 0), 2)
+    weak = np.where(speckle > np.quantile(speckle, 0.6), np.uint8(255), np.uint8(0))
+    regions = find_regions(np.where(speckle > np.quantile(speckle, 0.8), np.uint8(255), np.uint8(0)), 0)
+    link = links(*regions, weak)
+
+    count, inside = cv2.connectedComponents(weak)
+    strong, whole = np.zeros(count), np.bincount(inside.ravel())
+    for row, start, stop in zip(regions.row, regions.start, regions.stop, strict=True):
+        strong[inside[row, start]] += stop - start
+    for a, b in itertools.combinations(range(regions.total), 2):
+        place = [inside[regions.row[k], regions.start[k]] for k in (np.argmax(regions.label == i) for i in (a, b))]
+        together = place[0] == place[1] != 0 and strong[place[0]] > 0.25 * whole[place[0]]
+        assert (link[a] == link[b]) == together
+
+
+def test_what_lies_in_no_weak_region_is_linked_to_nothing():
+    regions = Regions(*np.array([[2, 5], [1, 1], [4, 4]], np.int32), np.arange(2), 2)
+    assert links(*regions, np.zeros((8, 8), np.uint8)).tolist() == [-1, -2]

@@ -36,7 +36,7 @@ from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
-from vidtrack.video.live.connection import Connection
+from vidtrack.video.live.connection import Connection, connection_to
 from vidtrack.video.live.source import LiveSource
 from vidtrack.video.live.stats import LiveStats
 from vidtrack.video.resources import frame_by_frame
@@ -170,6 +170,7 @@ class LiveRun:
     def _open_source(self, connect: Callable[[], Connection] | None, stats: LiveStats) -> LiveSource:
         """Open the camera; numbers and times continue from a saved state."""
         live, found = self._settings.live, self._checkpoint_file.found
+        connect = connect or connection_to(self._address, self._settings)
         if found is None:
             first = self._checkpoint_file.first
             return LiveSource(self._address, live, self._recorder, first=first, connect=connect, stats=stats)

@@ -27,7 +27,7 @@ def from_edges(
     farther inside, the less the edge says: sigma^2 = (edge * side)^2 + pixel^2 + offset^2.
     """
     count = len(predicted)
-    z, R = np.zeros((count, 2)), np.full((count, 2), UNKNOWN)
+    z, R = np.empty((count, 2)), np.empty((count, 2))
     own = np.zeros(count, np.int64)
     for i in range(count):
         for axis in range(2):
@@ -55,5 +55,5 @@ def from_edges(
             if weight > 0:
                 z[i, axis], R[i, axis] = total / weight, 1.0 / weight
             else:
-                z[i, axis] = predicted[i, axis] - box[i, axis]
+                z[i, axis], R[i, axis] = predicted[i, axis] - box[i, axis], UNKNOWN
     return z, R, own

@@ -86,7 +86,7 @@ class Occlusion:
         reliable = (view.hits > SETTLED) & ~view.border.cut(view.predicted)
         return claims(
             view.predicted, heaviest(decision), confirmed, reliable, view.blobs,
-            self.cover, self.growth, self.edge, view.border.pixel,
+            view.blobs[:, 0].argsort(kind="stable"), self.cover, self.growth, self.edge, view.border.pixel,
         )  # fmt: skip
 
     def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:

@@ -36,7 +36,7 @@ class Border:
         if scan.surveyed is None:
             return self
         left, top, right, bottom = scan.surveyed.tolist()
-        return Border(right - left, bottom - top, left, top, scan.pixel)
+        return Border(right - left, bottom - top, left, top, float(scan.pixel))  # an integer has kernels of its own
 
     @property
     def _edges(self) -> tuple[float, float, float, float]:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from vidtrack.arrays.rows import located
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.tracking.boxes import best_cover, longer
 from vidtrack.tracks import TENTATIVE, Tracks
@@ -28,7 +29,7 @@ class RestlessMap:
         self._cell = max(width, height) / _CELLS
         self.starts: Floats = np.zeros((math.ceil(height / self._cell), math.ceil(width / self._cell)))
         self._time_s = 0.0
-        self._id: Ints = np.empty(0, np.int64)  # tracks of the last scan that have not travelled yet
+        self._id: Ints = np.empty(0, np.int64)  # tracks of the last scan that have not travelled yet, ascending
         self._xy: Floats = np.empty((0, 2))
 
     def now(self) -> Mask:
@@ -43,13 +44,18 @@ class RestlessMap:
         """Count the tracks that ended since the last scan without having travelled, apart from known vehicles."""
         self.starts *= math.exp(-max(tracks.t - self._time_s, 0.0) / _FORGET_S)
         self._time_s = tracks.t
-        ended = ~np.isin(self._id, tracks.id)
-        if ended.any():
+        alive = located(tracks.id, self._id)
+        ended = np.ones(len(self._id), bool)
+        ended[alive[alive >= 0]] = False
+        if np.count_nonzero(ended):
             np.add.at(self.starts, self._cells(self._xy[ended]), 1.0)
         young = (tracks.status == TENTATIVE) & (tracks.travel < longer(tracks.box))
-        known = tracks.box[tracks.status != TENTATIVE]
-        young[young] = best_cover(tracks.box[young], known)[1] < 0.3
-        self._id, self._xy = tracks.id[young], tracks.xy[young]
+        if np.count_nonzero(young):
+            known = tracks.box[tracks.status != TENTATIVE]
+            young[young] = best_cover(tracks.box[young], known)[1] < 0.3
+        rows = young.nonzero()[0]
+        rows = rows[tracks.id[rows].argsort()]
+        self._id, self._xy = tracks.id[rows], tracks.xy[rows]
 
     def _cells(self, xy: Floats) -> tuple[Ints, Ints]:
         rows, columns = self.starts.shape

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Mask
+from vidtrack.compiled import kernel
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.sizes import SizeField
 from vidtrack.tracks import Tracks
@@ -32,19 +33,37 @@ class Road:
 
     def learn(self, tracks: Tracks) -> None:
         """Take in the tracks of a scan."""
-        left, top, width, height = tracks.box.T
-        right, bottom = self._width - _EDGE, self._height - _EDGE
-        whole = (left > _EDGE) & (top > _EDGE) & (left + width < right) & (top + height < bottom)
-        self.sizes.learn(tracks, whole)
+        self.sizes.learn(tracks, _whole(tracks.box, self._width - _EDGE, self._height - _EDGE))
         self.restless.learn(tracks)
 
     def growth(self, before: Floats, after: Floats) -> Floats:
         """(N, 4) factors by which boxes (N, 4) grow on their way, about a point in them: far vehicles look small."""
         if not self.sizes.known or not len(before):
             return np.ones((len(before), 4))
-        grown = self.sizes.typical(after) / self.sizes.typical(before)
-        return np.tile(np.clip(np.nan_to_num(grown, nan=1.0), 1 / _FASTEST, _FASTEST), 2)
+        return _growth(self.sizes.typical(before), self.sizes.typical(after))
 
     def travel_factor(self, xy: Floats) -> Floats:
         """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""
         return np.where(self._wary & self.restless.restless(xy), _CAUTION, 1.0)
+
+
+@kernel
+def _whole(box: Floats, right: float, bottom: float) -> Mask:
+    """(N,) boxes (N, 4) that no border cuts."""
+    whole = np.empty(len(box), np.bool_)
+    for i in range(len(box)):
+        left, top, width, height = box[i, 0], box[i, 1], box[i, 2], box[i, 3]
+        whole[i] = left > _EDGE and top > _EDGE and left + width < right and top + height < bottom
+    return whole
+
+
+@kernel(error_model="numpy")
+def _growth(before: Floats, after: Floats) -> Floats:
+    """(N, 4) bounded ratios of typical sizes (N, 2), for both corners and both sides of boxes; 1 where unknown."""
+    growth = np.ones((len(before), 4))
+    for i in range(len(before)):
+        for axis in range(2):
+            ratio = after[i, axis] / before[i, axis]
+            if not np.isnan(ratio):
+                growth[i, axis] = growth[i, axis + 2] = min(max(ratio, 1 / _FASTEST), _FASTEST)
+    return growth

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.rows import located
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracks import CONFIRMED, Tracks
 
@@ -37,47 +39,39 @@ class SizeField:
         self._place: Floats = np.empty((0, 3))  # 1, x, y over the extent
         self._size: Floats = np.empty((0, 2))
         self._of: Ints = np.empty(0, np.int64)  # track of each sample
-        self._id: Ints = np.empty(0, np.int64)  # tracks that were sampled, and where last
+        self._id: Ints = np.empty(0, np.int64)  # tracks that were sampled, ascending, and where last
         self._xy: Floats = np.empty((0, 2))
         self._fitted_s = 0.0
 
     @property
     def known(self) -> bool:
         """Whether the field is fitted."""
-        return bool((self.spread < _SPREAD).all())
+        return bool(self.spread[0] < _SPREAD[0] and self.spread[1] < _SPREAD[1])
 
     def typical(self, box: Floats) -> Floats:
         """(N, 2) width and height typical of vehicles whose bottom centre is that of boxes (N, 4); NaN if unknown."""
         if not self.known:
             return np.full((len(box), 2), np.nan)
-        return np.maximum(self._places(box) @ self._fit, self._floor)
+        return _fitted(_places(box, self._extent), self._fit, self._floor)
 
     def learn(self, tracks: Tracks, whole: Mask) -> None:
         """Take samples of tracks (T,) that are alone, `whole` (T,) and have driven; refit once a second."""
         longest = longer(tracks.box)
         good = (tracks.status == CONFIRMED) & (tracks.group < 0) & (tracks.travel > longest) & whole
-        rows = np.flatnonzero(good)
-        before = np.full((len(rows), 2), np.inf)
-        _, here, there = np.intersect1d(tracks.id[rows], self._id, assume_unique=True, return_indices=True)
-        before[here] = self._xy[there]
-        moved = np.linalg.norm(tracks.xy[rows] - before, axis=1) > _STRIDE * longest[rows]
-        rows = rows[moved]
-        alive = np.isin(self._id, tracks.id) & ~np.isin(self._id, tracks.id[rows])
-        self._id = np.concatenate([self._id[alive], tracks.id[rows]])
-        self._xy = np.concatenate([self._xy[alive], tracks.xy[rows]])
+        last = located(tracks.id, self._id)
+        xy, moved = _since(last, self._xy, tracks.xy, good, _STRIDE * longest)
+        rows = moved.nonzero()[0]
+        sampled = (moved | (last >= 0)).nonzero()[0]
+        sampled = sampled[tracks.id[sampled].argsort()]
+        self._id, self._xy = tracks.id[sampled], xy[sampled]
         if len(rows):
-            self._place = np.concatenate([self._place, self._places(tracks.box[rows])])[-_SAMPLES:]
+            self._place = np.concatenate([self._place, _places(tracks.box[rows], self._extent)])[-_SAMPLES:]
             self._size = np.concatenate([self._size, tracks.box[rows, 2:]])[-_SAMPLES:]
             self._of = np.concatenate([self._of, tracks.id[rows]])[-_SAMPLES:]
         if tracks.t - self._fitted_s >= _REFIT_S:
             self._fitted_s = tracks.t
             if len(np.unique(self._of)) >= _TRACKS:
                 self._refit()
-
-    def _places(self, box: Floats) -> Floats:
-        """(N, 3) 1, x, y of the bottom centres."""
-        bottom = np.column_stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]])
-        return np.column_stack([np.ones(len(box)), bottom / self._extent - 0.5])
 
     def _refit(self) -> None:
         """Quantile regression of relative sizes by iteratively reweighted least squares; each vehicle counts alike."""
@@ -98,3 +92,37 @@ class SizeField:
                 normal = (self._place * weight[:, None]).T @ self._place + flat
                 fit = np.linalg.solve(normal, (self._place * weight[:, None]).T @ size)
             self._fit[:, axis], self.spread[axis] = fit, scale
+
+
+@kernel
+def _places(box: Floats, extent: float) -> Floats:
+    """(N, 3) 1, x, y of the bottom centres of boxes (N, 4), in units of the picture's extent from its middle."""
+    place = np.ones((len(box), 3))
+    for i in range(len(box)):
+        place[i, 1] = (box[i, 0] + box[i, 2] / 2) / extent - 0.5
+        place[i, 2] = (box[i, 1] + box[i, 3]) / extent - 0.5
+    return place
+
+
+@kernel
+def _fitted(place: Floats, fit: Floats, floor: Floats) -> Floats:
+    """(N, 2) place (N, 3) times fit (3, 2), at least floor (2,); NaN stays NaN."""
+    size = np.empty((len(place), 2))
+    for i in range(len(place)):
+        for axis in range(2):
+            value = place[i, 0] * fit[0, axis] + place[i, 1] * fit[1, axis] + place[i, 2] * fit[2, axis]
+            size[i, axis] = floor[axis] if value < floor[axis] else value
+    return size
+
+
+@kernel
+def _since(last: Ints, before: Floats, xy: Floats, good: Mask, stride: Floats) -> tuple[Floats, Mask]:
+    """(T, 2) where each track was sampled last, and (T,) whether it is now: if good, and a stride (T,) farther."""
+    where, moved = np.empty((len(last), 2)), good.copy()
+    for t in range(len(last)):
+        if last[t] >= 0:
+            dx, dy = xy[t, 0] - before[last[t], 0], xy[t, 1] - before[last[t], 1]
+            moved[t] &= np.sqrt(dx * dx + dy * dy) > stride[t]
+        for axis in range(2):
+            where[t, axis] = xy[t, axis] if moved[t] or last[t] < 0 else before[last[t], axis]
+    return where, moved

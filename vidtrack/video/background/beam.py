@@ -7,7 +7,7 @@ import numpy as np
 from vidtrack.compiled import kernel
 from vidtrack.video.background.scene import BEAM, Levels
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import connect, find_runs
+from vidtrack.video.runs import OBJECTS, SIDES, connect, find_runs
 
 _DARK = 45.0  # grey levels above black of half the scene; by day lamps do not light it
 _LAMP = 100.0  # grey levels above black; a brighter pixel of a dark scene is a lamp
@@ -36,7 +36,7 @@ def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> Non
         np.maximum(luma.astype(np.float32) - black, np.float32(0)) + _LIFT
     ) - np.log(np.maximum(scene - black, np.float32(0)) + _LIFT)  # fmt: skip
     soft = np.zeros(hit.shape, np.uint8)
-    row, start, stop = find_runs(hit, False)
+    row, start, stop = find_runs(hit, OBJECTS)
     for k in range(len(row)):
         y = row[k]
         up, down = max(y - 1, 0), min(y + 1, h - 1)
@@ -49,8 +49,8 @@ def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> Non
                 factor[up, left], factor[up, x], factor[up, right]
             )
             soft[y, x] = hit[y, x] == 1 and factor[y, x] > 0 and max(abs(across), abs(along)) < _SOFT
-    row, start, stop = find_runs(soft, False)
-    label, count = connect(row, start, stop, 0)
+    row, start, stop = find_runs(soft, OBJECTS)
+    label, count = connect(row, start, stop, SIDES)
     fading = np.zeros(count, np.int64)
     for k in range(len(row)):
         y = row[k]

@@ -6,10 +6,10 @@ import numpy as np
 
 from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
-from vidtrack.video.background.scene import Levels, Scene
+from vidtrack.video.background.scene import BEAM, Levels, Scene
 from vidtrack.video.frame import Image
 
-_ONE = np.float32(1)
+_ONE, _NO_HIT = np.float32(1), np.uint8(0)
 _CLEAR = 40.0  # grey levels over two pixels; one pixel in a hundred of a scene in clear light has a steeper edge
 _STEEP = 99.0  # percent
 LEAST_CONTRAST = 0.5  # of the threshold in clear light
@@ -87,3 +87,14 @@ def disturbance(
             d = (np.float32(picture.luma[y, x]) - scene.luma[y, x]) / threshold
             strength[y, x] = np.sqrt(d * d + chroma[x])
             hit[y, x] = np.uint8(strength[y, x] > least)
+
+
+@kernel
+def strong(strength: Levels, weak: Image) -> Image:
+    """(h, w) the values of the weak hits where the strength is above 1, or where lamps light the scene; else 0."""
+    hit = np.empty_like(weak)
+    h, w = weak.shape
+    for y in range(h):
+        for x in range(w):
+            hit[y, x] = weak[y, x] if (strength[y, x] > _ONE) | (weak[y, x] == BEAM) else _NO_HIT
+    return hit

@@ -15,12 +15,12 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.video import DisturbanceSettings
 from vidtrack.video.background.beam import lamps_light, mark_beams
 from vidtrack.video.background.change import Change
-from vidtrack.video.background.distance import contrast, disturbance, haziness, veil
+from vidtrack.video.background.distance import contrast, disturbance, haziness, strong, veil
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import BEAM, Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
+from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
 from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
@@ -215,7 +215,7 @@ class Disturbance:
         black = np.float32(self._view.black)
         if s.beams and lamps_light(seen.luma, scene.luma, black):
             mark_beams(seen.luma, scene.luma, black, weak)
-        hit = np.where((strength > 1) | (weak == BEAM), weak, np.uint8(0))
+        hit = strong(strength, weak)
         if s.shadow and s.amid:
             reclaim(hit)
         return strength, hit, weak

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import Levels, Scene
@@ -40,7 +41,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     """
     h, w = luma.shape
     stride = max(1, int(np.sqrt(h * w / _POINTS)))
-    ratio = np.empty((h // stride + 1) * (w // stride + 1), np.float32)
+    ratio = np.empty((h // stride + 1) * (w // stride + 1))
     n = 0
     for y in range(0, h, stride):
         for x in range(0, w, stride):
@@ -55,7 +56,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
 
 
 @kernel
-def _mostly_steady(ratio: Levels) -> bool:
+def _mostly_steady(ratio: Floats) -> bool:
     """Whether the median of ratio (N,) is within _STEP of 1."""
     above = below = 0
     for r in ratio:

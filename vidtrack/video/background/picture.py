@@ -93,8 +93,8 @@ class View:
         h, w = (side * self.step for side in self.reduced)
         if np.array_equal(place, affine.IDENTITY) and np.array_equal(motion, affine.IDENTITY):
             return None, None, np.array([0.0, 0.0, w, h])
-        to_scene = affine.rescaled(place, self.step)
-        to_picture = affine.after(affine.rescaled(motion, self.step), affine.inverse(to_scene))
+        to_scene = affine.rescaled(place, float(self.step))
+        to_picture = affine.after(affine.rescaled(motion, float(self.step)), affine.inverse(to_scene))
         upper_left, upper_right, lower_left, lower_right = (
             affine.points(affine.inverse(to_picture), np.array([[0, 0], [w, 0], [0, h], [w, h]]) - 0.5) + 0.5
         )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vidtrack.compiled import kernel
 from vidtrack.video.background.scene import Scene
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import Runs, connect, find_runs
+from vidtrack.video.runs import CORNERS, HOLES, OBJECTS, SIDES, Runs, connect, find_runs
 
 _REACH = 3  # px to either side of a border over which contrast is taken
 _ALIKE = np.float32(6)  # grey levels within which a pixel is as it was before; wider, dark vehicles pass for it
@@ -29,14 +29,15 @@ def paint(mask: Image, row: Runs, start: Runs, stop: Runs, value: int) -> None:
 def fill_holes(mask: Image) -> None:
     """Set to 255 the background regions (4-connected) that do not reach the picture's edge. mask (h, w) uint8."""
     h, w = mask.shape
-    row, start, stop = find_runs(mask, True)
-    label, count = connect(row, start, stop, 0)
+    row, start, stop = find_runs(mask, HOLES)
+    label, count = connect(row, start, stop, SIDES)
     enclosed = np.ones(count, np.bool_)
     for k in range(len(row)):
         if row[k] == 0 or row[k] == h - 1 or start[k] == 0 or stop[k] == w:
             enclosed[label[k]] = False
-    hole = enclosed[label]
-    paint(mask, row[hole], start[hole], stop[hole], 255)
+    for k in range(len(row)):
+        if enclosed[label[k]]:
+            mask[row[k], start[k] : stop[k]] = 255
 
 
 @kernel
@@ -50,8 +51,8 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
     cover has not changed for _UNMOVED_S, makes a ghost anywhere.
     """
     h, w = mask.shape
-    row, start, stop = find_runs(mask, False)
-    label, count = connect(row, start, stop, 1)
+    row, start, stop = find_runs(mask, OBJECTS)
+    label, count = connect(row, start, stop, CORNERS)
     area = np.zeros(count, np.int64)
     returned = np.zeros(count, np.int64)
     border = np.zeros(count, np.int64)
@@ -74,11 +75,14 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
             in_frame[blob] += _contrast(luma, y, x)
             covered_s[blob] += scene.covered_s[y, x]
             steady_s[blob] += scene.steady_s[y, x]
-    left = (in_scene > _MARGIN * in_frame) & (covered_s >= settled_s * border)
-    stays = (in_scene > _CLEAR * in_frame) & (steady_s >= _UNMOVED_S * border)
-    ghost = (returned > _RETURNED * area) | left | stays
-    chosen = ghost[label]
-    return row[chosen], start[chosen], stop[chosen]
+    n = 0
+    for k in range(len(row)):
+        b = label[k]
+        left = in_scene[b] > _MARGIN * in_frame[b] and covered_s[b] >= settled_s * border[b]
+        stays = in_scene[b] > _CLEAR * in_frame[b] and steady_s[b] >= _UNMOVED_S * border[b]
+        row[n], start[n], stop[n] = row[k], start[k], stop[k]
+        n += left or stays or returned[b] > _RETURNED * area[b]
+    return row[:n], start[:n], stop[:n]
 
 
 @kernel(inline="always")

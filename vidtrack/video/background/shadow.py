@@ -12,7 +12,7 @@ from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import connect, find_runs
+from vidtrack.video.runs import CORNERS, OBJECTS, connect, find_runs
 
 _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
@@ -90,7 +90,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     there is structure and less light.
     """
     count = np.zeros(_BINS + 1)
-    row, start, stop = find_runs(hit, False)
+    row, start, stop = find_runs(hit, OBJECTS)
     coloured = len(picture.cb) > 0
     share = tolerance.texture_share if coloured else _GREY_SHARE
     for k in range(len(row)):
@@ -143,8 +143,8 @@ def reclaim(hit: Image) -> None:
     side if a line of hits leads to a pixel that is not shadow. A region that is nearly all shadow stays shadow: the
     rest of it is soft edges.
     """
-    row, start, stop = find_runs(hit, False)
-    label, count = connect(row, start, stop, 1)
+    row, start, stop = find_runs(hit, OBJECTS)
+    label, count = connect(row, start, stop, CORNERS)
     whole, lit = np.zeros(count), np.zeros(count)
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)

@@ -102,8 +102,7 @@ def _measure(
     first = np.zeros((blobs, 2))
     second = np.zeros((blobs, 3))  # xx, xy, yy
     amplitude = np.zeros(blobs)
-    low = np.full((blobs, 2), 2**31)
-    high = np.zeros((blobs, 2), np.int64)
+    box = np.zeros((blobs, 4))  # first left, top, right, bottom
     for k in range(len(row)):
         i, y, a, b = label[k], row[k], start[k], stop[k]
         length = b - a
@@ -114,19 +113,19 @@ def _measure(
         second[i, 0] += length * (middle * middle + (length * length - 1) / 12)
         second[i, 1] += length * middle * y
         second[i, 2] += length * y * y
-        low[i, 0], low[i, 1] = min(low[i, 0], a), min(low[i, 1], y)
-        high[i, 0], high[i, 1] = max(high[i, 0], b), max(high[i, 1], y + 1)
+        empty = box[i, 2] == 0
+        box[i, 0], box[i, 1] = (a, y) if empty else (min(box[i, 0], a), min(box[i, 1], y))
+        box[i, 2], box[i, 3] = max(box[i, 2], b), max(box[i, 3], y + 1)
         for x in range(a, b):
             amplitude[i] += strength[y, x]
     mean = np.empty((blobs, 2))
     cov = np.empty((blobs, 2, 2))
-    box = np.empty((blobs, 4))
     for i in range(blobs):
         mx, my = first[i, 0] / n[i], first[i, 1] / n[i]
         mean[i, 0], mean[i, 1] = mx, my
         cov[i, 0, 0] = second[i, 0] / n[i] - mx * mx + 1 / 12  # a pixel has an extent of its own
         cov[i, 1, 1] = second[i, 2] / n[i] - my * my + 1 / 12
         cov[i, 0, 1] = cov[i, 1, 0] = second[i, 1] / n[i] - mx * my
-        box[i, 0], box[i, 1] = low[i, 0], low[i, 1]
-        box[i, 2], box[i, 3] = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1]
-    return n, mean, cov, box, amplitude / n
+        box[i, 2], box[i, 3] = box[i, 2] - box[i, 0], box[i, 3] - box[i, 1]
+        amplitude[i] /= n[i]
+    return n, mean, cov, box, amplitude

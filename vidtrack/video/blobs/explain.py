@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats, Ints
@@ -12,9 +12,9 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.picture.sizes import SizeField
 from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.video.blobs.blobs import Blobs, measured
-from vidtrack.video.blobs.fragments import together
+from vidtrack.video.blobs.fragments import links, together
 from vidtrack.video.blobs.nearest import nearest_box
-from vidtrack.video.blobs.necks import parts
+from vidtrack.video.blobs.necks import half_width, parts
 from vidtrack.video.blobs.regions import Regions, find_regions, of_labels, patch
 from vidtrack.video.foreground import Foreground, enlargement
 from vidtrack.video.frame import Image
@@ -30,7 +30,6 @@ _OPEN = 0.72  # before a typical size is known: a region that fills less of its 
 _EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
 _LEAST_PX, _LEAST_HOLLOW_PX = 60, 300  # pixels of the mask; the shape of smaller regions is the grid's
 _AT_EDGE = 1.0  # px of the mask; a region this close to the picture's edge is cut by it
-_FILLED = 0.25  # least share of a region of weak foreground that is foreground
 _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
 
 
@@ -87,20 +86,10 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
 
 
 def _links(regions: Regions, weak: Image | None) -> Ints:
-    """(R,) group of each region: regions inside one region of the weak mask (h, w) have the same number.
-
-    Weak foreground much larger than the regions in it, as in flickering light, links nothing.
-    """
-    link = -1 - np.arange(regions.total)
+    """(R,) group of each region: regions that weak foreground (h, w) links have the same number."""
     if weak is None or regions.total < 2:  # nothing to link
-        return link
-    count, inside, stats, _ = cv2.connectedComponentsWithStats(weak)
-    of_run = inside[regions.row, regions.start]
-    filled = np.bincount(of_run, regions.stop - regions.start, count) > _FILLED * stats[:, cv2.CC_STAT_AREA]
-    filled[0] = False  # the background
-    linked = filled[of_run]
-    link[regions.label[linked]] = of_run[linked]
-    return link
+        return -1 - np.arange(regions.total)
+    return links(*regions, weak)
 
 
 def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
@@ -111,24 +100,24 @@ def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
     hollow = np.isnan(typical[:, 0]) & (area < _OPEN * box[:, 2] * box[:, 3])
     for i in np.flatnonzero(large & (area >= _LEAST_PX) | hollow & (area >= _LEAST_HOLLOW_PX)).tolist():
         border = measure.border(box[i])
-        inside = patch(regions, i, box[i])
+        depth = half_width(patch(regions, i, box[i]), border)
         if large[i]:
             least = typical[i] * np.sqrt(_CUT_PART if any(border) else _PART)
-            cut = _cut(inside, border, _NECK, least, box[i])
+            cut = _cut(depth, _NECK, least, box[i])
             if cut.total < 2:
-                cut = _cut(inside, border, _SHALLOW, least, box[i])
+                cut = _cut(depth, _SHALLOW, least, box[i])
                 if not _likelier(cut, box[i], typical[i], measure.sizes):
                     continue
         else:
-            cut = _cut(inside, border, _NECK, np.ones(2), box[i])
+            cut = _cut(depth, _NECK, np.ones(2), box[i])
             if not _alike(cut):
                 continue
         regions = regions.parted(i, cut)
     return regions
 
 
-def _cut(inside: Image, border: tuple[int, int, int, int], neck: float, least: Floats, box: Ints) -> Regions:
-    label, count = parts(inside, border, neck, least)
+def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> Regions:
+    label, count = parts(depth, neck, least)
     return of_labels(label, count, box)
 
 

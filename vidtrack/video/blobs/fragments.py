@@ -6,7 +6,8 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.video.runs import components, join
+from vidtrack.video.frame import Image
+from vidtrack.video.runs import CORNERS, OBJECTS, Runs, components, connect, find_runs, join
 
 _SPREAD = 1.2  # predicted boxes are taken this much larger about their centres before fragments are sought in them
 _LIKE = 0.3  # share of the typical area that makes a piece a vehicle
@@ -16,6 +17,45 @@ _SMALL = 0.35  # share of the typical area of a piece that nobody predicted
 _WHOLE = 1.2  # typical areas of what pieces make together at most
 _LESSER = 0.6  # of two linked pieces the smaller is less than this share of the larger, before sizes are known
 _NEAR = 0.35  # typical sizes between such pieces at most
+_FILLED = 0.25  # least share of a region of weak foreground that is foreground
+
+
+@kernel
+def links(row: Runs, start: Runs, stop: Runs, label: Ints, total: int, weak: Image) -> Ints:
+    """(total,) group of each region of the runs (row, start, stop, label): the same number inside one weak region.
+
+    weak (h, w) is the mask with lower thresholds. Its regions much larger than the foreground in them, as in flickering
+    light, link nothing; what they do not link has a negative number of its own.
+    """
+    over, begin, end = find_runs(weak, OBJECTS)
+    region, count = connect(over, begin, end, CORNERS)
+    filled, whole = np.zeros(count), np.zeros(count)
+    for k in range(len(over)):
+        whole[region[k]] += end[k] - begin[k]
+    inside = np.full(len(row), -1)
+    for k in range(len(row)):
+        i = _run_at(over, begin, end, row[k], start[k])
+        if i >= 0:
+            inside[k] = region[i]
+            filled[region[i]] += stop[k] - start[k]
+    link = -1 - np.arange(total)
+    for k in range(len(row)):
+        if inside[k] >= 0 and filled[inside[k]] > _FILLED * whole[inside[k]]:
+            link[label[k]] = inside[k]
+    return link
+
+
+@kernel
+def _run_at(row: Runs, start: Runs, stop: Runs, y: int, x: int) -> int:
+    """Index of the run, of those in raster order, that holds the pixel (x, y); -1: none."""
+    low, high = 0, len(row)  # the last run that begins there or before lies in low - 1
+    while low < high:
+        middle = (low + high) // 2
+        if row[middle] < y or (row[middle] == y and start[middle] <= x):
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1 if low > 0 and row[low - 1] == y and x < stop[low - 1] else -1
 
 
 @kernel

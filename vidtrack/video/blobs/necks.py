@@ -13,15 +13,11 @@ from vidtrack.video.frame import Image
 _LEVELS = 8  # per pixel of distance, for sorting
 
 
-def parts(inside: Image, border: tuple[int, int, int, int], neck: float, least: Floats) -> tuple[Ints, int]:
-    """Parts (h, w) of a region, numbered from 0, -1 outside, and the number of parts.
+def half_width(inside: Image, border: tuple[int, int, int, int]) -> NDArray[np.float32]:
+    """(h, w) distance from the nearest pixel outside a region.
 
     inside  (h, w) uint8, 1 inside the region
     border  1 for each side (left, top, right, bottom) at the picture's border, beyond which the region continues
-    neck    largest half width of the region between two parts, as a share of the smaller one's
-    least   (2,) width and height whose product is the smallest box area of a part; smaller parts join a neighbour
-
-    The half width is the distance to the nearest pixel outside; parts are the basins of the watershed transform.
     """
     left, top, right, bottom = border
     grown = cv2.copyMakeBorder(inside, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
@@ -29,8 +25,17 @@ def parts(inside: Image, border: tuple[int, int, int, int], neck: float, least: 
                              (top, np.s_[1], np.s_[0]), (bottom, np.s_[-2], np.s_[-1])):  # fmt: skip
         if on:
             grown[outer] = grown[inner]
-    depth = cv2.distanceTransform(grown, cv2.DIST_L2, 5)[1:-1, 1:-1]
-    return _watershed(np.ascontiguousarray(depth, np.float32), neck, float(least[0] * least[1]))
+    return np.ascontiguousarray(cv2.distanceTransform(grown, cv2.DIST_L2, 5)[1:-1, 1:-1], np.float32)
+
+
+def parts(depth: NDArray[np.float32], neck: float, least: Floats) -> tuple[Ints, int]:
+    """Parts (h, w) of a region, numbered from 0, -1 outside, and the number of parts.
+
+    depth   (h, w) its half width at each pixel; parts are the basins of the watershed transform
+    neck    largest half width of the region between two parts, as a share of the smaller one's
+    least   (2,) width and height whose product is the smallest box area of a part; smaller parts join a neighbour
+    """
+    return _watershed(depth, neck, float(least[0] * least[1]))
 
 
 @kernel
@@ -79,7 +84,8 @@ def _deepest_first(depth: NDArray[np.float32]) -> Ints:
     count = np.zeros(deepest + 2, np.int64)
     for d in flat:
         count[deepest - int(d * _LEVELS) + 1] += 1
-    count = np.cumsum(count)
+    for bucket in range(1, len(count)):
+        count[bucket] += count[bucket - 1]
     order = np.empty(len(flat), np.int64)
     for p in range(len(flat)):
         bucket = deepest - int(flat[p] * _LEVELS)

@@ -9,7 +9,7 @@ import numpy as np
 from vidtrack.arrays.types import Ints
 from vidtrack.compiled import kernel
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import Runs, connect, find_runs
+from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs
 
 
 class Regions(NamedTuple):
@@ -74,31 +74,33 @@ def of_labels(labels: Ints, count: int, box: Ints) -> Regions:
 
 @kernel
 def _large(mask: Image, least: float) -> tuple[Runs, Runs, Runs, Ints, int]:
-    row, start, stop = find_runs(mask, False)
-    label, count = connect(row, start, stop, 1)
+    row, start, stop = find_runs(mask, OBJECTS)
+    label, count = connect(row, start, stop, CORNERS)
     area = np.zeros(count, np.int64)
     for k in range(len(row)):
         area[label[k]] += stop[k] - start[k]
-    number = np.full(count, -1)
-    n = 0
+    number, total = np.empty(count, np.int64), 0
     for i in range(count):
-        if area[i] >= least:
-            number[i] = n
-            n += 1
-    new = number[label]
-    stays = new >= 0
-    return row[stays], start[stays], stop[stays], new[stays], n
+        number[i] = total if area[i] >= least else -1
+        total += area[i] >= least
+    n = 0
+    for k in range(len(row)):
+        row[n], start[n], stop[n], label[n] = row[k], start[k], stop[k], number[label[k]]
+        n += label[n] >= 0
+    return row[:n].copy(), start[:n].copy(), stop[:n].copy(), label[:n].copy(), total
 
 
 @kernel
 def _boxes(row: Runs, start: Runs, stop: Runs, label: Ints, count: int) -> Ints:
-    low, high = np.full((count, 2), 2**31), np.zeros((count, 2), np.int64)
+    box = np.zeros((count, 4), np.int64)  # first left, top, right, bottom
     for k in range(len(row)):
-        i = label[k]
-        low[i, 0], low[i, 1] = min(low[i, 0], start[k]), min(low[i, 1], row[k])
-        high[i, 0], high[i, 1] = max(high[i, 0], stop[k]), max(high[i, 1], row[k] + 1)
-    box = np.empty((count, 4), np.int64)
-    box[:, :2], box[:, 2:] = low, high - low
+        i, empty = label[k], box[label[k], 2] == 0
+        box[i, 0] = start[k] if empty else min(box[i, 0], start[k])
+        box[i, 1] = row[k] if empty else min(box[i, 1], row[k])
+        box[i, 2], box[i, 3] = max(box[i, 2], stop[k]), max(box[i, 3], row[k] + 1)
+    for i in range(count):
+        for axis in range(2):
+            box[i, 2 + axis] -= box[i, axis]
     return box
 
 

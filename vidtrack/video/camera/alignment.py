@@ -88,21 +88,18 @@ def _fit(
     by least squares with Tukey's weights; then A becomes A W(d)^-1. luma (h, w) is the picture at 1/size of the points'
     scale; part: start, stop and step of the points.
     """
-    used = np.arange(part[0], part[1], part[2])
-    used = used[free[part[0] : part[1] : part[2]]]
-    count = len(used)
+    x, y, value, gx, gy = _used(points, free, part)
+    count = len(x)
     if count < FEWEST:
         return motion, 0.0
-    x, y, value, gx, gy = points.x[used], points.y[used], points.value[used], points.gx[used], points.gy[used]
-    middle_x, middle_y = np.float64(np.mean(x)), np.float64(np.mean(y))
-    radius = np.sqrt(np.mean((x - middle_x) ** 2 + (y - middle_y) ** 2)) + 1.0
+    middle_x, middle_y, radius = _extent(x, y)
     rows = np.empty((count, 6))
     for k in range(count):
         dx, dy = (x[k] - middle_x) / radius, (y[k] - middle_y) / radius
         rows[k, 0], rows[k, 1] = gx[k], gy[k]
         rows[k, 2], rows[k, 3] = gx[k] * dx + gy[k] * dy, gy[k] * dx - gx[k] * dy
         rows[k, 4], rows[k, 5] = value[k] / _GREY, 1.0
-    seen, shown, weighted = np.empty(count), np.empty(count), np.empty((count, 6))
+    seen, normal, found = np.empty(count), np.empty((6, 6)), np.empty(6)
     A = motion.copy()
     gain, bias = 1.0, 0.0
     inside = _sample(luma, size, x, y, A, seen)
@@ -110,18 +107,21 @@ def _fit(
         if inside < _INSIDE * count:
             return A, 0.0
         centre, sigma = _spread(seen, gain, bias, value)
+        normal[:], found[:] = 0.0, 0.0
         for k in range(count):
             r = (seen[k] - gain * value[k] - bias - centre) / (_TUKEY * sigma)
-            weight = (1 - r * r) ** 2 if abs(r) < 1 else 0.0
-            shown[k] = seen[k] if weight > 0 else 0.0
+            if not abs(r) < 1:  # NaN, too
+                continue
+            weight = (1 - r * r) ** 2
             for i in range(6):
-                weighted[k, i] = weight * rows[k, i]
-        normal = weighted.T @ rows
+                found[i] += weight * rows[k, i] * seen[k]
+                for j in range(i + 1):
+                    normal[i, j] += weight * rows[k, i] * rows[k, j]
         for i in range(6):
             normal[i, i] += 1e-6 * normal[i, i] + 1e-3
         if stiff:
             normal[2, 2], normal[3, 3] = 1e12, 1e12
-        found = np.linalg.solve(normal, weighted.T @ shown)
+        _solve(normal, found)
         gain, bias = found[4] / _GREY, found[5]
         if not 1 / _GAIN < gain < _GAIN:
             return A, 0.0
@@ -138,6 +138,48 @@ def _fit(
     return A, fits / max(inside, 1)
 
 
+@kernel
+def _used(points: Points, free: Mask, part: tuple[int, int, int]) -> tuple[Levels, Levels, Levels, Levels, Levels]:
+    """x, y, value, gx, gy (N,) of the free points of a part."""
+    x, y, value = np.empty_like(points.x), np.empty_like(points.x), np.empty_like(points.x)
+    gx, gy, n = np.empty_like(points.x), np.empty_like(points.x), 0
+    for k in range(part[0], part[1], part[2]):
+        if free[k]:
+            x[n], y[n], value[n], gx[n], gy[n] = points.x[k], points.y[k], points.value[k], points.gx[k], points.gy[k]
+            n += 1
+    return x[:n], y[:n], value[:n], gx[:n], gy[:n]
+
+
+@kernel
+def _extent(x: Levels, y: Levels) -> tuple[float, float, float]:
+    """Middle of points (N,), and root mean square distance from it."""
+    middle_x, middle_y, square = 0.0, 0.0, 0.0
+    for k in range(len(x)):
+        middle_x += x[k] / len(x)
+        middle_y += y[k] / len(x)
+    for k in range(len(x)):
+        square += ((x[k] - middle_x) ** 2 + (y[k] - middle_y) ** 2) / len(x)
+    return middle_x, middle_y, np.sqrt(square) + 1.0
+
+
+@kernel(error_model="numpy")
+def _solve(A: Floats, b: Floats) -> None:
+    """Replace b (n,) by A^-1 b; A (n, n) is positive definite, and its lower triangle becomes its Cholesky factor."""
+    n = len(b)
+    for i in range(n):
+        for j in range(i + 1):
+            for k in range(j):
+                A[i, j] -= A[i, k] * A[j, k]
+            A[i, j] = np.sqrt(A[i, i]) if i == j else A[i, j] / A[j, j]
+        for k in range(i):
+            b[i] -= A[i, k] * b[k]
+        b[i] /= A[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= A[k, i] * b[k]
+        b[i] /= A[i, i]
+
+
 @kernel(error_model="numpy")
 def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[float, float]:
     """Median and robust standard deviation of the residuals, from a sample of the points."""
@@ -151,7 +193,9 @@ def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[floa
     if not n:
         return 0.0, _SIGMA
     centre = np.median(off[:n])
-    return centre, max(1.4826 * np.median(np.abs(off[:n] - centre)), _SIGMA)
+    for k in range(n):
+        off[k] = abs(off[k] - centre)
+    return centre, max(1.4826 * np.median(off[:n]), _SIGMA)
 
 
 @kernel

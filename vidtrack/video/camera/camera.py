@@ -84,7 +84,9 @@ class Camera:
 
     def on_canvas(self, box: Floats, step: int) -> Floats:
         """Boxes (K, 4) of the scene [source px] on the canvas [processed px]."""
-        return (box if self.at_home else affine.boxes(affine.inverse(affine.rescaled(self.place, step)), box)) / step
+        if self.at_home:
+            return box / step
+        return affine.boxes(affine.inverse(affine.rescaled(self.place, float(step))), box) / step
 
     def restart(self) -> None:
         """The last picture becomes the scene; after a change of view, with new coordinates."""
@@ -123,7 +125,7 @@ class Camera:
         h, w = luma.shape
         dt, self._time_s = min(time_s - self._time_s, 1.0), time_s
         if self.moves:
-            moved = affine.displacement(affine.after(self.motion, affine.inverse(self.place)), w, h)
+            moved = affine.displacement(affine.after(self.motion, affine.inverse(self.place)), w, h, affine.IDENTITY)
             self._away = moved > _LARGEST * max(h, w)
         lost = self._away or (not self.fits and (self.moves or self._strange or not self.trusted))
         self.lost_s = self.lost_s + dt if lost else 0.0
@@ -204,7 +206,7 @@ class Camera:
         return scene
 
     def _off(self, fit: Fit, luma: Image) -> float:
-        return affine.displacement(fit.motion, luma.shape[1], luma.shape[0])
+        return affine.displacement(fit.motion, luma.shape[1], luma.shape[0], affine.IDENTITY)
 
     def _sane(self, fit: Fit, luma: Image) -> Fit:
         """The fit, with share 0 if the motion is implausible."""

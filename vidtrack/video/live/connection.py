@@ -5,8 +5,9 @@ from __future__ import annotations
 import ctypes
 import errno
 import socket
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from time import monotonic
 from urllib.parse import urlsplit
 
@@ -14,7 +15,10 @@ import av
 import av._core
 import av.format
 
+from vidtrack.config.names import Decoder
+from vidtrack.config.settings import Settings
 from vidtrack.errors import SourceError
+from vidtrack.video.decoder import accelerator
 from vidtrack.video.live.address import Address
 from vidtrack.video.planes import planar
 
@@ -39,14 +43,17 @@ class Connection:
     is_raw whether packets are uncompressed pictures; the pictures are then planar
 
     options  NAME=VALUE for FFmpeg; they override those of the address
+    decoder  hardware that decodes
 
     Raises Refused, Stalled or another SourceError if it cannot be opened; messages contain no password.
     """
 
-    def __init__(self, address: Address, timeout_s: float, options: Sequence[str] = ()) -> None:
+    def __init__(
+        self, address: Address, timeout_s: float, options: Sequence[str] = (), decoder: Decoder = "software"
+    ) -> None:
         self._address = address
         self._timeout_s = timeout_s
-        self._container = _open(address, timeout_s, options)
+        self._container = _open(address, timeout_s, options, decoder)
         self.stream = _video_stream(self._container, address)
         self._coder = self.stream.codec_context
         self._coder.thread_type = "SLICE"  # frame threads hold back a picture each
@@ -96,6 +103,12 @@ class Connection:
         self._container.close()
 
 
+def connection_to(address: Address, settings: Settings) -> Callable[[], Connection]:
+    """Opens a connection as the settings say."""
+    live = settings.live
+    return partial(Connection, address, live.timeout_s, live.ffmpeg, settings.source.decoder)
+
+
 _TOO_LARGE = f"a picture larger than {_LARGEST >> 20} MB came; is it a video stream?"
 
 
@@ -108,13 +121,16 @@ def bound_pictures() -> None:
         ctypes.CDLL(av._core.__file__).av_max_alloc(ctypes.c_size_t(_LARGEST))
 
 
-def _open(address: Address, timeout_s: float, options: Sequence[str]) -> av.container.InputContainer:
+def _open(address: Address, timeout_s: float, options: Sequence[str], decoder: Decoder) -> av.container.InputContainer:
     bound_pictures()
     began = monotonic()
     own = dict(option.split("=", 1) for option in options)
     chosen = {"analyzeduration": str(round(_PROBE_S * 1e6)), **address.options, **own}
     try:
-        return av.open(address.url, format=address.format, options=chosen, timeout=timeout_s, metadata_errors="ignore")
+        return av.open(
+            address.url, format=address.format, options=chosen, timeout=timeout_s, metadata_errors="ignore",
+            hwaccel=accelerator(decoder),
+        )  # fmt: skip
     except av.FFmpegError as error:
         raise _complaint(address, error, timed_out=monotonic() - began > 0.9 * timeout_s, timeout_s=timeout_s) from None
 

@@ -1,0 +1,125 @@
+"""Where the processor's time of one frame goes, beside decoding and beside MOG2 with components.
+
+    python tools/benchmark_frame.py CLIP ... [--rounds 3]
+
+Each round runs on each clip, one after the other: decoding alone; a whole run into a folder, as `vidtrack track CLIP`
+makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components, in
+one thread, on the same pictures. All times are processor time in ms a frame, user and system, of all threads for
+decoding, run and MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from
+the caches that they share. Medians of the rounds. `beyond` is the run less decoding.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
+from statistics import median
+from time import thread_time
+
+import av
+import cv2
+import numpy as np
+
+from vidtrack.config.settings import Settings
+from vidtrack.run.files import run_file
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, has_driven
+from vidtrack.video.blobs.explain import explain
+from vidtrack.video.resources import frame_by_frame
+from vidtrack.video.source import open_source
+
+STAGES = ("predict", "detect", "blobs", "track")
+
+
+def used() -> float:
+    """Processor time of this process so far [s]."""
+    usage = getrusage(RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def decode(path: Path) -> int:
+    """Decode all; returns the number of pictures."""
+    with av.open(str(path)) as container:
+        container.streams.video[0].thread_type = "AUTO"
+        return sum(1 for _ in container.decode(video=0))
+
+
+def whole_run(path: Path) -> None:
+    """A run into a folder."""
+    with tempfile.TemporaryDirectory() as place, run_file(str(path), Settings(), Path(place) / "run") as run:
+        for _ in run:
+            pass
+
+
+def mog2(path: Path) -> None:
+    """Decode, subtract the background, find components."""
+    model = cv2.createBackgroundSubtractorMOG2()
+    with av.open(str(path)) as container:
+        for picture in container.decode(video=0):
+            mask = model.apply(picture.to_ndarray(format="bgr24"))
+            cv2.connectedComponentsWithStats(np.where(mask == 255, np.uint8(255), np.uint8(0)))
+
+
+def stages(path: Path) -> dict[str, float]:
+    """Seconds of the main thread in each stage."""
+    settings = Settings()
+    spent = dict.fromkeys(STAGES, 0.0)
+    with open_source(str(path), settings.source) as source, frame_by_frame(settings.detector.kind):
+        tracker, detector = (
+            build_blob_tracker(settings.tracker, (source.width, source.height)),
+            build_detector(settings),
+        )
+        for frame in source:
+            clock = [thread_time()]
+            expected = tracker.predict(frame.time_s)
+            clock.append(thread_time())
+            foreground = detector.apply(frame, expected.box[has_driven(expected)])
+            clock.append(thread_time())
+            scan = explain(foreground, expected, tracker.road, settings.blobs).scan(frame.time_s)
+            clock.append(thread_time())
+            tracker.step(scan)
+            clock.append(thread_time())
+            for stage, seconds in zip(STAGES, np.diff(clock).tolist(), strict=True):
+                spent[stage] += seconds
+    return spent
+
+
+def cost(what: Callable[[Path], object], path: Path) -> float:
+    """Processor time of a call [s]."""
+    begin = used()
+    what(path)
+    return used() - begin
+
+
+def main() -> None:
+    """Run the rounds, print a row for each clip."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("clips", type=Path, nargs="+", metavar="CLIP")
+    parser.add_argument("--rounds", type=int, default=3)
+    options = parser.parse_args()
+    found: dict[Path, list[dict[str, float]]] = {clip: [] for clip in options.clips}
+    sizes: dict[Path, tuple[int, int]] = {}
+    cv2.setNumThreads(1)
+    whole_run(options.clips[0])  # compiles, and imports what is imported late
+    for _ in range(options.rounds):
+        for clip, rows in found.items():
+            frames = decode(clip)
+            with open_source(str(clip), Settings().source) as source:
+                sizes[clip] = source.width, source.height
+            row = {"decode": cost(decode, clip), "run": cost(whole_run, clip), "MOG2": cost(mog2, clip), **stages(clip)}
+            rows.append({name: 1e3 * seconds / frames for name, seconds in row.items()})
+    names = ("decode", "run", *STAGES, "MOG2", "beyond")
+    print("ms a frame          " + "".join(f"{name:>9s}" for name in names))
+    for clip, rows in found.items():
+        width, height = sizes[clip]
+        for row in rows:
+            row["beyond"] = row["run"] - row["decode"]
+        cells = "".join(f"{median(row[name] for row in rows):9.2f}" for name in names)
+        print(f"{clip.stem[:14]:14s} {width:4d}x{height:<4d}"[:20].ljust(20) + cells)
+
+
+if __name__ == "__main__":
+    main()
