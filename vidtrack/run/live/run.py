@@ -17,7 +17,7 @@ from vidtrack.output.intervals.days import zone_of
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard
-from vidtrack.recording.recorder import NoRecorder, Recorder
+from vidtrack.recording.recorder import Beginning, NoRecorder, Recorder
 from vidtrack.recording.reserve import Reserve
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
 from vidtrack.run.live.counting import COUNTS, counting_of
@@ -107,11 +107,11 @@ class LiveRun:
             zone = zone_of(live.zone)
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
             subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, None)
-            site = self._followed(stats.warn)
-            subject = subject if site is None else subject.at(site.used)
+            self._site = self._followed(stats.warn)
+            subject = subject if self._site is None else subject.at(self._site.used)
             self.counts = None if counter is None else extras.counts or self.folder / COUNTS
             counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s)
-            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn, site)
+            self._outputs = Outputs(self.folder, subject, extras, roll_s, retention, counting, stats.warn, self._site)
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 
     def __iter__(self) -> Iterator[Step]:
@@ -197,10 +197,14 @@ class LiveRun:
             if span.over(frame.time_s):
                 break
             place = self._source.place
-            recorder.log_frame(frame, place, checkpoint.gather() if recorder.begins(place) else None)
+            recorder.log_frame(frame, place, self._beginning() if recorder.begins(place) else None)
             self._checkpoint_file.offer(checkpoint)
             self._in_work = True
             yield frame
+
+    def _beginning(self) -> Beginning:
+        """What the repetition of a recording begins with, now."""
+        return Beginning(self._checkpoint.gather(), None if self._site is None else self._site.used.text)
 
     def _reading(self) -> Mapping[str, Any]:
         """The run's counters, for the summary and the page."""
