@@ -3,7 +3,7 @@
     python tools/station_day.py [--cameras 16] [--hours 24] [--seed 0] [--processes 2] [--folder DIR]
 
 Each camera sees vehicles as boxes, two scans a second, on a simulated clock; tracker, lines, parts, counts by interval
-and saved state are those of `vidtrack live`. The day begins at half past eleven in the evening before Berlin leaves
+and saved state are those of `vidtrack live`. The day begins half an hour before Berlin leaves
 daylight saving time. Faults are drawn from the seed: cameras that do not deliver, kills (half of them within a write),
 ends, steps of the wall clock by up to two hours, full disks. After a kill or an end a new process goes on from the
 saved state. The reference is the same traffic without faults.
@@ -50,7 +50,7 @@ from vidtrack.run.trackers import build_box_tracker
 from vidtrack.scan import Scan
 from vidtrack.video.frame import Frame
 
-BEGIN_S = 1_792_877_400.0  # 2026-10-24 23:30 in Berlin
+BEGIN_S = 1_792_888_200.0  # 2026-10-25 02:30 in Berlin
 RATE, SIZE, BOX = 2.0, (320.0, 240.0), (36.0, 18.0)
 LANES = ((40.0, 30.0), (90.0, 22.0), (150.0, -26.0), (200.0, -18.0))  # y [px], speed [px/s]
 GATES = {"west": 110.0, "east": 210.0}

@@ -13,7 +13,10 @@ async function followCounts(camera) {
       if (counts) {
         camera.counts = { ...counts, totals: camera.status.counts ?? {} };
         showLines(camera);
-        if (chosen() === camera) showHistory(camera);
+        if (chosen() === camera) {
+          showCounts(camera);
+          showHistory(camera);
+        }
       }
     }
     await pause(camera.counts ? COUNTS_MS : STATUS_MS);

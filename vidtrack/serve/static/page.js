@@ -161,7 +161,7 @@ function alarm(camera) {
   const item = document.createElement("li");
   const link = document.createElement("a");
   link.href = `#${encodeURIComponent(camera.status.name)}`;
-  link.append(element("b", camera.status.name), why ? `${word}: ${why}` : word);
+  link.append(element("b", camera.status.name), ` ${word}${why ? `: ${why}` : ""}`);
   item.append(link);
   return item;
 }
