@@ -11,11 +11,10 @@ SECONDS = 300.0
 
 @pytest.fixture
 def day(monkeypatch):
-    """The tool, two minutes before the clock is set back an hour."""
+    """The tool."""
     monkeypatch.setattr(sys, "path", [str(TOOLS), *sys.path])
     import station_day
 
-    monkeypatch.setattr(station_day, "BEGIN_S", 1_792_890_000.0 - 120.0)
     station_day.load_kernels()
     return station_day
 
@@ -28,6 +27,7 @@ def test_every_crossing_is_there_once_or_in_a_stated_gap(day, tmp_path):
         full=[(150.0, 165.0)],
         ends=[(80.0, 2.0, True), (130.0, 1.0, False), (230.0, 15.0, True)],
         steps=[(0.0, 0.0), (100.0, 900.0), (180.0, -600.0)],
+        begin_s=1_792_890_000.0 - 120.0,  # two minutes before Berlin's clocks are set back an hour
     )
     found = day.camera_day(tmp_path, traffic, faults, SECONDS, 7)
     assert (found["kills"], found["ends"], found["refused starts"]) == (2, 2, 0)
