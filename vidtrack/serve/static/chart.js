@@ -79,12 +79,15 @@ function nice(value) {
   return power * [1, 2, 3, 4, 5, 6, 8, 10].find((factor) => factor * power >= value);
 }
 
-/* Small, without numbers: the last day by hours. */
+/* Where a chart of the last hours begins: there are no more than have been watched, and three at least. */
+const beginning = (rows, since, until) => Math.max(since, Math.min(until - 10800, ...rows.map((row) => row.begin_s)));
+
+/* Small, without numbers: the last day by hours, or the few hours that there are by quarters. */
 function spark(rows, ways, since, until) {
   const drawing = shape("svg", { viewBox: "0 0 240 40", preserveAspectRatio: "none", "aria-hidden": "true" });
   drawing.append(shape("rect", { class: "unwatched", x: 0, y: 0, width: 240, height: 40 }));
   const across = (unix) => (240 * (Math.min(Math.max(unix, since), until) - since)) / (until - since);
-  bars(drawing, joined(intervals(rows, ways), 3600), across, 40, 0);
+  bars(drawing, joined(intervals(rows, ways), until - since > 28800 ? 3600 : 900), across, 40, 0);
   return drawing;
 }
 

@@ -54,13 +54,14 @@ function showLines(camera) {
     part.className = "line";
     const title = element("p", "");
     title.className = "title";
-    title.append(element("span", `${line}, today`), element("span", "last 24 hours"));
+    title.append(element("span", `${line}, today`), element("span", "last hours"));
     const ways = element("p", "");
     ways.className = "ways";
     ways.append(...directions.map((name, place) => way(name, place, sum(camera, "today", line, name))));
     part.append(title, ways);
     if (camera.counts?.today) {
-      part.append(spark(camera.counts.intervals.filter((row) => row.gate === line), directions, camera.counts.since_s, camera.counts.until_s));
+      const { intervals: all, since_s: since, until_s: until } = camera.counts;
+      part.append(spark(all.filter((row) => row.gate === line), directions, beginning(all, since, until), until));
     }
     return part;
   });
@@ -109,7 +110,9 @@ async function showHistory(camera) {
   section.dataset.asked = asked;
   const path = day.value ? `counts/${camera.place}/${day.value}.json` : `counts/${camera.place}.json`;
   const counts = every === "15min" && !day.value ? camera.counts : await fetched(`${path}?every=${every}`);
-  if (counts && section.dataset.asked === asked) draw(section.querySelector(".charts"), counts, linesOf(camera));
+  if (!counts || section.dataset.asked !== asked) return;
+  const since = day.value ? counts.since_s : beginning(counts.intervals, counts.since_s, counts.until_s);
+  draw(section.querySelector(".charts"), { ...counts, since_s: since }, linesOf(camera));
 }
 
 function draw(charts, counts, lines) {

@@ -114,14 +114,18 @@ class Recount:
         """Read the rows of the parts that are still there."""
         while True:
             try:
-                return self._read(calibration, ground)
+                self._read(calibration, ground)
             except (OSError, FormatError) as error:
                 left = tuple(one for one in self._day.recordings if has_tracks(one.folder))
                 if not left:
                     raise SourceError("the tracks of this run have been deleted; open a newer one") from None
                 if len(left) == len(self._day.recordings):
+                    if isinstance(error, FormatError):
+                        raise
                     raise SourceError(f"the tracks of this run cannot be read: {error}") from None
                 self._day = replace(self._day, recordings=left)
+            else:
+                return
 
     def _read(self, calibration: Calibration | None, ground: Ground | None) -> None:
         reader, lives, blocks = Reader(self._day, {self.size: ground}), Lives(), list[Rows]()
