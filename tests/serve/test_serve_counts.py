@@ -81,3 +81,18 @@ def test_a_damaged_file_is_told(url, counted):
     code, _, body = get(f"{url}counts/0/{day.name}.csv")
     path.write_bytes(before)
     assert (code, b"is damaged" in body) == (500, True)
+
+
+def test_what_was_counted_today_and_in_the_last_hour(url):
+    last = get_json(url + "counts/0.json")
+    assert last["hour"] == {"gate": {"left": 60, "right": 0}}
+    assert 0 <= last["today"]["gate"]["left"] <= 180  # by the hour of the day in UTC
+    assert last["until_s"] - last["since_s"] == 86400
+
+
+def test_any_day_for_the_chart(url, counted):
+    day = day_folders(counted.counts)[0].name
+    found = get_json(f"{url}counts/0/{day}.json?every=1h")
+    assert found["until_s"] - found["since_s"] == 86400
+    assert sum(row["count"] or 0 for row in found["intervals"]) == 1
+    assert get(f"{url}counts/0/2020-01-01.json")[0] == 404

@@ -1,16 +1,19 @@
 """What the page of a site is told, and what it may write."""
 
 import json
+import shutil
 import struct
 from pathlib import Path
 
 import pytest
 from drawn_runs import CALIBRATED, straight, write_run
-from site_desk import ask, ask_json, desk_over
+from site_desk import ask, ask_json, desk_over, served
 
 from vidtrack.errors import ConfigError
-from vidtrack.serve.site.app import Picture
+from vidtrack.serve.site.app import Desk, Picture
+from vidtrack.serve.site.file import SiteFile
 from vidtrack.serve.site.plan import read_world, world_file
+from vidtrack.traffic.measures.recount import Recount
 from vidtrack.traffic.site import read_site
 
 PLACE = """# The yard behind the works.
@@ -176,6 +179,24 @@ def test_counts_residuals_and_a_grid(desk):
     assert found["calibration"]["wrong"] == [5]
     assert "pair 5 of the calibration" in found["warnings"][0]
     assert "tally" not in found
+
+
+def test_parts_that_a_running_camera_deletes_are_left_out(tmp_path):
+    """Metres are read when the calibration is drawn, which may be days after the page was opened."""
+    parts = [write_run(tmp_path / f"part{k}", [straight(k, 2.0, 50, 150, 100, 5)], covariances=True) for k in range(3)]
+    tree = json.loads(json.dumps(CALIBRATED))
+    desk = Desk("yard", Recount([str(part) for part in parts]), SiteFile(tmp_path / "site.toml"), tree, None, None)
+    with served(desk) as url:
+        for part, left in zip(parts, (2, 1, None), strict=True):
+            shutil.rmtree(part)
+            tree["calibration"]["ground"][0][0] += 0.001
+            found = ask_json(url, "look", {"tree": tree, "count": True})
+            if left is None:
+                assert "the tracks of this run have been deleted" in "\n".join(found["warnings"])
+                assert ask(url, "paths", {"tree": tree})[0] == 422
+            else:
+                assert found["tally"]["counts"]["middle"]["right"] == left
+                assert ask(url, "paths", {"tree": tree})[0] == 200
 
 
 def test_paths_are_as_many_as_tracks(desk):

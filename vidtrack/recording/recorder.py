@@ -7,6 +7,7 @@ import shutil
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from threading import RLock
@@ -23,6 +24,7 @@ from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, new_part
 from vidtrack.recording.source import FRAMES, FRAMES_HEADER, SETTINGS, STATE, VIDEO
 from vidtrack.state import State, write_state
+from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.connection import Connection
 from vidtrack.video.live.packet_sink import NoPacketSink, Place
@@ -35,6 +37,18 @@ _END_S = 0.5  # for the reader to finish its packet at the end
 _NOWHERE: Place = (-1, 0)
 
 
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """What the repetition of a part begins with.
+
+    state  checkpoint before the first tracked frame
+    site   text of the site's file; None without a site
+    """
+
+    state: State
+    site: str | None
+
+
 class NoRecorder(NoPacketSink):
     """Records nothing: a run without --record."""
 
@@ -45,7 +59,7 @@ class NoRecorder(NoPacketSink):
         """False."""
         return False
 
-    def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
+    def log_frame(self, frame: Frame, place: Place, beginning: Beginning | None) -> None:
         """Do nothing."""
 
     def close(self) -> None:
@@ -95,7 +109,7 @@ class Recorder:
         self._retry_s = 0.0
         self._warned_s = -_WARN_S
         self._logged = _NOWHERE[0]
-        self._to_write: deque[tuple[int, State | str]] = deque()
+        self._to_write: deque[tuple[int, Beginning | str]] = deque()
         self._list: LineFile | None = None
         self._listed = _NOWHERE[0]
 
@@ -153,14 +167,14 @@ class Recorder:
         """Whether the frame at this place is the first tracked frame of its part."""
         return place[0] not in (self._logged, _NOWHERE[0])
 
-    def log_frame(self, frame: Frame, place: Place, state: State | None) -> None:
-        """Log the frame that is tracked next; `state` is the checkpoint before it if it `begins` a part."""
+    def log_frame(self, frame: Frame, place: Place, beginning: Beginning | None) -> None:
+        """Log the frame that is tracked next; `beginning` if it `begins` a part."""
         part, packet = place
         if part == _NOWHERE[0]:
             return
-        if state is not None:
+        if beginning is not None:
             self._logged = part
-            self._to_write.append((part, state))
+            self._to_write.append((part, beginning))
         self._to_write.append((part, f"{frame.index},{frame.time_s!r},{packet}\n"))
 
     def close(self) -> None:
@@ -215,7 +229,7 @@ class Recorder:
             ended.close()
 
     def _write_log(self) -> None:
-        """Write the logged states and frames to their parts."""
+        """Write the logged beginnings and frames to their parts."""
         while self._to_write:
             part, entry = self._to_write.popleft()
             if not isinstance(entry, str):
@@ -223,13 +237,15 @@ class Recorder:
             elif self._list is not None and part == self._listed:
                 self._list.add(entry)
 
-    def _begin_list(self, part: int, state: State) -> None:
+    def _begin_list(self, part: int, beginning: Beginning) -> None:
         self._end_list()
         folder = self._folders.get(part)
         if folder is None:  # its pictures could not be written
             return
         with writing(folder):
-            write_state(folder / STATE, state)
+            if beginning.site is not None:
+                (folder / SITE_COPY).write_text(beginning.site, encoding="utf-8")
+            write_state(folder / STATE, beginning.state)
             self._state_bytes = (folder / STATE).stat().st_size
         self._list = LineFile(folder / FRAMES, FRAMES_HEADER)
         self._listed = part

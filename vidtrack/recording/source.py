@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from math import isfinite
@@ -13,10 +14,13 @@ import av
 
 from vidtrack.errors import FormatError, SourceError
 from vidtrack.state import State, read_state
+from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.video.clock import FALLBACK_FPS
 from vidtrack.video.frame import Frame
 from vidtrack.video.planes import matched, to_frame
 from vidtrack.video.stats import SourceStats
+
+log = logging.getLogger(__name__)
 
 VIDEO, FRAMES, STATE, SETTINGS = "video.mkv", "frames.csv", "state.npz", "settings.json"
 FRAMES_HEADER = "frame,time_s,packet\n"
@@ -29,12 +33,22 @@ def is_recording(path: str) -> bool:
 
 
 def recorded_settings(path: str) -> dict[str, Any]:
-    """Settings of the run that made the recording. Raises FormatError."""
-    file = _parts(Path(path))[0] / SETTINGS
+    """Settings of the run that made the recording, with the site as it was then. Raises FormatError."""
+    parts = _parts(Path(path))
+    file = parts[0] / SETTINGS
     try:
         settings: dict[str, Any] = json.loads(file.read_text())
     except (OSError, ValueError) as error:
         raise FormatError(f"cannot read {file}: {error}") from None
+    copy = parts[0] / SITE_COPY
+    if copy.is_file():
+        settings["output"]["site"] = str(copy)
+        for part in parts[1:]:
+            if (part / SITE_COPY).is_file() and (part / SITE_COPY).read_bytes() != copy.read_bytes():
+                log.warning(
+                    "%s was recorded with another site than %s, whose site is used; repeat it alone", part, copy
+                )
+                break
     return settings
 
 

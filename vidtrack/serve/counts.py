@@ -1,14 +1,14 @@
-"""The counts by interval on the page: the last day as JSON for its chart, and tables of any day to download."""
+"""The counts by interval on the page: as JSON for its charts, and tables of any day to download."""
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -19,9 +19,11 @@ from starlette.routing import Route
 
 from vidtrack.errors import FormatError
 from vidtrack.output.figures import csv_of
-from vidtrack.output.intervals.day import Plan, day_folders, read_day
-from vidtrack.output.intervals.days import DAY_S, EVERY
+from vidtrack.output.intervals.day import Day, Plan, day_folders, read_day
+from vidtrack.output.intervals.days import DAY_S, EVERY, date_of, span_of, zone_of
 from vidtrack.serve.camera import Camera, Shared
+
+Value = TypeVar("Value")
 
 _LEAST_S = 2.0  # between two looks at the files of a camera
 
@@ -43,10 +45,11 @@ class Counts:
         return [
             Route("/counts/{number:int}.json", self.last_day),
             Route("/counts/{number:int}/{day}.csv", self.table),
+            Route("/counts/{number:int}/{day}.json", self.one_day),
         ]
 
     async def last_day(self, request: Request) -> Response:
-        """The intervals of the last 24 hours, and the days that can be downloaded."""
+        """The intervals of the last 24 hours, the counts of today and of the last hour, and the days that there are."""
         key = number, every = request.path_params["number"], _every(request)
         folder = self._folder(number)
         if folder is None:
@@ -58,19 +61,28 @@ class Counts:
         except FormatError as error:
             raise HTTPException(500, f"{error}\n") from None
 
+    async def one_day(self, request: Request) -> Response:
+        """The intervals of one local day."""
+        folder, every = self._day(request), _every(request)
+        return JSONResponse(await _read(_one_day, folder, EVERY[every]))
+
     async def table(self, request: Request) -> Response:
         """The table of one local day, as CSV with the columns of `vidtrack measure`."""
-        number, every, day = request.path_params["number"], _every(request), request.path_params["day"]
-        folder = self._folder(number)
+        folder, every = self._day(request), _every(request)
+        content = await _read(_csv, folder, EVERY[every])
+        named = {"Content-Disposition": f'attachment; filename="{folder.name}-{every}.csv"'}
+        return Response(content, media_type="text/csv; charset=utf-8", headers=named)
+
+    def _day(self, request: Request) -> Path:
+        """The folder of the day that is asked for. Raises HTTPException."""
+        folder, day = self._folder(request.path_params["number"]), request.path_params["day"]
         try:
             date.fromisoformat(day)
         except ValueError:
             raise HTTPException(404, "write the day as 2026-11-22\n") from None
         if folder is None or not (folder / day).is_dir():
             raise HTTPException(404, "nothing was counted on that day\n")
-        content = await asyncio.to_thread(_csv, folder / day, EVERY[every])
-        named = {"Content-Disposition": f'attachment; filename="{day}-{every}.csv"'}
-        return Response(content, media_type="text/csv; charset=utf-8", headers=named)
+        return folder / day
 
     def _folder(self, number: int) -> Path | None:
         if number >= len(self._cameras):
@@ -85,15 +97,43 @@ def _every(request: Request) -> str:
     return every
 
 
+async def _read(make: Callable[[Path, float], Value], folder: Path, every_s: float) -> Value:
+    """What a function makes of a folder, in a thread of its own. Raises HTTPException for a damaged one."""
+    try:
+        return await asyncio.to_thread(make, folder, every_s)
+    except FormatError as error:
+        raise HTTPException(500, f"{error}\n") from None
+
+
 def _last_day(folder: Path, every_s: float) -> dict[str, Any]:
-    days = day_folders(folder)
-    rows: list[dict[str, Any]] = []
-    since_s = time.time() - DAY_S
-    if days:
-        plan = Plan.read(folder)
-        tables = [read_day(day).intervals(every_s, plan) for day in days[-2:]]
-        rows = [row for table in tables for row in _rows(table) if row["end_s"] > since_s]
-    return {"since_s": since_s, "every_s": every_s, "days": [day.name for day in days], "intervals": rows}
+    folders, now_s = day_folders(folder), time.time()
+    found: dict[str, Any] = {"since_s": now_s - DAY_S, "until_s": now_s, "every_s": every_s, "intervals": []}
+    if folders:
+        plan, days = Plan.read(folder), [read_day(day) for day in folders[-2:]]
+        zone = zone_of(plan.zone)
+        midnight_s = span_of(date_of(now_s, zone), zone)[0]
+        rows = [row for day in days for row in _rows(day.intervals(every_s, plan))]
+        found["intervals"] = [row for row in rows if row["end_s"] > now_s - DAY_S]
+        found |= {"today": _counted(days, plan, midnight_s), "hour": _counted(days, plan, now_s - 3600)}
+    return found | {"days": [day.name for day in folders]}
+
+
+def _one_day(folder: Path, every_s: float) -> dict[str, Any]:
+    plan = Plan.read(folder.parent)
+    since_s, until_s = span_of(date.fromisoformat(folder.name), zone_of(plan.zone))
+    rows = _rows(read_day(folder).intervals(every_s, plan))
+    return {"since_s": since_s, "until_s": until_s, "every_s": every_s, "intervals": rows}
+
+
+def _counted(days: Sequence[Day], plan: Plan, since_s: float) -> dict[str, dict[str, int]]:
+    """Crossings since a Unix time [s], by gate and direction."""
+    counts = {gate: dict.fromkeys(ways, 0) for gate, ways in plan.gates.items()}
+    for day in days:
+        late = pc.greater_equal(day.crossings["utc"].cast(pa.int64()), round(1000 * since_s))
+        for row in day.crossings.filter(late).select(["gate", "direction"]).to_pylist():
+            if row["direction"] in counts.get(row["gate"], ()):
+                counts[row["gate"]][row["direction"]] += 1
+    return counts
 
 
 def _rows(table: pa.Table) -> list[dict[str, Any]]:
@@ -104,8 +144,4 @@ def _rows(table: pa.Table) -> list[dict[str, Any]]:
 
 
 def _csv(folder: Path, every_s: float) -> bytes:
-    try:
-        table = read_day(folder).intervals(every_s, Plan.read(folder.parent))
-    except FormatError as error:
-        raise HTTPException(500, f"{error}\n") from None
-    return csv_of(table)
+    return csv_of(read_day(folder).intervals(every_s, Plan.read(folder.parent)))

@@ -190,6 +190,17 @@ def test_a_damaged_file_is_set_aside_and_ends_no_run(tmp_path, caplog):
     assert list(path.parent.glob("crossings.csv.damaged-*"))
 
 
+def test_a_damaged_day_is_told_by_none_of_its_old_tables(tmp_path):
+    book = CountBook(tmp_path, PLAN)
+    book.add([passage(NOON), passage(NOON + 1)])
+    book.close()
+    path = tmp_path / "2026-10-24" / "crossings.csv"
+    path.write_bytes(path.read_bytes() + b"\x00\xff,,,,,\n")
+    os.utime(path, ns=(2**62, 2**62))
+    CountBook(tmp_path, PLAN)
+    assert totals(tmp_path) == {}
+
+
 def test_a_damaged_table_is_made_up_for_by_the_crossings(tmp_path):
     book = CountBook(tmp_path, PLAN)
     book.add([passage(NOON), passage(NOON + 1)])

@@ -42,6 +42,21 @@ main()
 """
 
 
+POOL = """
+from concurrent.futures import ThreadPoolExecutor
+from vidtrack.run.live.leave import leave
+
+pool = ThreadPoolExecutor()
+pool.submit(print, "done").result()
+leave(3)
+"""
+
+
+def test_a_pool_that_nobody_closed_does_not_delay_it():
+    done = subprocess.run([sys.executable, "-c", POOL], capture_output=True, text=True, timeout=HANG_S, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (3, "done\n", "")
+
+
 @pytest.mark.parametrize("code", [0, 3])
 def test_threads_that_write_in_compiled_code_do_not_abort_it(code):
     program = [sys.executable, "-c", ABANDONED.replace("CODE", str(code))]

@@ -9,6 +9,7 @@ import shutil
 import time
 from types import SimpleNamespace
 
+import pyarrow as pa
 import pytest
 from synthetic_steps import make_step
 
@@ -130,6 +131,26 @@ def test_a_gap_in_the_frames_is_a_gap_in_what_was_watched(tmp_path, clock):
     assert (read_day(day).watched - BEGAN_S).round(2).tolist() == [[0, 4.96], [30, 34.96], [60.2, 65.16]]
 
 
+def test_what_is_known_of_a_vehicle_lasts_until_its_crossing_is_decided(tmp_path, clock):
+    """It is measured until just beyond the line, and then hidden for 20 s, while another one drives."""
+    station = Station(tmp_path, clock, "tracker.hidden_s=20", "tracker.coast_s=20")
+    for frame in range(round(24 * FPS)):
+        t = frame / FPS
+        rows = [(2, "c", 10 + t, 20)]
+        if t <= 1:
+            rows.append((1, "c", 52 + 50 * t, 100))
+        elif t < 21:
+            rows.append((1, "o", 102, 100))
+        seen = [number for number, word, *_ in rows if word == "c"]
+        names = ("length_m", "length_sigma_m", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
+        road = {name: len(seen) * [value] for name, value in zip(names, (4.0, 0.1, 36.0, 1.0, 1.0), strict=True)}
+        station.counting.step([make_step(frame, rows)], pa.table({"track_id": seen, "time_s": len(seen) * [t]} | road))
+    station.counting.close()
+    (day,) = day_folders(tmp_path / "intervals")
+    (crossing,) = read_day(day).crossings.to_pylist()
+    assert (crossing["track_id"], crossing["length_m"], crossing["speed_kmh"]) == (1, 4.0, 36.0)
+
+
 @pytest.mark.parametrize("step_s", [3600.0, -3600.0])
 def test_a_step_of_the_wall_clock_neither_loses_nor_doubles(tmp_path, clock, step_s):
     station = Station(tmp_path, clock)
@@ -201,6 +222,25 @@ def test_crossings_of_a_disk_without_any_room_are_written_later(tmp_path, clock,
     station.parts.finish()
     (part,) = parts_of(tmp_path)
     assert len(rows_of(part / "counts.csv")) == totals(tmp_path / "intervals")["gate"]["right"]
+
+
+def test_crossings_of_a_part_that_cannot_begin_are_in_the_next_one(tmp_path, clock, monkeypatch):
+    """Even where the next one begins at the end of the run, for them alone."""
+    station = Station(tmp_path, clock)
+    station.drive(0, 9.8)
+
+    def full(*_):
+        raise StoppedEarly("No space left")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("vidtrack.run.live.parts.Part", full)
+        for begin_s in (10, 11, 12):
+            with pytest.raises(StoppedEarly, match="No space left"):
+                station.drive(begin_s, begin_s + 0.2)
+            clock.now = begin_s + 1
+    station.parts.finish()
+    crossings = [row for part in parts_of(tmp_path) for row in rows_of(part / "counts.csv")]
+    assert len(crossings) == totals(tmp_path / "intervals")["gate"]["right"] == 12
 
 
 def test_recordings_leave_more_room_than_tracks(tmp_path, monkeypatch):

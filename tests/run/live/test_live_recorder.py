@@ -49,7 +49,8 @@ def receive(tape, full=False):
 
 
 def track(tape, index, place):
-    tape.log_frame(Frame.blank((48, 64), coloured=False), place, {"frame": index} if tape.begins(place) else None)
+    beginning = recorder.Beginning({"frame": index}, f"site {index}") if tape.begins(place) else None
+    tape.log_frame(Frame.blank((48, 64), coloured=False), place, beginning)
 
 
 def test_a_part_that_ends_before_its_first_frame_is_tracked_ends_no_other(tape, tmp_path, caplog):

@@ -18,9 +18,10 @@ from click.testing import CliRunner
 from patient import line_with, start
 
 import vidtrack.run.live.run
+import vidtrack.run.live.worker
 from vidtrack.cli import cli
 from vidtrack.config.load import load
-from vidtrack.errors import ConfigError, OutputError
+from vidtrack.errors import ConfigError, OutputError, StoppedEarly
 from vidtrack.output.lock import exclusive
 from vidtrack.output.repair import read_tracks
 from vidtrack.run.live.cameras import Entry, extras_of, listed, named, refuse_shared_site, settings_of
@@ -138,6 +139,22 @@ def test_it_is_tried_for_ever_once_it_crashed(tmp_path):
         worker.kill()
         wait_for(lambda: cameras.running(0.05) and worker.restarts > 1)
         assert any("connection refused" in what for _, what in worker.status()["problems"])
+
+
+def full(name):
+    """In the camera's process: nothing can be written."""
+
+    def refuse(*_, **__):
+        raise StoppedEarly("cannot write out: No space left on device")
+
+    vidtrack.run.live.worker.LiveRun = refuse
+
+
+def test_a_disk_that_is_full_at_the_start_may_have_room_later(tmp_path):
+    with Supervisors([replace(job("a", NOBODY, tmp_path), prepare=full)], tmp_path) as cameras:
+        worker = cameras.by_camera["a"]
+        wait_for(lambda: cameras.running(0.05) and worker.restarts > 0)
+        assert any("No space left" in what for _, what in worker.status()["problems"])
 
 
 def test_a_crash_goes_on_in_the_same_parts(tmp_path):

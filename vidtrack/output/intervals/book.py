@@ -195,7 +195,7 @@ class CountBook:
             self._make_tables(folder)
         except FormatError as error:
             log.warning("%s; it is set aside, and its day is counted anew", error)
-            for name in (CROSSINGS, WATCHED):
+            for name in (CROSSINGS, WATCHED, *(f"{name}.csv" for name in EVERY)):  # else totals are those of the tables
                 with suppress(OSError):
                     (folder / name).rename(folder / f"{name}.damaged-{int(time.time())}")
         except Error as error:

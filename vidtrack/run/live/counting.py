@@ -19,7 +19,6 @@ from vidtrack.traffic.lines import Crossing, LineCounter
 COUNTS = "intervals"
 """Folder of the counts by interval"""
 
-_FORGET_S = 10.0  # a crossing is decided sooner than this after the last row of its track
 _MARGIN_S = 1.0  # for a vehicle to be clear of the line
 _STEP_S = 0.5  # the wall clock was set if it moved by more than this
 _SPEEDS = ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
@@ -50,7 +49,6 @@ class RoadReadings:
             if fast[number]:
                 speed, own, shared = speeds[fast[number] - 1].tolist()
                 self._speeds[one] = speed, own, shared
-        self._forget(float(time_s[-1]))
 
     def of(self, track_id: int) -> tuple[float, float, float, float]:
         """Length, speed and its standard deviations; NaN where nothing is known."""
@@ -58,8 +56,9 @@ class RoadReadings:
         length = np.nan if sums is None else float(mean_length(sums[None])[0])
         return length, *self._speeds.get(track_id, _NOTHING)
 
-    def _forget(self, now_s: float) -> None:
-        for one in [one for one, seen_s in self._seen_s.items() if now_s - seen_s > _FORGET_S]:
+    def forget(self, before_s: float) -> None:
+        """Forget the tracks without rows since then."""
+        for one in [one for one, seen_s in self._seen_s.items() if seen_s < before_s]:
             for memory in (self._sums, self._speeds, self._seen_s):
                 memory.pop(one, None)
 
@@ -113,6 +112,8 @@ class Counting:
         self._note(crossings)
         for step in steps:
             self._watch(step.time_s)
+        if self._last_s is not None:
+            self._readings.forget(self._last_s - self._late_s)
         self._tell_watched(self._late_s)
         return crossings
 

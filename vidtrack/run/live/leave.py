@@ -16,9 +16,7 @@ def leave(code: int) -> NoReturn:
     Python's own end takes libraries apart, which a run that has to end soon has no time for, and ends abandoned threads
     where they ask for its lock; in compiled code that aborts the process.
     """
-    for thread in threading.enumerate():
-        if not thread.daemon and thread is not threading.current_thread():
-            thread.join()
+    threading._shutdown()  # type: ignore[attr-defined]  # joins threads; those of pools wait until they are told to end
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # its reader is gone, or it is closed

@@ -112,11 +112,10 @@ class Parts:
             if self._whole is not None:
                 self._whole.interrupted = False
                 stack.callback(self._whole.close)
-            for part in (*self._ended, *([self._part] if self._part else [])):
-                stack.callback(part.finish)
+            stack.callback(self._finish_parts)
             if self._counting is not None:
                 self._crossings.extend(self._counting.end())
-                stack.callback(self._write_crossings)
+                stack.callback(self._write_last_crossings)
                 stack.callback(self._counting.close)
             if self._events is not None:
                 stack.callback(self._events.save)
@@ -129,18 +128,33 @@ class Parts:
             rows = rows.filter(pc.is_in(rows["frame"], pa.array([step.index for step in chosen], pa.int64())))
         self._roll()
         part = self._part or self._begin()
-        self._write_crossings()
+        self._write_crossings(part)
         self._reserve.check_tracks(self._root)
         part.write(steps, chosen, rows)
         for ended in [ended for ended in self._ended if ended.is_settled(steps)]:
             self._ended.remove(ended)
             self._later(Part.finish, ended)
 
-    def _write_crossings(self) -> None:
+    def _write_crossings(self, part: Part) -> None:
         """Write the crossings, those too that there was no room for before."""
-        if self._part is not None and self._crossings:
-            self._part.write_crossings(self._crossings)
+        if self._crossings:
+            part.write_crossings(self._crossings)
             self._crossings.clear()
+
+    def _write_last_crossings(self) -> None:
+        """Write them at the end, to a part of their own where none could begin since."""
+        if not self._crossings:
+            return
+        try:
+            self._write_crossings(self._part or self._begin())
+        except StoppedEarly as error:
+            count = len(self._crossings)
+            raise StoppedEarly(f"{error}; {count} crossings of the end are in the counts by interval alone") from None
+
+    def _finish_parts(self) -> None:
+        with ExitStack() as stack:
+            for part in (*self._ended, *([self._part] if self._part else [])):
+                stack.callback(part.finish)
 
     def _roll(self) -> None:
         """End the current part if its period is over, it is too large, or the site has changed."""

@@ -21,7 +21,7 @@ from vidtrack.output.lock import exclusive
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard, trouble_of
 from vidtrack.recording.event_pictures import EventPictures
-from vidtrack.recording.recorder import NoRecorder, Recorder
+from vidtrack.recording.recorder import Beginning, NoRecorder, Recorder
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Limits
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
@@ -121,8 +121,8 @@ class LiveRun:
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
             self._status = lambda: asdict(self.board.now())
             subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, None)
-            site = self._followed(stats.warn)
-            subject = subject if site is None else subject.at(site.used)
+            self._site = self._followed(stats.warn)
+            subject = subject if self._site is None else subject.at(self._site.used)
             self.counts = None if counter is None else (extras.lasting or self.folder) / COUNTS
             told = None if self._events is None else self._events.crossed
             counting = None if self.counts is None else counting_of(subject, self.counts, self._began_s, told)
@@ -131,7 +131,16 @@ class LiveRun:
                 pictures = self._event_pictures(extras.lasting or self.folder, subject)
                 self._events.begin(subject, pictures, self._began_s)
             self._outputs = Outputs(
-                self.folder, subject, extras, roll_s, retention, counting, stats.warn, site, self._events, pictures
+                self.folder,
+                subject,
+                extras,
+                roll_s,
+                retention,
+                counting,
+                stats.warn,
+                self._site,
+                self._events,
+                pictures,
             )
             self._open, self._locks = stack.pop_all(), locks.pop_all()
 
@@ -246,10 +255,14 @@ class LiveRun:
             if span.over(frame.time_s):
                 break
             place = self._source.place
-            recorder.log_frame(frame, place, checkpoint.gather() if recorder.begins(place) else None)
+            recorder.log_frame(frame, place, self._beginning() if recorder.begins(place) else None)
             self._checkpoint_file.offer(checkpoint)
             self._in_work = True
             yield frame
+
+    def _beginning(self) -> Beginning:
+        """What the repetition of a recording begins with, now."""
+        return Beginning(self._checkpoint.gather(), None if self._site is None else self._site.used.text)
 
     def _reading(self) -> Mapping[str, Any]:
         """The run's counters, for the summary and the page."""

@@ -16,6 +16,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any
 
+from vidtrack.errors import StoppedEarly
 from vidtrack.output.status import is_stuck
 from vidtrack.recording.retention import parts_of
 from vidtrack.run.live.counting import COUNTS
@@ -35,6 +36,8 @@ _SPAWN = multiprocessing.get_context("spawn")  # fork would copy locks held by t
 
 class Supervisor:
     """Supervises a camera's process, and restarts it, after growing pauses, when it ends without a final status.
+
+    It is restarted too where it could not begin on a full disk: there may be room later.
 
     All methods but `restart_if_due` and `change` may be called from any thread.
 
@@ -89,7 +92,7 @@ class Supervisor:
         if self._restart_s is not None:
             if monotonic() >= self._restart_s:
                 self._restart()
-        elif code != 0 and (self.restarts or not self._has_final_status()):
+        elif code != 0 and (self.restarts or code == StoppedEarly.exit_code or not self._has_final_status()):
             pause_s = self._pause_s()
             self._restart_s = monotonic() + pause_s
             self._crashes = [*self._crashes, (time.time(), f"{self._why()}; it is started again")][-5:]

@@ -28,6 +28,7 @@ from vidtrack.traffic.measures.recount import Recount
 log = logging.getLogger(__name__)
 
 _STATIC = Path(__file__).with_name("static")
+_COLOURS = Path(__file__).parents[1] / "static" / "colours.css"
 _LARGEST = 4_000_000  # bytes of a request
 _GONE_S = 90.0  # a page that did not ask for so long is gone; browsers let hidden ones ask once a minute
 _MOST_EDITORS = 100
@@ -72,6 +73,7 @@ class Desk:
                 Route("/paths", self.paths, methods=["POST"]),
                 Route("/save", self.save, methods=["POST"]),
                 Route("/here", self.here, methods=["POST"]),
+                Route("/static/colours.css", lambda request: FileResponse(_COLOURS)),
                 Mount("/static", StaticFiles(directory=_STATIC)),
             ],
             exception_handlers={Error: _refused, Exception: _failed},

@@ -1,110 +1,133 @@
 "use strict";
 
-/* The chart of the last day and the download of any day, for each camera that counts. */
+/* What each camera counted: the lines of its card, and the history of the one that is enlarged. */
 
-const COUNTS_MS = 30000;
-const WIDE = 960;
-const HIGH = 120;
+const COUNTS_MS = 15000;
+const MOST_LINES = 3;
 
-const clock = (unix) => new Date(1000 * unix).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-
-function shape(name, attributes, title) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (title) made.append(shape("title", {}));
-  if (title) made.firstChild.textContent = title;
-  return made;
-}
-
-/* One gate: what its two directions counted stands on each other; grey is what was not watched. */
-function chart(gate, rows, since, until) {
-  const ways = [...new Set(rows.map((row) => row.direction))];
-  const intervals = grouped(rows);
-  const sums = [...intervals.values()].map((group) => group.reduce((sum, row) => sum + (row.count ?? 0), 0));
-  const most = Math.max(1, ...sums);
-  const across = (unix) => (WIDE * (Math.max(unix, since) - since)) / (until - since);
-  const drawing = shape("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, preserveAspectRatio: "none", role: "img" });
-  drawing.append(shape("rect", { class: "unwatched", x: 0, y: 0, width: WIDE, height: HIGH }, "not watched"));
-  for (const [begin, group] of intervals) {
-    const x = across(begin);
-    const width = Math.max(across(group[0].end_s) - x - 1, 0.5);
-    const covered = Math.min(group[0].coverage ?? 0, 1);
-    const told = group.map((row) => {
-      const speed = row.time_mean_speed_kmh ? `, ${row.time_mean_speed_kmh.toFixed(0)} km/h` : "";
-      return `${row.direction} ${row.count ?? "–"}${speed}`;
-    });
-    const title = `${clock(begin)} to ${clock(group[0].end_s)}: ${told.join("; ")}; watched ${Math.round(100 * covered)} %`;
-    drawing.append(shape("rect", { class: "watched", x, y: 0, width: width + 1, height: HIGH, opacity: covered }, title));
-    let y = HIGH;
-    for (const row of group) {
-      const height = (HIGH * (row.count ?? 0)) / most;
-      y -= height;
-      drawing.append(shape("rect", { class: `way${ways.indexOf(row.direction) % 2}`, x, y, width, height }, title));
+/* The counts of a camera that were fetched last, and asked for again and again. */
+async function followCounts(camera) {
+  for (;;) {
+    if (!document.hidden) {
+      const counts = await fetched(`counts/${camera.place}.json`);
+      if (counts) {
+        camera.counts = { ...counts, totals: camera.status.counts ?? {} };
+        showLines(camera);
+        if (chosen() === camera) {
+          showCounts(camera);
+          showHistory(camera);
+        }
+      }
     }
+    await pause(camera.counts ? COUNTS_MS : STATUS_MS);
   }
-  const made = document.createElement("figure");
-  const caption = document.createElement("figcaption");
-  const name = document.createElement("strong");
-  name.textContent = gate;
-  caption.append(name);
-  ways.forEach((way, number) => {
-    const counted = rows.filter((row) => row.direction === way).reduce((sum, row) => sum + (row.count ?? 0), 0);
-    const part = document.createElement("span");
-    part.className = `way${number % 2}`;
-    part.textContent = `${way} ${counted}`;
-    caption.append(part);
+}
+
+async function fetched(path) {
+  try {
+    const answer = await fetch(HERE + path, { signal: AbortSignal.timeout(10000) });
+    return answer.ok ? await answer.json() : null;
+  } catch {
+    return null; // the page says that there is no answer
+  }
+}
+
+/* What was counted today or in the last hour, with what the status has counted since. */
+function sum(camera, span, line, direction) {
+  const counts = camera.counts ?? {};
+  const now = camera.status.counts?.[line]?.[direction];
+  const then = counts.totals?.[line]?.[direction];
+  const since = now === undefined || then === undefined ? 0 : Math.max(0, now - then);
+  const known = counts[span]?.[line]?.[direction];
+  return known === undefined ? undefined : known + since;
+}
+
+/* Names of the lines with their directions: as counted now, or as the files have them. */
+const linesOf = (camera) => Object.entries(camera.status.counts && Object.keys(camera.status.counts).length
+  ? camera.status.counts : camera.counts?.today ?? {}).map(([line, ways]) => [line, Object.keys(ways).sort()]);
+
+function showLines(camera) {
+  const lines = linesOf(camera);
+  const shown = lines.slice(0, lines.length > MOST_LINES ? MOST_LINES - 1 : MOST_LINES);
+  const made = shown.map(([line, directions]) => {
+    const part = element("div", "");
+    part.className = "line";
+    const title = element("p", "");
+    title.className = "title";
+    title.append(element("span", `${line}, today`), element("span", "last hours"));
+    const ways = element("p", "");
+    ways.className = "ways";
+    ways.append(...directions.map((name, place) => way(name, place, sum(camera, "today", line, name))));
+    part.append(title, ways);
+    if (camera.counts?.today) {
+      const { intervals: all, since_s: since, until_s: until } = camera.counts;
+      part.append(spark(all.filter((row) => row.gate === line), directions, beginning(all, since, until), until));
+    }
+    return part;
   });
-  const peak = document.createElement("span");
-  peak.textContent = `most in an interval ${Math.max(0, ...sums)}`;
-  caption.append(peak);
-  const hours = document.createElement("div");
-  hours.className = "hours";
-  for (let part = 0; part <= 4; part += 1) {
-    const label = document.createElement("span");
-    label.textContent = clock(since + (part * (until - since)) / 4);
-    hours.append(label);
+  if (lines.length > shown.length) {
+    const more = element("p", `and ${lines.length - shown.length} more lines`);
+    more.className = "more";
+    made.push(more);
   }
-  made.append(caption, drawing, hours);
-  return made;
+  camera.card.querySelector(".lines").replaceChildren(...made);
 }
 
-function grouped(rows) {
-  const groups = new Map();
-  for (const row of rows) groups.set(row.begin_s, [...(groups.get(row.begin_s) ?? []), row]);
-  return groups;
+/* The table of the enlarged camera. */
+function showCounts(camera) {
+  const section = one.querySelector(".counts");
+  const lines = linesOf(camera);
+  section.querySelector("table").hidden = lines.length === 0;
+  section.querySelector(".empty").hidden = lines.length > 0;
+  section.querySelector("tbody").replaceChildren(...lines.flatMap(([line, directions]) => directions.map((name, place) => {
+    const made = row(place ? "" : line, "", ...["hour", "today"].map((span) => number(sum(camera, span, line, name))),
+      number(camera.status.counts?.[line]?.[name]));
+    const arrow = element("i", ARROWS[name] ?? "");
+    made.children[1].className = `way ${WAYS[place % 2]}`;
+    made.children[1].append(arrow, ` ${name}`);
+    return made;
+  })));
 }
 
-function offerDays(section, place, days) {
-  const choice = section.querySelector(".day");
-  if (choice.options.length !== days.length) {
-    choice.replaceChildren(...[...days].reverse().map((day) => new Option(day, day)));
+/* The charts of the enlarged camera: of the last 24 hours, or of the day that is chosen. */
+async function showHistory(camera) {
+  const section = one.querySelector(".history");
+  const days = camera.counts?.days ?? [];
+  section.hidden = days.length === 0;
+  if (section.hidden) return;
+  const day = section.querySelector(".day");
+  const every = section.querySelector(".every").value;
+  const options = [...days].reverse();
+  if (day.dataset.of !== `${camera.place} ${options}`) {
+    const before = day.value;
+    day.replaceChildren(new Option("the last 24 hours", ""), ...options.map((name) => new Option(name, name)));
+    day.value = options.includes(before) ? before : "";
+    day.dataset.of = `${camera.place} ${options}`;
   }
   const link = section.querySelector("a");
-  const point = () => {
-    const every = section.querySelector(".every").value;
-    link.href = `counts/${place}/${choice.value}.csv?every=${every}`;
-  };
-  choice.onchange = section.querySelector(".every").onchange = point;
-  point();
+  link.href = `counts/${camera.place}/${day.value || options[0]}.csv?every=${every}`;
+  const asked = `${camera.place} ${day.value} ${every}`;
+  section.dataset.asked = asked;
+  const path = day.value ? `counts/${camera.place}/${day.value}.json` : `counts/${camera.place}.json`;
+  const counts = every === "15min" && !day.value ? camera.counts : await fetched(`${path}?every=${every}`);
+  if (!counts || section.dataset.asked !== asked) return;
+  const since = day.value ? counts.since_s : beginning(counts.intervals, counts.since_s, counts.until_s);
+  draw(section.querySelector(".charts"), { ...counts, since_s: since }, linesOf(camera));
 }
 
-async function followCounts(card, place) {
-  const section = card.querySelector(".history");
-  for (;;) {
-    try {
-      const answer = await fetch(`${HERE}counts/${place}.json`, { signal: AbortSignal.timeout(10000) });
-      if (answer.ok) {
-        const counts = await answer.json();
-        const gates = [...new Set(counts.intervals.map((row) => row.gate))];
-        const until = counts.since_s + 86400;
-        section.querySelector(".charts").replaceChildren(...gates.map((gate) =>
-          chart(gate, counts.intervals.filter((row) => row.gate === gate), counts.since_s, until)));
-        section.hidden = counts.days.length === 0;
-        offerDays(section, place, counts.days);
-      }
-    } catch {
-      /* the page says that there is no answer */
-    }
-    await pause(COUNTS_MS);
-  }
+function draw(charts, counts, lines) {
+  const names = [...new Set([...lines.map(([line]) => line), ...counts.intervals.map((row) => row.gate)])];
+  const size = [Math.max(charts.clientWidth, 240), names.length > 1 ? 170 : 260];
+  charts.replaceChildren(...names.map((line) => {
+    const rows = counts.intervals.filter((row) => row.gate === line);
+    const ways = [...new Set(rows.map((row) => row.direction))].sort();
+    const figure = document.createElement("figure");
+    const caption = document.createElement("figcaption");
+    const counted = (name) => rows.filter((row) => row.direction === name).reduce((all, row) => all + (row.count ?? 0), 0);
+    caption.append(element("strong", line), ...ways.map((name, place) => way(name, place, counted(name))));
+    const note = element("p", "");
+    note.className = "note";
+    figure.append(caption, chart(rows, ways, counts.since_s, counts.until_s, size, (words) => { note.textContent = words; }), note);
+    return figure;
+  }));
 }

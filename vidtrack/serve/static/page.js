@@ -1,16 +1,24 @@
 "use strict";
 
+/* The wall of all cameras, and the one that is enlarged: #NAME in the address. */
+
 const STATUS_MS = 1000;
 const PICTURE_MS = 200;
+const FEW = 4; // more cameras are shown closer together, and their pictures are asked for less often
 const HERE = location.origin + location.pathname; // without the password that the address may hold: fetch refuses it
-const cards = [];
+const cameras = [];
+const wall = document.getElementById("wall");
+const one = document.getElementById("one");
 let shownNames;
 const seen = new IntersectionObserver((entries) => {
   for (const entry of entries) entry.target.inSight = entry.isIntersecting;
 });
 
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
-const number = (value, digits = 0, unit = "") => (value === undefined || value === null ? "–" : value.toFixed(digits) + unit);
+const number = (value, digits = 0, unit = "") =>
+  (value === undefined || value === null ? "–" : value.toLocaleString(undefined, { minimumFractionDigits: digits, maximumFractionDigits: digits }) + unit);
+const named = () => decodeURIComponent(location.hash.slice(1));
+const chosen = () => (cameras.length === 1 ? cameras[0] : cameras.find((camera) => camera.status.name === named()));
 
 function span(seconds) {
   if (seconds < 120) return `${Math.round(seconds)} s`;
@@ -60,81 +68,152 @@ function numbers(camera) {
   });
 }
 
-function problem([unix, text]) {
-  const item = document.createElement("li");
-  item.append(element("time", new Date(1000 * unix).toLocaleString()), ` ${text}`);
-  return item;
+/* Why a camera does not deliver, in a word and in a sentence. */
+function trouble(camera) {
+  if (camera.up) return ["running", ""];
+  const failing = Object.entries(camera.failing ?? {});
+  const last = camera.problems.at(-1);
+  const age = camera.frame_age_s;
+  const since = age > 2 ? `no picture for ${span(age)}` : "";
+  if (camera.state !== "running") return [camera.state, [since, last?.[1]].filter(Boolean).join(": ")];
+  if (failing.length) return [`not written: ${failing.map(([output]) => output).join(", ")}`, failing.map(([, why]) => why).join("; ")];
+  return ["no frames", since];
 }
 
-function fill(card, section, rows) {
-  const place = card.querySelector(section);
-  place.hidden = rows.length === 0;
-  place.querySelector("tbody, ul").replaceChildren(...rows);
+function showState(place, camera) {
+  place.classList.toggle("up", camera.up);
+  place.querySelector(".name").textContent = camera.name;
+  place.querySelector(".state").textContent = trouble(camera)[0];
 }
 
-function show(card, camera) {
-  card.classList.toggle("up", camera.up);
-  card.querySelector(".name").textContent = camera.name;
-  const failing = Object.keys(camera.failing ?? {});
-  const trouble = failing.length ? `not written: ${failing.join(", ")}` : "no frames";
-  card.querySelector(".state").textContent = camera.up || camera.state !== "running" ? camera.state : trouble;
-  card.querySelector(".source").textContent = camera.source === camera.name ? "" : camera.source;
-  card.querySelector(".numbers").replaceChildren(...numbers(camera));
-  const counts = Object.entries(camera.counts ?? {}).flatMap(([line, ways]) =>
-    Object.entries(ways).map(([way, count]) => row(line, way, count)));
-  fill(card, ".counts", counts);
-  fill(card, ".tracks", (camera.tracks ?? []).map((track) => row(track.track_id, track.status,
-    number(track.x_px), number(track.y_px), number(Math.hypot(track.vx_px_s, track.vy_px_s)))));
-  fill(card, ".problems", camera.problems.map(problem).reverse());
+function showCard(camera) {
+  const { card, status } = camera;
+  showState(card, status);
+  card.querySelector(".why").textContent = trouble(status)[1];
+  card.querySelector(".picture").href = `#${encodeURIComponent(status.name)}`;
+  card.querySelector(".picture").title = `enlarge ${status.name}`;
+  showLines(camera);
 }
 
-function addCard() {
+function showOne(camera) {
+  const { status } = camera;
+  showState(one, status);
+  one.querySelector(".source").textContent = status.source === status.name ? "" : status.source;
+  one.querySelector(".back").hidden = cameras.length === 1;
+  showCounts(camera);
+  one.querySelector(".numbers").replaceChildren(...numbers(status));
+  const tracks = (status.tracks ?? []).map((track) => row(track.track_id, track.status,
+    number(track.x_px), number(track.y_px), number(Math.hypot(track.vx_px_s, track.vy_px_s))));
+  one.querySelector(".tracks").hidden = tracks.length === 0;
+  one.querySelector(".tracks tbody").replaceChildren(...tracks);
+  const problems = [...status.problems].reverse().map(([unix, text]) => {
+    const item = document.createElement("li");
+    item.append(element("time", `${new Date(1000 * unix).toLocaleDateString()} ${clock(unix)}`), text);
+    return item;
+  });
+  one.querySelector(".problems").hidden = problems.length === 0;
+  one.querySelector(".problems ul").replaceChildren(...problems);
+}
+
+/* All cameras, or the one of the address. */
+function route() {
+  const camera = chosen();
+  one.hidden = !camera;
+  wall.hidden = Boolean(camera);
+  if (!camera || one.camera === camera) return;
+  one.camera = camera;
+  one.querySelector(".picture img").removeAttribute("src");
+  one.querySelector(".charts").replaceChildren();
+  showOne(camera);
+  showHistory(camera);
+  scrollTo(0, 0);
+}
+
+function addCamera(status) {
   const card = document.getElementById("camera").content.firstElementChild.cloneNode(true);
-  document.querySelector("main").append(card);
+  const camera = { card, status, place: cameras.length, counts: null };
+  wall.append(card);
   seen.observe(card);
-  const place = cards.push(card) - 1;
-  watch(card.querySelector(".picture img"), card, place);
-  followCounts(card, place);
-  return card;
+  cameras.push(camera);
+  watch(card.querySelector("img"), () => (card.inSight && !wall.hidden ? camera : null), () => (cameras.length > FEW ? 5 : 1) * PICTURE_MS);
+  followCounts(camera);
+  return camera;
 }
 
 /* The next picture is asked for when the last one is here: a slow line sees fewer. */
-async function watch(picture, card, place) {
+async function watch(picture, of, every) {
   for (;;) {
-    if (card.inSight && !document.hidden) {
+    const camera = document.hidden ? null : of();
+    if (camera) {
       await new Promise((done) => {
         picture.onload = picture.onerror = (event) => {
           picture.classList.toggle("missing", event.type === "error");
           done();
         };
-        picture.src = `picture/${place}.jpg?${Date.now()}`;
+        picture.src = `picture/${camera.place}.jpg?${Date.now()}`;
       });
     }
-    await pause(PICTURE_MS);
+    await pause(every());
   }
 }
 
-async function look() {
+function alarm(camera) {
+  const [word, why] = trouble(camera.status);
+  const item = document.createElement("li");
+  const link = document.createElement("a");
+  link.href = `#${encodeURIComponent(camera.status.name)}`;
+  link.append(element("b", camera.status.name), ` ${word}${why ? `: ${why}` : ""}`);
+  item.append(link);
+  return item;
+}
+
+function showAll(statuses) {
+  statuses.forEach((status, place) => {
+    const camera = cameras[place] ?? addCamera(status);
+    camera.status = status;
+    showCard(camera);
+  });
+  const down = cameras.filter((camera) => !camera.status.up);
+  const count = cameras.length;
   const summary = document.getElementById("summary");
-  try {
-    const answer = await fetch(`${HERE}status`, { signal: AbortSignal.timeout(10000) });
-    if (!answer.ok) throw new Error(answer.statusText);
-    const cameras = await answer.json();
-    const names = JSON.stringify(cameras.map((camera) => camera.name));
+  const all = count === 1 ? "the camera delivers" : `all ${count} cameras deliver`;
+  summary.textContent = down.length ? `${count - down.length} of ${count} cameras deliver` : all;
+  summary.classList.toggle("bad", down.length > 0);
+  document.title = down.length ? `vidtrack (${down.length} down)` : "vidtrack";
+  document.getElementById("alerts").replaceChildren(...down.map(alarm));
+  wall.classList.toggle("dense", count > FEW);
+  wall.style.setProperty("--columns", Math.min(5, Math.ceil(Math.sqrt(count))));
+  wall.style.setProperty("--head", `${document.querySelector("header").offsetHeight}px`);
+  route();
+  if (one.camera && !one.hidden) showOne(one.camera);
+}
+
+async function look() {
+  const statuses = await fetched("status");
+  const [day, time] = document.getElementById("clock").children;
+  day.textContent = new Date().toLocaleDateString([], { weekday: "long", day: "numeric", month: "long" });
+  time.textContent = clock(Date.now() / 1000);
+  if (statuses) {
+    const names = JSON.stringify(statuses.map((status) => status.name));
     if (shownNames !== undefined && names !== shownNames) location.reload(); // cameras were added or removed
     shownNames = names;
-    cameras.forEach((camera, place) => show(cards[place] ?? addCard(), camera));
-    const up = cameras.filter((camera) => camera.up).length;
-    summary.textContent = up === cameras.length ? "all cameras deliver" : `${up} of ${cameras.length} cameras deliver`;
-    summary.classList.toggle("bad", up < cameras.length);
-    document.title = up === cameras.length ? "vidtrack" : `vidtrack (${cameras.length - up} down)`;
-  } catch {
-    summary.textContent = `no answer from vidtrack at ${new Date().toLocaleTimeString()}`;
-    summary.classList.add("bad");
-    document.title = "vidtrack (no answer)";
-    cards.forEach((card) => card.classList.remove("up"));
+    showAll(statuses);
+    return;
   }
+  const summary = document.getElementById("summary");
+  summary.textContent = `no answer from vidtrack at ${clock(Date.now() / 1000)}`;
+  summary.classList.add("bad");
+  document.title = "vidtrack (no answer)";
+  for (const place of [one, ...cameras.map((camera) => camera.card)]) place.classList.remove("up");
 }
+
+addEventListener("hashchange", route);
+addEventListener("resize", () => one.camera && !one.hidden && showHistory(one.camera));
+addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && cameras.length > 1) location.hash = "";
+});
+for (const choice of one.querySelectorAll("select")) choice.onchange = () => showHistory(one.camera);
+watch(one.querySelector(".picture img"), () => (one.hidden ? null : one.camera), () => PICTURE_MS);
 
 (async () => {
   for (;;) {

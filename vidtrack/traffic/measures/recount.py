@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.errors import ConfigError
+from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.checks import movements
 from vidtrack.traffic.measures.gates import gates_of
@@ -17,7 +17,7 @@ from vidtrack.traffic.measures.journeys import journeys
 from vidtrack.traffic.measures.lives import Lives
 from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
 from vidtrack.traffic.measures.rows import Reader, Rows
-from vidtrack.traffic.measures.runs import open_day
+from vidtrack.traffic.measures.runs import has_tracks, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.site import Calibration, Fault, Gate, Point, Site
 
@@ -53,6 +53,7 @@ class Recount:
     size     (width, height) px of its pictures
     until_s  of a run with more than `most` rows only the beginning is counted, to this time; None: all of it
 
+    A live run may delete its oldest parts meanwhile: when the rows are read again, they are left out.
     Raises ConfigError, SourceError or FormatError for what cannot be used.
     """
 
@@ -110,6 +111,23 @@ class Recount:
             self._load(calibration, ground)
 
     def _load(self, calibration: Calibration | None, ground: Ground | None) -> None:
+        """Read the rows of the parts that are still there."""
+        while True:
+            try:
+                self._read(calibration, ground)
+            except (OSError, FormatError) as error:
+                left = tuple(one for one in self._day.recordings if has_tracks(one.folder))
+                if not left:
+                    raise SourceError("the tracks of this run have been deleted; open a newer one") from None
+                if len(left) == len(self._day.recordings):
+                    if isinstance(error, FormatError):
+                        raise
+                    raise SourceError(f"the tracks of this run cannot be read: {error}") from None
+                self._day = replace(self._day, recordings=left)
+            else:
+                return
+
+    def _read(self, calibration: Calibration | None, ground: Ground | None) -> None:
         reader, lives, blocks = Reader(self._day, {self.size: ground}), Lives(), list[Rows]()
         for rows in reader:
             if sum(map(len, blocks)) >= self._most:

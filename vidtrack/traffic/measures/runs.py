@@ -120,6 +120,11 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
     return Day(tuple(_apart(recordings)), utc)
 
 
+def has_tracks(folder: Path) -> bool:
+    """Whether a run's table of tracks is in its folder."""
+    return any((folder / name).is_file() for name in ("tracks.parquet", "tracks.csv"))
+
+
 def measured_run(run: Mapping[str, Any]) -> Recording:
     """A recording as measures.json has it. Raises SourceError where the run is no longer in its folder."""
     folder = Path(run["folder"])
@@ -194,7 +199,7 @@ def _sessions(found: list[_Found]) -> list[int]:
 
 def _found(run: str) -> _Found:
     folder, time = _split(run)
-    if not any((folder / name).is_file() for name in ("tracks.parquet", "tracks.csv")):
+    if not has_tracks(folder):
         raise SourceError(f"{folder} is not a finished run: it has no tracks.parquet and no tracks.csv")
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
