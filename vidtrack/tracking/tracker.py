@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,7 +39,8 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.snapshot import snapshot
-from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
+from vidtrack.tracking.station import Station
+from vidtrack.tracks import CONFIRMED, MERGED, TENTATIVE, Tracks
 
 
 class Outcome(NamedTuple):
@@ -79,6 +80,8 @@ class Tracker:
     threshold  controller of the detection threshold, set for each track and scan from its innovation covariance; P_D
                and clutter density then follow from it, and those given are ignored. None: all measurements are used
     surveyed   area [px^2 or m^2] over which the clutter is estimated; None: the picture, else the measurements' extent
+    stations   several sensors, each with its own P_D, clutter density and coverage; scans say by number whose they are.
+               None: one, with the P_D and clutter density given. Saved states hold the first only
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
@@ -104,6 +107,7 @@ class Tracker:
         clutter_density: Rate = 1e-5,
         threshold: ThresholdController | None = None,
         surveyed: float | None = None,
+        stations: Sequence[Station] | None = None,
         explain: bool = False,
         smooth: bool = False,
     ) -> None:
@@ -115,11 +119,12 @@ class Tracker:
         self.two_stage = two_stage or SINGLE_STAGE
         self.timing = self._timing(associate or GNN(), births)
         self.threshold = threshold
-        self.rates = Rates(detection_probability, clutter_density, self.picture.area if surveyed is None else surveyed)
+        space = self.picture.area if surveyed is None else surveyed
+        self.stations = tuple(stations or [Station(Rates(detection_probability, clutter_density, space))])
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
-        self.register = Register(self.model.dim, smooth)
+        self.register = Register(self.model.dim, smooth, len(self.stations))
         self.t: float | None = None
 
     def step(self, scan: Scan) -> Tracks:
@@ -174,6 +179,11 @@ class Tracker:
         return self.register.id[first:].copy()
 
     @property
+    def rates(self) -> Rates:
+        """P_D and clutter density of the first station."""
+        return self.stations[0].rates
+
+    @property
     def road(self) -> Road | None:
         """Maps learnt from traffic; None without them."""
         return self.picture.road
@@ -193,6 +203,8 @@ class Tracker:
         t = scan.t
         if len(scan) and scan.sensor is None and scan.z.shape[1] != self.model.dim:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
+        if not 0 <= scan.station < len(self.stations):
+            raise ScanError(f"the scan is of station {scan.station}, but the tracker has {len(self.stations)}, from 0")
         dt = self._since_last(t)
         x, P = self.bank.x, self.bank.P
         self.bank.predict(dt)
@@ -224,10 +236,12 @@ class Tracker:
         """Which measurements each track may take, and how likely each is."""
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
-        self.rates.look(scan)
-        detection, clutter = self.rates.of(self.register.run)
+        station = self.stations[scan.station]
+        station.rates.look(scan)
+        detection, clutter = station.rates.of(self.register.run)
+        expected = station.coverage.share(self._xy()) * self.picture.in_view(self.bank)
         problem = Problem.gated(
-            self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
+            self.gate, zhat, cov, scan, detection * expected, clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
             modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
         )  # fmt: skip
@@ -249,15 +263,16 @@ class Tracker:
         rows = hit.nonzero()[0]
         sure = hit.copy()
         sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
-        register.record_hits(hit, sure, scan.t, dt)
+        looked = hit | (self.stations[scan.station].coverage.share(self._xy()) >= 0.5)
+        register.record_hits(hit, sure, looked, scan.station, scan.t, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
         self.picture.follow(view, found.taken, register, self.bank, dt)
         self.sharing.update(found, view, register, self.bank, dt)
-        return Outcome(found.measurement, self._weigh_evidence(found, dt), self._why(found))
+        return Outcome(found.measurement, self._weigh_evidence(found, looked, dt), self._why(found))
 
-    def _weigh_evidence(self, found: Association, dt: float) -> Floats:
+    def _weigh_evidence(self, found: Association, looked: Mask, dt: float) -> Floats:
         """Update the tracks' existence (Bayes' rule in log-odds) and the estimates of P_D and clutter density.
 
         Returns the normalised innovations squared (T,), NaN for a miss.
@@ -266,12 +281,25 @@ class Tracker:
         log_ratio, nis = evidence(problem, found.decision, found.taken)
         log_ratio[~alone] = 0.0
         self.register.add_evidence(log_ratio)
-        if self.rates.estimated:
-            alone &= self.timing.shown(problem.rows)
-            self.rates.learn(
-                found.decision, found.shared, self.register, alone, problem.inside, problem.measurements, dt
-            )
+        self._learn_rates(found, alone & self.timing.shown(problem.rows), looked, dt)
         return nis
+
+    def _learn_rates(self, found: Association, alone: Mask, looked: Mask, dt: float) -> None:
+        """Learn P_D and clutter density from rows (T,) that share no measurement."""
+        register, problem = self.register, found.problem
+        seen, known = looked & (register.history & 1 == 1), alone & (register.status != TENTATIVE)
+        count = known & seen & (register.status != MERGED)
+        for number, station in enumerate(self.stations):
+            if not station.rates.estimated:
+                continue
+            now = number == problem.scan.station
+            station.rates.forget(dt)
+            if now:
+                runs = 1 + int(register.run.max(initial=0))
+                station.rates.learn_clutter(found.decision, found.shared, known, problem.measurements, runs)
+            missed = register.missed[count, number] - now  # this scan is counted, and was none
+            station.rates.learn_detection(missed, problem.inside[count], seen=now)
+        register.seen(seen)
 
     def _why(self, found: Association) -> Choices | None:
         """The choices of the tracks that are shown."""
