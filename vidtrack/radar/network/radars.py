@@ -1,4 +1,4 @@
-"""Radars of a network: their places, errors and coverage; one file, `radars.toml`, with a table [radars.NAME] for each."""
+"""Radars of a network: their places, errors and coverage; `radars.toml`, with a table [radars.NAME] for each."""
 
 from __future__ import annotations
 
@@ -44,6 +44,8 @@ class Radar(Group):
     """s; time of a turn of the antenna; None: from the plots"""
     farthest_m: float | None = Field(None, gt=0)
     """m; range beyond which nothing is detected; None: the farthest plot"""
+    sector_deg: float = Field(360.0, gt=0, le=360)
+    """degrees; width of the sector about azimuth zero that the radar covers"""
     detection_probability: float | None = Field(None, gt=0, lt=1)
     """probability that a scan detects a target in range; None: radar.detection_probability"""
     bias_range_m: float = Field(100.0, ge=0)
@@ -149,9 +151,7 @@ def read_radars(path: str | Path) -> Radars:
 
 def _on_plane(path: Path, radars: dict[str, Radar]) -> Radars:
     placed = [
-        Placed(
-            name, radar, (radar.x_m or 0.0, radar.y_m or 0.0, radar.height_m), float(np.radians(radar.boresight_deg))
-        )
+        Placed(name, radar, (radar.x_m or 0.0, radar.y_m or 0.0, radar.height_m), np.radians(radar.boresight_deg))
         for name, radar in radars.items()
     ]
     return Radars(path, tuple(placed), None)
