@@ -1,6 +1,6 @@
 """Measures the registration of two radars on `simulate radar-network`: errors, ids, GOSPA, and honesty of the biases.
 
-    python tools/measure_registration.py --seeds 20
+python tools/measure_registration.py --seeds 20
 """
 
 import argparse
@@ -11,7 +11,7 @@ import numpy as np
 
 from vidtrack import score
 from vidtrack.config.load import load
-from vidtrack.formats import read
+from vidtrack.formats import read, read_states
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.network import network_pipeline
 from vidtrack.run.run import Extras, Run
@@ -19,6 +19,8 @@ from vidtrack.simulate.radar_network import simulate_network, write_network
 
 BIAS = {"bias_range_m": 0, "bias_azimuth_deg": 0}
 NEAR_M = 2000.0
+LEARNT = 30
+"""Scans of both radars, in 60 s, after which errors are also given without what came before."""
 
 
 def tracked(folder: Path, given: dict[str, float], settings: list[str]) -> tuple[dict[str, float], dict]:
@@ -31,24 +33,29 @@ def tracked(folder: Path, given: dict[str, float], settings: list[str]) -> tuple
         radars = read_radars(folder / "known.toml")
     paths = [str(folder / f"{name}.csv") for name in radars.names]
     found: dict = {}
-    with Run(network_pipeline(paths, radars, load(assignments=settings), Extras(), 0), folder / "run", force=True) as run:
+    with Run(
+        network_pipeline(paths, radars, load(assignments=settings), Extras(), 0), folder / "run", force=True
+    ) as run:
         for _ in run:
             pass
         found = run._summary._reading()["radars"]
     result, truth = read(folder / "run"), read(folder / "truth.csv")
-    scores = score.evaluate(result, truth, max_distance=NEAR_M)
-    error = []
+    scores = score.evaluate(result, truth, max_distance=NEAR_M, states=read_states(folder / "run"))
+    error, late = [], []
     for frame in np.unique(truth.frame):
         at, there = result.xy[result.frame == frame], truth.xy[truth.frame == frame][:, :2]
         if len(at):
             near = np.linalg.norm(there[:, None] - at[None], axis=-1).min(axis=1)
             error.extend(near[near < NEAR_M])
+            late.extend(near[near < NEAR_M] if frame >= LEARNT else [])
     row = {
         "rms_m": float(np.sqrt(np.mean(np.square(error)))),
+        "late_rms_m": float(np.sqrt(np.mean(np.square(late)))),
         "ids": len(np.unique(result.id)),
         "idf1": scores["idf1"],
         "switches": scores["switches"],
         "gospa_m": scores["gospa"],
+        "nees": scores["nees"],
     }
     return row, found
 
@@ -94,7 +101,9 @@ def main() -> None:
     error = np.array(errors)
     print("final bias errors, rms by radar (range m, azimuth deg, time s):", np.sqrt((error[..., 0] ** 2).mean(axis=0)))
     with np.errstate(invalid="ignore", divide="ignore"):
-        print("... over their stated standard deviations:", np.sqrt(((error[..., 0] / error[..., 1]) ** 2).mean(axis=0)))
+        print(
+            "... over their stated standard deviations:", np.sqrt(((error[..., 0] / error[..., 1]) ** 2).mean(axis=0))
+        )
 
 
 if __name__ == "__main__":

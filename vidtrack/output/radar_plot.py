@@ -26,7 +26,7 @@ class RadarPlot:
 
     def __init__(self, path: Path, radars: Sequence[tuple[float, float]]) -> None:
         self._path = path
-        self._radars = np.asarray(radars, float)
+        self._radars = np.asarray(radars, float).reshape(-1, 2)
         self._plots: list[np.ndarray] = []
         self._tracks: dict[int, list[Floats]] = {}
 

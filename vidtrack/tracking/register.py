@@ -109,12 +109,19 @@ class Register:
         _settle(self.status, self.history, self.merged)
 
     def append(
-        self, t: float, position: Floats, box: Floats, score: float, run: Ints, label: Ints | None = None
+        self,
+        t: float,
+        position: Floats,
+        box: Floats,
+        score: float,
+        run: Ints,
+        label: Ints | None = None,
+        ids: Ints | None = None,
     ) -> Ints:
-        """Register new tentative tracks; returns their ids."""
+        """Register new tentative tracks; returns their ids, the next ones unless given."""
         count = len(position)
-        ids = np.arange(self.next_id, self.next_id + count)
-        self.next_id += count
+        ids = np.arange(self.next_id, self.next_id + count) if ids is None else ids
+        self.next_id = max(self.next_id + count, 1 + int(ids.max(initial=0)))
         new = {
             "id": ids,
             "status": TENTATIVE,

@@ -126,6 +126,8 @@ class Tracker:
         self.bank = estimator(self.model)
         self.register = Register(self.model.dim, smooth, len(self.stations))
         self.t: float | None = None
+        self.number: Callable[[Scan, Ints], Ints] | None = None
+        """Gives ids to the tracks that measurements of a scan begin; None: they are numbered on."""
 
     def step(self, scan: Scan) -> Tracks:
         """Take one scan and return all tracks at its time.
@@ -347,7 +349,8 @@ class Tracker:
         self.bank.append(position, cov, scale)
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
         label = None if scan.label is None else scan.label[born]
-        ids = self.register.append(scan.t, position, box, self.life.birth, run, label)
+        ids = None if self.number is None else self.number(scan, born)
+        ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids)
         for track, j in zip(ids.tolist(), born.tolist(), strict=True):
             events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
 

@@ -48,7 +48,7 @@ class Radar(Group):
     """degrees; width of the sector about azimuth zero that the radar covers"""
     detection_probability: float | None = Field(None, gt=0, lt=1)
     """probability that a scan detects a target in range; None: radar.detection_probability"""
-    bias_range_m: float = Field(100.0, ge=0)
+    bias_range_m: float = Field(30.0, ge=0)
     """m; standard deviation of the unknown bias in range; 0: there is none"""
     bias_azimuth_deg: float = Field(1.0, ge=0, le=45)
     """degrees; the same in azimuth"""
