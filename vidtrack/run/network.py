@@ -56,7 +56,7 @@ def network_pipeline(
     }
 
     def reading() -> dict[str, object]:
-        own = zip(network.feeds, tracker.stations, strict=True)
+        own = zip(network.feeds, tracker.stations.each, strict=True)
         rates = {feed.placed.name: station.rates.as_dict() for feed, station in own}
         biases = network.as_dict()
         return account | {"radars": {name: rates[name] | biases[name] for name in rates}}

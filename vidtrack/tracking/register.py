@@ -26,13 +26,14 @@ class Register:
     is another's, since they were not resolved), score (log-odds that it is a target), best (highest score since it was
     confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its
     own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by
-    REST of its size), missed (T, S) scans of each station without it since it was last seen.
+    REST of its size), missed (T, S) scans of each station without it since it was last seen,
+    visible (T, S) probability that each station could see it, NaN while nothing is known.
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
              "exchange", "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s",
-             "missed")  # fmt: skip
+             "missed", "visible")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
 
@@ -59,6 +60,7 @@ class Register:
         self.rest = np.empty((0, dim))
         self.rest_s = np.empty(0)
         self.missed = np.empty((0, stations), np.int64)
+        self.visible = np.empty((0, stations))
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
 
     def __len__(self) -> int:

@@ -39,8 +39,8 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.snapshot import snapshot
-from vidtrack.tracking.station import Station
-from vidtrack.tracks import CONFIRMED, MERGED, TENTATIVE, Tracks
+from vidtrack.tracking.station import Station, Stations
+from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 
 class Outcome(NamedTuple):
@@ -120,7 +120,7 @@ class Tracker:
         self.timing = self._timing(associate or GNN(), births)
         self.threshold = threshold
         space = self.picture.area if surveyed is None else surveyed
-        self.stations = tuple(stations or [Station(Rates(detection_probability, clutter_density, space))])
+        self.stations = Stations(stations or [Station(Rates(detection_probability, clutter_density, space))])
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
@@ -135,11 +135,11 @@ class Tracker:
         Raises ScanError if the scan is older than the last one, or does not fit the sensor or model.
         """
         events: list[Event] = []
-        dt = self._predict(scan, events)
+        dt, since = self._predict(scan, events), self.stations.take(scan)
         view = self.picture.view(scan, self.register, self.bank)
-        problem = self._gate(scan, view)
+        problem = self._gate(scan, view, since)
         found = self._associate(problem, view, dt, events)
-        outcome = self._update(found, scan, view, dt)
+        outcome = self._update(found, scan, view, dt, since)
         kept = self._delete(found, scan.t, events)
         born = self._register(found, scan, view, events)
         return self._tracks(scan.t, outcome.after(kept, born), events)
@@ -183,7 +183,7 @@ class Tracker:
     @property
     def rates(self) -> Rates:
         """P_D and clutter density of the first station."""
-        return self.stations[0].rates
+        return self.stations.each[0].rates
 
     @property
     def road(self) -> Road | None:
@@ -205,8 +205,6 @@ class Tracker:
         t = scan.t
         if len(scan) and scan.sensor is None and scan.z.shape[1] != self.model.dim:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
-        if not 0 <= scan.station < len(self.stations):
-            raise ScanError(f"the scan is of station {scan.station}, but the tracker has {len(self.stations)}, from 0")
         dt = self._since_last(t)
         x, P = self.bank.x, self.bank.P
         self.bank.predict(dt)
@@ -234,16 +232,13 @@ class Tracker:
             raise ScanError(f"{t:.6g} s is before the last scan at {self.t:.6g} s; sort the scans by time")
         return dt
 
-    def _gate(self, scan: Scan, view: View | None) -> Problem:
+    def _gate(self, scan: Scan, view: View | None, since: float) -> Problem:
         """Which measurements each track may take, and how likely each is."""
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
-        station = self.stations[scan.station]
-        station.rates.look(scan)
-        detection, clutter = station.rates.of(self.register.run)
-        expected = station.coverage.share(self._xy()) * self.picture.in_view(self.bank)
+        detection, clutter = self.stations.expected(scan, self.register, self._xy(), since)
         problem = Problem.gated(
-            self.gate, zhat, cov, scan, detection * expected, clutter,
+            self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
             modes=self.bank.modes(sensor) if isinstance(self.bank, Mixture) else None,
         )  # fmt: skip
@@ -257,16 +252,18 @@ class Tracker:
         shared = self.sharing.unresolved(problem, shown, self.register, self.bank, dt)
         return self.timing.associate(problem, shared, view, self.register, events)
 
-    def _update(self, found: Association, scan: Scan, view: View | None, dt: float) -> Outcome:
-        """Update states, boxes and existence with the measurements that the tracks took."""
+    def _update(self, found: Association, scan: Scan, view: View | None, dt: float, since: float) -> Outcome:
+        """Update states, boxes and existence with the measurements that the tracks took.
+
+        dt, since  seconds since the last scan, and since the last one of the same station
+        """
         register = self.register
-        self.bank.update(found.decision, for_update(scan, dt), scan.sensor or POSITION)
+        self.bank.update(found.decision, for_update(scan, since), scan.sensor or POSITION)
         hit = found.taken >= 0
         rows = hit.nonzero()[0]
         sure = hit.copy()
         sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
-        looked = hit | (self.stations[scan.station].coverage.share(self._xy()) >= 0.5)
-        register.record_hits(hit, sure, looked, scan.station, scan.t, dt)
+        looked = self.stations.record(scan, register, self._xy(), hit, sure, found.problem.detection, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
@@ -283,25 +280,8 @@ class Tracker:
         log_ratio, nis = evidence(problem, found.decision, found.taken)
         log_ratio[~alone] = 0.0
         self.register.add_evidence(log_ratio)
-        self._learn_rates(found, alone & self.timing.shown(problem.rows), looked, dt)
+        self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
         return nis
-
-    def _learn_rates(self, found: Association, alone: Mask, looked: Mask, dt: float) -> None:
-        """Learn P_D and clutter density from rows (T,) that share no measurement."""
-        register, problem = self.register, found.problem
-        seen, known = looked & (register.history & 1 == 1), alone & (register.status != TENTATIVE)
-        count = known & seen & (register.status != MERGED)
-        for number, station in enumerate(self.stations):
-            if not station.rates.estimated:
-                continue
-            now = number == problem.scan.station
-            station.rates.forget(dt)
-            if now:
-                runs = 1 + int(register.run.max(initial=0))
-                station.rates.learn_clutter(found.decision, found.shared, known, problem.measurements, runs)
-            missed = register.missed[count, number] - now  # this scan is counted, and was none
-            station.rates.learn_detection(missed, problem.inside[count], seen=now)
-        register.seen(seen)
 
     def _why(self, found: Association) -> Choices | None:
         """The choices of the tracks that are shown."""
