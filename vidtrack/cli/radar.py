@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from vidtrack.cli.options import announce_compiling, common, receives, seed_option, settings_options, start_log
 from vidtrack.cli.tracking import TrackingOptions, association_options, choice, finish, smooth_option
 from vidtrack.config import names
+
+if TYPE_CHECKING:
+    from vidtrack.run.run import Extras, Run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +22,8 @@ class RadarOptions(TrackingOptions):
 
     plots: tuple[str, ...]
     radars: Path | None
+    camera: str | None
+    site: Path | None
     seed: int
     smooth: bool | None
     estimator: str | None
@@ -32,6 +38,7 @@ Examples:
   vidtrack radar plots.csv
   vidtrack radar plots.parquet -o result --estimator ekf --set radar.max_speed=60
   vidtrack radar north.csv south.csv --radars radars.toml -o picture
+  vidtrack radar radar.csv --radars radars.toml --camera traffic.mp4 --site site.toml
   vidtrack simulate radar-tws -o tws && vidtrack radar tws/plots.csv -o run && vidtrack eval run tws/truth.csv""",
 )
 @click.argument("plots", nargs=-1, required=True)
@@ -45,6 +52,13 @@ Examples:
     type=click.Path(path_type=Path),
     metavar="RADARS.toml",
     help="Places and errors of the radars; NAME.csv has the plots of radar NAME.",
+)
+@click.option("--camera", metavar="VIDEO", help="A video of the same road and time, to be tracked with the plots.")
+@click.option(
+    "--site",
+    type=click.Path(path_type=Path),
+    metavar="SITE.toml",
+    help="Calibration of the camera, in the metres of the radars' places.",
 )
 @click.option(
     "--estimator",
@@ -62,7 +76,8 @@ def command(options: RadarOptions) -> None:
     Columns: scan, time_s, and range_m, azimuth_deg[, elevation_deg] or x_m, y_m[, z_m]; optional: doppler_m_s,
     amplitude, and sigma_range_m, sigma_azimuth_deg, ... for the errors. Azimuth is clockwise from north, x east,
     y north, z up. Tables of several radars become one picture: --radars says where they are; their biases in range,
-    azimuth and time are estimated from common targets (registration.csv). The results' folder is printed; it holds
+    azimuth and time are estimated from common targets (registration.csv). With --camera and --site the plots of a
+    traffic radar and the blobs of a video give tracks of vehicles, in metres. The results' folder is printed; it holds
     tracks.csv, tracks.parquet, summary.json and tracks.png.
     Ctrl-C ends with complete results up to then.
     """
@@ -72,9 +87,12 @@ def command(options: RadarOptions) -> None:
     from vidtrack.run.run import Extras
 
     start_log(options.verbose, options.quiet)
+    extras = Extras(rerun=options.rerun, decisions=options.decisions)
+    if options.camera is not None or options.site is not None:
+        finish(_with_camera(options, extras), options.quiet, unit="scan")
+        return
     settings = options.settings(Input.RADAR)
     announce_compiling(options.quiet)
-    extras = Extras(rerun=options.rerun, decisions=options.decisions)
     where = {"output": options.output, "extras": extras, "force": options.force, "seed": options.seed}
     if options.radars is not None:
         run = run_network(options.plots, options.radars, settings, **where)
@@ -83,3 +101,17 @@ def command(options: RadarOptions) -> None:
     else:
         run = run_plots(options.plots[0], settings, **where)
     finish(run, options.quiet, unit="scan")
+
+
+def _with_camera(options: RadarOptions, extras: Extras) -> Run:
+    """The run of a radar and a camera."""
+    from vidtrack.run.road import ROAD, run_road
+
+    if options.radars is None or options.camera is None or options.site is None:
+        raise click.UsageError("a camera beside a radar needs --radars, --camera and --site")
+    settings = options.settings(base=ROAD)
+    announce_compiling(options.quiet)
+    return run_road(
+        options.plots, options.radars, options.camera, options.site, settings, options.output, extras,
+        force=options.force,
+    )  # fmt: skip

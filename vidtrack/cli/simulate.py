@@ -32,7 +32,7 @@ WEATHER = ("clear", "rain", "snow", "fog")
 LIGHT = ("day", "low-sun", "dusk", "night")
 OPTIONS = {
     VIDEO: (*PICTURE, "leaves"),
-    ROADS: (*PICTURE, "seconds", "flow", "camera_height", "tilt_deg", "lens", "click_sigma"),
+    ROADS: (*PICTURE, "seconds", "flow", "camera_height", "tilt_deg", "lens", "click_sigma", "radar"),
     RADAR: ("snr_db", "pfa", "weibull", "glint"),
     NETWORK: ("bias",),
 }
@@ -91,6 +91,7 @@ class SimulateOptions(Options):
     tilt_deg: float | None
     lens: float
     click_sigma: float
+    radar: bool
     snr_db: float | None
     pfa: float | None
     weibull: Weibull | None
@@ -141,6 +142,7 @@ Examples:
 @click.option("--tilt-deg", type=float, help="Roads: camera's axis below the horizon.  [default: the scenario's]")
 @click.option("--lens", default=0.0, show_default=True, help="Roads: k1 of Brown-Conrady, -0.3 to 0.3; barrel below 0.")
 @click.option("--click-sigma", default=1.0, show_default=True, help="Roads: error of clicked points in site.toml, px.")
+@click.option("--radar", is_flag=True, help="Roads: also the plots of a traffic radar, as radar.csv and radars.toml.")
 @click.option("--snr-db", type=float, help="Radar: mean signal to noise ratio of a target.  [default: the scenario's]")
 @click.option(
     "--pfa", type=click.FloatRange(0, 0.1), help="Radar: false alarms per resolution cell.  [default: the scenario's]"
@@ -195,8 +197,10 @@ def command(options: SimulateOptions) -> None:
 def _draw_video(options: SimulateOptions, conditions: dict[str, Any]) -> None:
     from vidtrack.output.folder import open_folder
     from vidtrack.simulate import simulate, simulate_road, write, write_road
+    from vidtrack.simulate.roads.radar import write_road_plots
 
     if options.scenario in ROADS:
+        conditions.pop("radar")
         road = simulate_road(options.scenario, seed=options.seed, **conditions)
         frames, count, save = iter(road), len(road), partial(write_road, road)
     else:
@@ -205,6 +209,8 @@ def _draw_video(options: SimulateOptions, conditions: dict[str, Any]) -> None:
     folder = open_folder(options.output, options.scenario, options.force)
     with click.progressbar(frames, length=count, label=str(folder), file=sys.stderr, hidden=options.quiet) as shown:
         save(folder, shown)
+    if options.radar:
+        write_road_plots(folder, road)
 
 
 def _draw_plots(options: SimulateOptions) -> None:
