@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import vidtrack as vt
 from vidtrack.radar.network.coverage import Sector
+from vidtrack.tracking.station import Visibility
 
 
 def scans(rng, detection, false, count, targets=15):
@@ -48,3 +50,27 @@ def test_a_sector_covers_its_range_and_its_angles():
     sector = Sector((10.0, 0.0), 100.0, middle=np.pi / 2, width=np.pi / 2)
     xy = np.array([[60.0, 0.0], [60.0, 45.0], [60.0, 60.0], [120.0, 0.0], [-40.0, 0.0]])
     np.testing.assert_array_equal(sector.share(xy), [1, 1, 0, 0, 0])
+
+
+def test_visibility_is_the_filter_of_a_hidden_state():
+    visibility = Visibility(visible_s=10.0, hidden_s=3.0)
+    rate = np.array([[-1 / 10, 1 / 10], [1 / 3, -1 / 3]])  # from visible, from hidden
+    expected = np.array([0.4, 0.6]) @ expm(0.7 * rate)
+    assert visibility.predicted(np.array([0.4]), 0.7)[0] == pytest.approx(expected[0])
+    assert visibility.predicted(np.array([0.0]), 1e6)[0] == pytest.approx(10 / 13)
+
+
+def test_a_target_that_one_of_two_stations_cannot_see_is_kept():
+    def ends(visibility):
+        stations = [vt.Station(vt.Rates(0.9, 1e-6), visibility=visibility) for _ in range(2)]
+        tracker = vt.Tracker(picture=vt.NoPicture(), life=vt.LogRatio(coast_scans=60), stations=stations)
+        rng, ids = np.random.default_rng(1), set()
+        for k in range(400):
+            dark = k > 100 and k % 4  # station 1, three times as fast as the other, sees nothing after 10 s
+            z = np.array([[10.0 + 0.1 * k, 20.0]]) + rng.normal(size=(1, 2))
+            tracks = tracker.step(vt.Scan(0.1 * k, z[: int(not dark)], np.eye(2), station=int(k % 4 > 0)))
+            ids |= set(tracks.id[tracks.status != vt.Status.TENTATIVE].tolist())
+        return len(ids)
+
+    assert ends(Visibility(10.0, 3.0)) == 1
+    assert ends(None) > 1

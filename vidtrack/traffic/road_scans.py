@@ -15,7 +15,7 @@ from vidtrack.traffic.footprint import Footprints
 UNKNOWN_PX_S = 1e3
 """px/s; standard deviation of the velocity of a blob without a track."""
 EDGE_PX = 1.5
-"""Processed pixels; standard deviation of the edges of a blob, which shadow and parts like the road move for seconds."""
+"""Processed pixels; standard deviation of the edges of a blob, which shadow and the like move for seconds."""
 CELL_PX = 16.0
 """px; side of the squares by which the area of the picture on the road is added up."""
 
