@@ -113,5 +113,5 @@ def _with_camera(options: RadarOptions, extras: Extras) -> Run:
     announce_compiling(options.quiet)
     return run_road(
         options.plots, options.radars, options.camera, options.site, settings, options.output, extras,
-        force=options.force,
+        force=options.force, seed=options.seed,
     )  # fmt: skip

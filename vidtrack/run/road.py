@@ -12,10 +12,11 @@ from typing import Any
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
+from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
-from vidtrack.radar.filters import motion
+from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.network.network import Feed, Network, Turn, read_feeds
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.radar.scans import surveyed
@@ -63,21 +64,24 @@ def run_road(
     extras: Extras | None = None,
     *,
     force: bool = False,
+    seed: int = 0,
 ) -> Run:
     """A run over plot tables and a video of one road. Raises the errors of Run, and PlotFormatError."""
-    return Run(_pipeline(paths, read_radars(radars), video, site, settings, extras or Extras()), output, force=force)
+    return Run(
+        _pipeline(paths, read_radars(radars), video, site, settings, extras or Extras(), seed), output, force=force
+    )
 
 
 @contextmanager
 def _pipeline(
-    paths: Sequence[str], radars: Radars, video: str, site: Path, settings: Settings, extras: Extras
+    paths: Sequence[str], radars: Radars, video: str, site: Path, settings: Settings, extras: Extras, seed: int
 ) -> Iterator[Pipeline]:
     if radars.origin is not None:
         raise ConfigError(f"{radars.path} has latitudes; with a camera give x_m and y_m, in the metres of {site}")
     refuse_link(settings.output, "radar runs")
     network = Network(read_feeds(paths, radars, settings.radar))
     with open_camera(video, site, settings) as camera:
-        tracker = build_road_tracker(settings, network.feeds, camera, explain=extras.explain)
+        tracker = build_road_tracker(settings, network.feeds, camera, explain=extras.explain, seed=seed)
 
         def reading() -> dict[str, object]:
             names = [*(feed.placed.name for feed in network.feeds), "camera"]
@@ -116,13 +120,17 @@ def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
 
 
 def build_road_tracker(
-    settings: Settings, feeds: Sequence[Feed], camera: Camera | None, *, explain: bool = False
+    settings: Settings, feeds: Sequence[Feed], camera: Camera | None, *, explain: bool = False, seed: int = 0
 ) -> Tracker:
     """The tracker in metres: a station for each radar, then one for the camera; each may lose sight of a vehicle."""
     radar, common = settings.radar, settings.tracker
     stations = [
         Station(
-            Rates(feed.placed.radar.detection_probability or radar.detection_probability, None, surveyed(feed.found)),
+            Rates(
+                feed.placed.radar.detection_probability or radar.detection_probability,
+                radar.clutter_density,
+                surveyed(feed.found),
+            ),
             feed.coverage,
             VISIBLE,
         )
@@ -132,6 +140,7 @@ def build_road_tracker(
         stations.append(Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, VISIBLE))
     return Tracker(
         model=motion(radar, 2),
+        estimator=estimator(radar, feeds[0].found, seed) if feeds else KalmanBank,
         associate=rule(common),
         gate=gate(common, radar.euclidean_radius_m, adaptive=True),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),

@@ -86,7 +86,7 @@ def write_road_plots(folder: Path, clip: RoadClip, radar: TrafficRadar | None = 
         "scan_s": radar.scan_s,
         "farthest_m": radar.farthest,
         "sector_deg": np.degrees(radar.sector),
-        "detection_probability": radar.detected,
+        "detection_probability": min(radar.detected, 0.99),
     }
     lines = [f"{key} = {float(value):.6g}" for key, value in keys.items()]
     (folder / "radars.toml").write_text("\n".join(["[radars.radar]", *lines, ""]), encoding="utf-8")
