@@ -35,7 +35,7 @@ class InPicture:
         with np.errstate(invalid="ignore", divide="ignore"):
             pixels = self.ground.pixels(xy)
             ahead = self.ground.depth(xy) * self._sign() > 0
-            shown = ((pixels > 0) & (pixels < np.array(self.size) - 1)).all(axis=1)
+            shown = np.asarray(((pixels > 0) & (pixels < np.array(self.size) - 1)).all(axis=1))
             covered = ~np.isnan(self.ground.inside(np.where(shown[:, None], pixels, -1e6))[:, 0])
         return (ahead & shown & covered).astype(float)
 
