@@ -49,7 +49,11 @@ def test_a_track_outside_a_stations_coverage_is_not_missed_by_it():
 def test_a_sector_covers_its_range_and_its_angles():
     sector = Sector((10.0, 0.0), 100.0, middle=np.pi / 2, width=np.pi / 2)
     xy = np.array([[60.0, 0.0], [60.0, 45.0], [60.0, 60.0], [120.0, 0.0], [-40.0, 0.0]])
-    np.testing.assert_array_equal(sector.share(xy), [1, 1, 0, 0, 0])
+    np.testing.assert_array_equal(sector.share(xy, 0 * xy), [1, 1, 0, 0, 0])
+    slow = Sector((0.0, 0.0), 100.0, slowest=1.0).share(
+        np.tile([10.0, 0.0], (3, 1)), np.array([[3, 0], [0, 3], [1.5, 0]])
+    )
+    np.testing.assert_allclose(slow, [1, 0.02, 0.5])
 
 
 def test_visibility_is_the_filter_of_a_hidden_state():

@@ -41,8 +41,8 @@ ROAD: Mapping[str, Any] = {
 }  # fmt: skip
 """Defaults where vehicles are tracked and not aircraft."""
 CAMERA_DETECTION = 0.9
-VISIBLE = Visibility(visible_s=10.0, hidden_s=3.0)
-"""Vehicles are hidden behind others, stand where Doppler shows nothing, or are in the dark."""
+BY_RADAR, BY_CAMERA = Visibility(visible_s=20.0, hidden_s=0.2), Visibility(visible_s=10.0, hidden_s=3.0)
+"""A radar loses sight of slow vehicles, of others rarely; a camera of those behind others and in the dark."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,12 +132,12 @@ def build_road_tracker(
                 surveyed(feed.found),
             ),
             feed.coverage,
-            VISIBLE,
+            BY_RADAR,
         )
         for feed in feeds
     ]
     if camera is not None:
-        stations.append(Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, VISIBLE))
+        stations.append(Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, BY_CAMERA))
     return Tracker(
         model=motion(radar, 2),
         estimator=estimator(radar, feeds[0].found, seed) if feeds else KalmanBank,

@@ -10,6 +10,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ScanError
+from vidtrack.estimate.motion.model import Motion
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.rates import Rates
@@ -20,15 +21,15 @@ from vidtrack.tracks import MERGED, TENTATIVE
 class Coverage(Protocol):
     """Where a station can detect a target."""
 
-    def share(self, xy: Floats) -> Floats:
-        """(T,) share of the detection probability at positions (T, d): 0 where nothing can be seen, 1 where all."""
+    def share(self, xy: Floats, v: Floats) -> Floats:
+        """(T,) share of the detection probability at positions and velocities (T, d): from 0, nothing is seen, to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Everywhere:
     """No limit."""
 
-    def share(self, xy: Floats) -> Floats:
+    def share(self, xy: Floats, v: Floats) -> Floats:
         """Ones."""
         return np.ones(len(xy))
 
@@ -81,6 +82,11 @@ class Stations:
     def __len__(self) -> int:
         return len(self.each)
 
+    def share(self, scan: Scan, x: Floats, model: Motion) -> Floats:
+        """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""
+        coverage = self.each[scan.station].coverage
+        return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
+
     def take(self, scan: Scan) -> float:
         """Seconds since the last scan of the same station; 0 for the first. Raises ScanError for an unknown station."""
         if not 0 <= scan.station < len(self.each):
@@ -89,8 +95,11 @@ class Stations:
         self._last[scan.station] = scan.t
         return since
 
-    def expected(self, scan: Scan, register: Register, xy: Floats, since: float) -> tuple[Floats, float | Floats]:
-        """P_D (T,) of the rows at xy (T, d), `since` seconds after the station's last scan, and its clutter density."""
+    def expected(self, scan: Scan, register: Register, share: Floats, since: float) -> tuple[Floats, float | Floats]:
+        """P_D (T,) of the rows of which the station covers a share (T,), and its clutter density.
+
+        since  seconds after the station's last scan
+        """
         station, number = self.each[scan.station], scan.station
         station.rates.look(scan)
         detection, clutter = station.rates.of(register.run)
@@ -99,14 +108,14 @@ class Stations:
             before = np.where(np.isnan(known), station.visibility.usual, known)
             register.visible[:, number] = station.visibility.predicted(before, since)
             detection = detection * register.visible[:, number]
-        return detection * station.coverage.share(xy), clutter
+        return detection * share, clutter
 
     def record(
-        self, scan: Scan, register: Register, xy: Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
+        self, scan: Scan, register: Register, share: Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
     ) -> Mask:
-        """Note which rows (T,) at xy (T, d) the scan shows, of the P_D (T,) expected; returns (T,) those looked at."""
+        """Note which rows (T,) the scan shows, of a covered share and an expected P_D (T,); returns those looked at."""
         number = scan.station
-        looked = hit | (self.each[number].coverage.share(xy) >= 0.5)
+        looked = hit | (share >= 0.5)
         register.record_hits(hit, sure, looked, number, scan.t, dt)
         if self.each[number].visibility is not None:
             known = register.visible[:, number]

@@ -236,7 +236,8 @@ class Tracker:
         """Which measurements each track may take, and how likely each is."""
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
-        detection, clutter = self.stations.expected(scan, self.register, self._xy(), since)
+        share = self.stations.share(scan, self.bank.x, self.model)
+        detection, clutter = self.stations.expected(scan, self.register, share, since)
         problem = Problem.gated(
             self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
@@ -263,7 +264,8 @@ class Tracker:
         rows = hit.nonzero()[0]
         sure = hit.copy()
         sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
-        looked = self.stations.record(scan, register, self._xy(), hit, sure, found.problem.detection, dt)
+        share = self.stations.share(scan, self.bank.x, self.model)
+        looked = self.stations.record(scan, register, share, hit, sure, found.problem.detection, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)

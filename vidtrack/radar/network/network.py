@@ -47,7 +47,9 @@ class Feed:
         """What the radar covers, by its table; without a range in it, up to its farthest plot."""
         radar = self.placed.radar
         farthest = float(self.plots.z[:, 0].max()) if radar.farthest_m is None else radar.farthest_m
-        return Sector(self.placed.xyz[:2], farthest, self.placed.turned, np.radians(radar.sector_deg))
+        return Sector(
+            self.placed.xyz[:2], farthest, self.placed.turned, np.radians(radar.sector_deg), radar.slowest_m_s
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,8 @@ class Radar(Group):
     """m; range beyond which nothing is detected; None: the farthest plot"""
     sector_deg: float = Field(360.0, gt=0, le=360)
     """degrees; width of the sector about azimuth zero that the radar covers"""
+    slowest_m_s: float = Field(0.0, ge=0)
+    """m/s; range rate below which targets are not told from the ground"""
     detection_probability: float | None = Field(None, gt=0, lt=1)
     """probability that a scan detects a target in range; None: radar.detection_probability"""
     bias_range_m: float = Field(30.0, ge=0)

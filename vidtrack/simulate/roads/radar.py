@@ -85,6 +85,7 @@ def write_road_plots(folder: Path, clip: RoadClip, radar: TrafficRadar | None = 
         "sigma_doppler_m_s": radar.sigma[2],
         "scan_s": radar.scan_s,
         "farthest_m": radar.farthest,
+        "slowest_m_s": radar.least,
         "sector_deg": np.degrees(radar.sector),
         "detection_probability": min(radar.detected, 0.99),
     }
