@@ -153,10 +153,11 @@ def build_road_tracker(
 
 def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker) -> Iterator[Step]:
     """Yields a step for each scan of a radar and each picture, numbered in order of time."""
-    plots = ((turn.span.t, 0, turn) for turn in network or ())
-    pictures = ((step.time_s, 1, step) for step in (camera.steps if camera else ()))
+    plots: Iterator[tuple[float, int, Turn | Step]] = ((turn.span.t, 0, turn) for turn in network or ())
+    pictures: Iterator[tuple[float, int, Turn | Step]] = (
+        (step.time_s, 1, step) for step in (camera.steps if camera else ())
+    )
     number = 0 if network is None else len(network.feeds)
-    seen: Turn | Step
     for index, (_, _, seen) in enumerate(heapq.merge(plots, pictures, key=lambda one: one[:2])):
         began = perf_counter()
         if isinstance(seen, Turn):
