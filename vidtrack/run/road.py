@@ -41,6 +41,8 @@ ROAD: Mapping[str, Any] = {
 }  # fmt: skip
 """Defaults where vehicles are tracked and not aircraft."""
 CAMERA_DETECTION = 0.9
+LASTING_S = 1.0
+"""s; the light of headlamps, a reflection or a shadow looks like a vehicle for so long."""
 BY_RADAR, BY_CAMERA = Visibility(visible_s=20.0, hidden_s=0.2), Visibility(visible_s=10.0, hidden_s=3.0)
 """A radar loses sight of slow vehicles, of others rarely; a camera of those behind others and in the dark."""
 
@@ -137,7 +139,9 @@ def build_road_tracker(
         for feed in feeds
     ]
     if camera is not None:
-        stations.append(Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, BY_CAMERA))
+        stations.append(
+            Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, BY_CAMERA, LASTING_S)
+        )
     return Tracker(
         model=motion(radar, 2),
         estimator=estimator(radar, feeds[0].found, seed) if feeds else KalmanBank,

@@ -65,11 +65,14 @@ class Station:
     rates       detection probability of a visible target, and clutter density; given or estimated
     coverage    a target outside is neither seen nor missed
     visibility  None: targets inside are always visible
+    lasting_s   s; what looks like a target goes on to do so for this time: scans within it are together the evidence of
+                one. 0: each scan counts
     """
 
     rates: Rates = field(default_factory=Rates)
     coverage: Coverage = field(default_factory=Everywhere)
     visibility: Visibility | None = None
+    lasting_s: float = 0.0
 
 
 class Stations:
@@ -81,6 +84,11 @@ class Stations:
 
     def __len__(self) -> int:
         return len(self.each)
+
+    def weight(self, scan: Scan, since: float) -> float:
+        """Of the evidence of a scan, `since` seconds after the station's last one."""
+        lasting_s = self.each[scan.station].lasting_s
+        return min(1.0, since / lasting_s) if lasting_s > 0 else 1.0
 
     def share(self, scan: Scan, x: Floats, model: Motion) -> Floats:
         """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""

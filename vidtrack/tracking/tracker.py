@@ -271,9 +271,9 @@ class Tracker:
             register.label[rows] = np.where(told < 0, register.label[rows], told)
         self.picture.follow(view, found.taken, register, self.bank, dt)
         self.sharing.update(found, view, register, self.bank, dt)
-        return Outcome(found.measurement, self._weigh_evidence(found, looked, dt), self._why(found))
+        return Outcome(found.measurement, self._weigh_evidence(found, looked, dt, since), self._why(found))
 
-    def _weigh_evidence(self, found: Association, looked: Mask, dt: float) -> Floats:
+    def _weigh_evidence(self, found: Association, looked: Mask, dt: float, since: float) -> Floats:
         """Update the tracks' existence (Bayes' rule in log-odds) and the estimates of P_D and clutter density.
 
         Returns the normalised innovations squared (T,), NaN for a miss.
@@ -281,7 +281,7 @@ class Tracker:
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
         log_ratio[~alone] = 0.0
-        self.register.add_evidence(log_ratio)
+        self.register.add_evidence(log_ratio * self.stations.weight(problem.scan, since))
         self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
         return nis
 
