@@ -55,6 +55,9 @@ if TYPE_CHECKING:
     from vidtrack.tracking.occlusion.occlusion import Occlusion as Occlusion
     from vidtrack.tracking.picture.picture import NoPicture as NoPicture
     from vidtrack.tracking.picture.picture import Picture as Picture
+    from vidtrack.tracking.rates import Rates as Rates
+    from vidtrack.tracking.replay import Replay as Replay
+    from vidtrack.tracking.station import Station as Station
     from vidtrack.tracking.tracker import Tracker as Tracker
     from vidtrack.tracks import Status as Status
     from vidtrack.tracks import Tracks as Tracks
@@ -92,12 +95,15 @@ _HOME = {
     "PositionRangeRate": "radar.sensors",
     "RangeAzimuth": "radar.sensors",
     "RangeAzimuthElevation": "radar.sensors",
+    "Rates": "tracking.rates",
+    "Replay": "tracking.replay",
     "Scan": "scan",
     "ScanError": "errors",
     "Settings": "config.settings",
     "Singer": "estimate.motion.acceleration",
     "SourceError": "errors",
     "Split": "tracking.deferred.splitting",
+    "Station": "tracking.station",
     "Status": "tracks",
     "StoppedEarly": "errors",
     "StrongestNeighbour": "associate.strongest",

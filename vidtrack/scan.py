@@ -23,6 +23,7 @@ class Scan:
     z          (M, m) measurements, pixels or metres (radians for angles)
     R          (M, m, m) their covariances; (m, m) applies to all
     sensor     the measurement model; None: z is the position
+    station    number of the tracker's station that made the scan
     noise      (m, m) covariance of a missed measurement, which some updates after a miss need.
                None: R if one is given for all, else the mean of R; in an empty scan none
     box        (M, 4) left, top, width, height, relative to z (a centroid is not a box centre); see `box_scan`
@@ -53,6 +54,7 @@ class Scan:
     surveyed: Floats | None = None
     pixel: float = 1.0
     rim: float = 0.0
+    station: int = 0
 
     def __post_init__(self) -> None:
         from vidtrack.arrays.checks import check_covariances, check_measurements  # loads the compiler

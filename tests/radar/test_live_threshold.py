@@ -11,6 +11,7 @@ from vidtrack.radar.performance.in_gate import AllPlots, Gates
 from vidtrack.radar.performance.prediction import normalised
 from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.rates import Rates
+from vidtrack.tracking.station import Station, Stations
 from vidtrack.tracking.tracker import Tracker
 
 CELL, RUNS, SCANS, R = 2.0, 600, 35, np.eye(2)
@@ -31,7 +32,7 @@ def follow(threshold):
         target = truth[:, [0, 2]] + rng.standard_normal((RUNS, 2))
         gates = Gates(ahead.xy, ahead.xy_cov + R, 4.0, target)
         plots = AllPlots(10.0, threshold, CELL).draw(rng, k + 1.0, gates, R)
-        tracker.rates = Rates(plots.p_d, plots.density)
+        tracker.stations = Stations([Station(Rates(plots.p_d, plots.density))])
         tracks = tracker.step(plots.scan)
         error[k], p_fa[k] = np.linalg.norm(tracks.xy - truth[:, [0, 2]], axis=1), plots.p_fa
     return error, p_fa

@@ -23,6 +23,7 @@ COMMANDS = {
     "review": "Look at counted crossings, and correct them.",
     "doctor": "Look at a source, and say which setting will hurt.",
     "radar": "Tracks from a table of radar plots.",
+    "fuse": "One picture from the tracks of several radar runs.",
     "simulate": "Draw a traffic video or radar plots with exact truth.",
     "eval": "Score tracks against truth.",
     "predict": "Track error of a radar filter in clutter, before there is a plot.",

@@ -26,15 +26,33 @@ RADAR = (
     "radar-unresolved",
     "radar-parting",
 )
+NETWORK = ("radar-network",)
 PICTURE = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "clock")
 WEATHER = ("clear", "rain", "snow", "fog")
 LIGHT = ("day", "low-sun", "dusk", "night")
 OPTIONS = {
     VIDEO: (*PICTURE, "leaves"),
-    ROADS: (*PICTURE, "seconds", "flow", "camera_height", "tilt_deg", "lens", "click_sigma"),
+    ROADS: (*PICTURE, "seconds", "flow", "camera_height", "tilt_deg", "lens", "click_sigma", "radar"),
     RADAR: ("snr_db", "pfa", "weibull", "glint"),
+    NETWORK: ("bias",),
 }
 """The options of each kind of scenario."""
+
+
+class _Bias(click.ParamType):
+    """RANGE_M,AZIMUTH_DEG,TIME_S."""
+
+    name = "M,DEG,S"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        parts = value if isinstance(value, tuple) else str(value).split(",")
+        try:
+            metres, degrees, seconds = (float(part) for part in parts)
+        except ValueError:
+            self.fail(f"{value!r} is not three numbers such as 100,1,0", param, ctx)
+        return metres, degrees, seconds
 
 
 class _Size(click.ParamType):
@@ -73,10 +91,12 @@ class SimulateOptions(Options):
     tilt_deg: float | None
     lens: float
     click_sigma: float
+    radar: bool
     snr_db: float | None
     pfa: float | None
     weibull: Weibull | None
     glint: float | None
+    bias: tuple[float, float, float]
 
     def chosen(self, names: tuple[str, ...]) -> dict[str, Any]:
         """The values of these options."""
@@ -92,9 +112,10 @@ Examples:
   vidtrack simulate junction -o hard --size 1280x720 --noise 5 --shake 1.5 --light-steps 2
   vidtrack simulate junction -o rainy-night --weather rain --light night --clock
   vidtrack simulate junction-3d -o crossroads --seconds 120 --flow 1200 --lens -0.15
-  vidtrack simulate radar-tws -o tws --seed 3 --snr-db 16""",
+  vidtrack simulate radar-tws -o tws --seed 3 --snr-db 16
+  vidtrack simulate radar-network -o network --bias 100,1,0.5""",
 )
-@click.argument("scenario", type=click.Choice(VIDEO + ROADS + RADAR), metavar="SCENARIO")
+@click.argument("scenario", type=click.Choice(VIDEO + ROADS + RADAR + NETWORK), metavar="SCENARIO")
 @common("Folder to write.  [default: runs/SCENARIO]")
 @seed_option
 @click.option("--fps", type=float, help="Frames/s; motion per second stays.  [default: 15, roads 25]")
@@ -121,16 +142,24 @@ Examples:
 @click.option("--tilt-deg", type=float, help="Roads: camera's axis below the horizon.  [default: the scenario's]")
 @click.option("--lens", default=0.0, show_default=True, help="Roads: k1 of Brown-Conrady, -0.3 to 0.3; barrel below 0.")
 @click.option("--click-sigma", default=1.0, show_default=True, help="Roads: error of clicked points in site.toml, px.")
+@click.option("--radar", is_flag=True, help="Roads: also the plots of a traffic radar, as radar.csv and radars.toml.")
 @click.option("--snr-db", type=float, help="Radar: mean signal to noise ratio of a target.  [default: the scenario's]")
 @click.option(
     "--pfa", type=click.FloatRange(0, 0.1), help="Radar: false alarms per resolution cell.  [default: the scenario's]"
 )
 @weibull_option
 @click.option("--glint", type=click.FloatRange(0, 1), help="Radar: share of errors that are five times as large.")
+@click.option(
+    "--bias",
+    type=_Bias(),
+    default=(0.0, 1.0, 0.0),
+    help="Radar-network: what the second radar measures too much, in m, degrees and s.  [default: 0,1,0]",
+)
 @receives(SimulateOptions)
 def command(options: SimulateOptions) -> None:
     """Draw SCENARIO: a video as video.avi and gt.txt (MOTChallenge form, visibility in column 9), a road with
-    site.toml, road_truth.csv and road_events.csv besides, a radar scenario as plots.csv and truth.csv.
+    site.toml, road_truth.csv and road_events.csv besides, a radar scenario as plots.csv and truth.csv, a network of
+    radars as north.csv, south.csv, radars.toml and truth.csv.
 
     \b
     crossing     two vehicles cross in mid-picture and are one blob for half a second or more
@@ -152,12 +181,15 @@ def command(options: SimulateOptions) -> None:
     radar-crossing    two aircraft cross at a small angle in clutter
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     radar-parting     the same for 10 to 90 s, and half of the pairs have crossed when they part
+    radar-network     two radars 30 km apart see two aircraft; the second one's azimuths are 1 degree too large
     """
     start_log(options.verbose, options.quiet)
     scenarios = next(kind for kind in OPTIONS if options.scenario in kind)
     _refuse_others_than(OPTIONS[scenarios], options.scenario)
     if scenarios is RADAR:
         _draw_plots(options)
+    elif scenarios is NETWORK:
+        _draw_network(options)
     else:
         _draw_video(options, options.chosen(OPTIONS[scenarios]))
 
@@ -165,8 +197,10 @@ def command(options: SimulateOptions) -> None:
 def _draw_video(options: SimulateOptions, conditions: dict[str, Any]) -> None:
     from vidtrack.output.folder import open_folder
     from vidtrack.simulate import simulate, simulate_road, write, write_road
+    from vidtrack.simulate.roads.radar import write_road_plots
 
     if options.scenario in ROADS:
+        conditions.pop("radar")
         road = simulate_road(options.scenario, seed=options.seed, **conditions)
         frames, count, save = iter(road), len(road), partial(write_road, road)
     else:
@@ -175,6 +209,8 @@ def _draw_video(options: SimulateOptions, conditions: dict[str, Any]) -> None:
     folder = open_folder(options.output, options.scenario, options.force)
     with click.progressbar(frames, length=count, label=str(folder), file=sys.stderr, hidden=options.quiet) as shown:
         save(folder, shown)
+    if options.radar:
+        write_road_plots(folder, road)
 
 
 def _draw_plots(options: SimulateOptions) -> None:
@@ -191,6 +227,15 @@ def _draw_plots(options: SimulateOptions) -> None:
         glint=options.glint,
     )
     write_radar(seen, open_folder(options.output, options.scenario, options.force))
+
+
+def _draw_network(options: SimulateOptions) -> None:
+    from vidtrack.output.folder import open_folder
+    from vidtrack.simulate.radar_network import simulate_network, write_network
+
+    write_network(
+        simulate_network(options.seed, bias=options.bias), open_folder(options.output, options.scenario, options.force)
+    )
 
 
 def _refuse_others_than(options: tuple[str, ...], scenario: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,12 @@ _NUMBERED = 60
 class RadarPlot:
     """Sink that draws all plots in grey and each track in its colour, with its id at its end.
 
-    radar  (x, y) of the radar
+    radars  (x, y) of each radar
     """
 
-    def __init__(self, path: Path, radar: tuple[float, float]) -> None:
+    def __init__(self, path: Path, radars: Sequence[tuple[float, float]]) -> None:
         self._path = path
-        self._radar = radar
+        self._radars = np.asarray(radars, float).reshape(-1, 2)
         self._plots: list[np.ndarray] = []
         self._tracks: dict[int, list[Floats]] = {}
 
@@ -46,7 +47,7 @@ class RadarPlot:
         axes = figure.add_subplot()
         if self._plots:
             axes.plot(*(np.concatenate(self._plots).T / 1000), ".", color="0.6", markersize=2, zorder=1)
-        axes.plot(self._radar[0] / 1000, self._radar[1] / 1000, "^", color="black", markersize=7, zorder=2)
+        axes.plot(*(self._radars.T / 1000), "^", color="black", markersize=7, zorder=2)
         for track_id, points in self._tracks.items():
             x, y = np.array(points).T / 1000
             ink = tuple(0.8 * level / 255 for level in reversed(colour(track_id)))

@@ -55,6 +55,12 @@ class Plots:
     def __len__(self) -> int:
         return len(self.scan)
 
+    def rows(self, rows: slice) -> Plots:
+        """The plots of these rows."""
+        amplitude = None if self.amplitude is None else self.amplitude[rows]
+        z, sigma = self.z[rows], self.sigma[rows]
+        return replace(self, scan=self.scan[rows], time_s=self.time_s[rows], z=z, sigma=sigma, amplitude=amplitude)
+
     def without_range_rate(self) -> Plots:
         """The plots without range rates."""
         return replace(self, z=self.z[:, : self.dim], sigma=self.sigma[:, : self.dim], doppler=False)

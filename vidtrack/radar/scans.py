@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,28 @@ SIMULTANEOUS_S = 1e-6
 
 REACH_SCANS = 4
 """The surveyed space extends beyond the plots by the distance that a target can cover in so many scans."""
+
+
+class Span(NamedTuple):
+    """A scan of a table of plots: its number, its time [s] and its rows."""
+
+    number: int
+    t: float
+    rows: slice
+
+
+def spans(scan: Ints, time_s: Floats) -> Iterator[Span]:
+    """The scans of plots in order, from the first to the last; the times of empty ones are interpolated.
+
+    scan (N,) number of each plot's scan, time_s (N,) their times
+    """
+    number, first, size = np.unique(scan, return_index=True, return_counts=True)
+    mean_s = np.add.reduceat(time_s, first) / size
+    for k, (start, end) in enumerate(zip(first.tolist(), (first + size).tolist(), strict=True)):
+        for empty in range(number[k - 1] + 1 if k else number[0], number[k]):
+            between = np.interp(empty, number[k - 1 : k + 1], mean_s[k - 1 : k + 1])
+            yield Span(int(empty), float(between), slice(start, start))
+        yield Span(int(number[k]), float(mean_s[k]), slice(start, end))
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,22 +76,24 @@ class Measurements:
         return int(self.scan[-1] - self.scan[0]) + 1
 
     def __iter__(self) -> Iterator[tuple[int, Scan]]:
-        """Number and scan, from the first to the last; the times of empty scans are interpolated."""
-        number, first, size = np.unique(self.scan, return_index=True, return_counts=True)
-        time_s = np.add.reduceat(self.time_s, first) / size
+        """Number and scan, from the first to the last."""
         noise = self.R.mean(axis=0)
-        for k, (start, end) in enumerate(zip(first, first + size, strict=True)):
-            for empty in range(number[k - 1] + 1 if k else number[0], number[k]):
-                between = float(np.interp(empty, number[k - 1 : k + 1], time_s[k - 1 : k + 1]))
-                yield empty, Scan(between, self.z[:0], self.R[:0], self.sensor, noise=noise)
-            amplitude = None if self.amplitude is None else self.amplitude[start:end]
-            z, R = self.z[start:end], self.R[start:end]
-            sensor = self._at(self.time_s[start:end] - time_s[k], z, R)
-            yield int(number[k]), Scan(float(time_s[k]), z, R, sensor, amplitude=amplitude, noise=noise)
+        for span in spans(self.scan, self.time_s):
+            yield span.number, self.scan_of(span, noise)
+
+    def scan_of(self, span: Span, noise: Floats, lag_s: float = 0.0, station: int = 0) -> Scan:
+        """The scan of a span of these plots; noise (m, m) of a missed measurement.
+
+        lag_s  s; the plots were measured so much before their times
+        """
+        z, R = self.z[span.rows], self.R[span.rows]
+        amplitude = None if self.amplitude is None else self.amplitude[span.rows]
+        sensor = self._at(self.time_s[span.rows] - span.t - lag_s, z, R) if len(z) else self.sensor
+        return Scan(span.t, z, R, sensor, amplitude=amplitude, noise=noise, station=station)
 
     def _at(self, offset: Floats, z: Floats, R: Floats) -> Sensor:
         """The sensor of a scan with plots z (M, m), R, and time offsets (M,) from the scan's time."""
-        if np.ptp(offset) < SIMULTANEOUS_S:
+        if np.abs(offset).max() < SIMULTANEOUS_S:
             return self.sensor
         from scipy.spatial import KDTree
 

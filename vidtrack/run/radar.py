@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -30,6 +30,8 @@ from vidtrack.run.steps import scan_steps
 from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import NoPicture
+from vidtrack.tracking.rates import Rates
+from vidtrack.tracking.station import Station
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracking.unresolved.cell import PolarCell
 from vidtrack.tracking.unresolved.unresolved import Unresolved
@@ -80,14 +82,16 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
         count=found.count,
         steps=scan_steps(found, tracker, settings.tracker.redundant),
         summary=summary,
-        sinks=partial(radar_sinks, settings, extras, found.dim),
+        sinks=partial(radar_sinks, settings, extras, found.dim, [settings.radar.position[:2]]),
     )
 
 
-def radar_sinks(settings: Settings, extras: Extras, dim: int, folder: Path) -> Iterator[Sink]:
-    """The sinks of a run over plots in `dim` dimensions."""
+def radar_sinks(
+    settings: Settings, extras: Extras, dim: int, radars: Sequence[tuple[float, float]], folder: Path
+) -> Iterator[Sink]:
+    """The sinks of a run over plots in `dim` dimensions of radars at these places (x, y)."""
     table = TrackTable(folder, RADAR if dim == 2 else RADAR_3D)
-    plot = RadarPlot(folder / "tracks.png", settings.radar.position[:2])
+    plot = RadarPlot(folder / "tracks.png", radars)
     yield Confirmed(*smoothed_first(settings.output, table, plot), hold_s=math.inf)  # scans may be far apart
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv", index="scan")
@@ -102,34 +106,51 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
 
     Raises ConfigError for a filter without a smoother, or a method that needs amplitudes where there are none.
     """
-    radar, common = settings.radar, settings.tracker
-    if common.method in STRENGTH and found.amplitude is None:
+    radar = settings.radar
+    station = Station(Rates(radar.detection_probability, radar.clutter_density, surveyed(found)))
+    return build_point_tracker(settings, [found], [radar.position], [station], explain=explain, seed=seed)
+
+
+def build_point_tracker(
+    settings: Settings,
+    found: Sequence[Measurements],
+    places: Sequence[tuple[float, float, float]],
+    stations: Sequence[Station],
+    *,
+    explain: bool = False,
+    seed: int = 0,
+) -> Tracker:
+    """The tracker of radars that have made these measurements at these places [m]; each is a station.
+
+    Raises ConfigError as `build_radar_tracker`.
+    """
+    radar, common, dim = settings.radar, settings.tracker, found[0].dim
+    if common.method in STRENGTH and any(each.amplitude is None for each in found):
         raise ConfigError(
             f"the plots have no amplitudes, by which {common.method} chooses; take another method (gnn, jpda, mht)"
         )
     if settings.output.smooth and radar.estimator == "alpha-beta":
         raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
-    sharing = _sharing(radar, found.dim)
+    sharing = _sharing(radar, [place[:dim] for place in places])
     return Tracker(
-        model=motion(radar, found.dim),
-        estimator=estimator(radar, found, seed),
+        model=motion(radar, dim),
+        estimator=estimator(radar, found[0], seed),
         associate=rule(common, unresolved=isinstance(sharing, Unresolved)),
         gate=gate(common, radar.euclidean_radius_m, adaptive=True),
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         picture=NoPicture(),
         sharing=sharing,
-        detection_probability=radar.detection_probability,
-        clutter_density=radar.clutter_density,
-        surveyed=surveyed(found),
+        stations=stations,
         explain=explain,
         smooth=settings.output.smooth,
     )
 
 
-def _sharing(radar: RadarSettings, dim: int) -> Sharing:
-    """The model for unresolved targets; alpha-beta has no covariances from which to tell them."""
+def _sharing(radar: RadarSettings, places: Sequence[tuple[float, ...]]) -> Sharing:
+    """The model for targets that radars at these places do not resolve; alpha-beta has no covariances to tell them."""
     if not radar.unresolved or radar.estimator == "alpha-beta":
         return Exclusive()
-    angles = (radar.cell_azimuth_deg, radar.cell_elevation_deg)[: dim - 1]
+    angles = (radar.cell_azimuth_deg, radar.cell_elevation_deg)[: len(places[0]) - 1]
     sides = (radar.cell_range_m, *(None if side is None else math.radians(side) for side in angles))
-    return Unresolved(PolarCell(radar.position[:dim], sides))
+    cells = [PolarCell(place, sides) for place in places]
+    return Unresolved(cells[0], cells)

@@ -29,6 +29,8 @@ class Radar:
     p_fa       probability that a resolution cell without a target exceeds the threshold
     clutter    amplitudes in such cells; sets the threshold
     glint      probability that a component of a plot has GLINT_FACTOR times its standard deviation
+    place      (x, y, z) of the radar [m]
+    start_s    time of the first scan
     """
 
     scan_s: float
@@ -40,6 +42,8 @@ class Radar:
     p_fa: float = 0.0
     clutter: Weibull = RAYLEIGH
     glint: float = 0.0
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_s: float = 0.0
 
     @property
     def dim(self) -> int:
@@ -58,7 +62,7 @@ class Radar:
 
     def measures(self, xyz: Floats) -> Floats:
         """(K, dim) range, azimuth 0..360[, elevation] of positions (K, 3)."""
-        polar = to_polar(xyz[:, : self.dim])
+        polar = to_polar((xyz - self.place)[:, : self.dim])
         polar[:, 1:] = np.degrees(polar[:, 1:])
         polar[:, 1] %= 360
         return polar
@@ -103,8 +107,8 @@ class Seen:
 
 
 def observe(radar: Radar, targets: Sequence[Target], scans: int, rng: Generator) -> Seen:
-    """Let the radar look at the targets, from time 0."""
-    times: Floats = radar.scan_s * np.arange(scans, dtype=float)
+    """Let the radar look at the targets."""
+    times: Floats = radar.start_s + radar.scan_s * np.arange(scans, dtype=float)
     states = np.stack([np.hstack(target.flight(times)) for target in targets])
     there = np.stack([
         (times >= target.start_s) & (times <= target.end_s) & radar.covers(xyz)

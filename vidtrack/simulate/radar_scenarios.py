@@ -51,7 +51,7 @@ MULTIFUNCTION = Radar(
 
 def tws(rng: Generator) -> list[Target]:
     """Eight aircraft; the first two turn with 2.5 g, the third appears late, the fourth disappears early."""
-    targets = [Target(_anywhere(rng, turning=k < 2)) for k in range(8)]
+    targets = [Target(anywhere(rng, turning=k < 2)) for k in range(8)]
     targets[2] = replace(targets[2], start_s=rng.uniform(40, 80))
     targets[3] = replace(targets[3], end_s=rng.uniform(160, 200))
     return targets
@@ -185,7 +185,7 @@ def _through(place: Floats, course: float, speed: float, at_s: float) -> Flight:
     return fly(place - at_s * velocity, velocity)
 
 
-def _anywhere(rng: Generator, turning: bool) -> Flight:
+def anywhere(rng: Generator, turning: bool) -> Flight:
     """A flight through the coverage, with one 2.5 g turn of 60 to 180 degrees if `turning`."""
     place, course, speed = _place(rng, 5e3, 50e3), rng.uniform(0, 2 * np.pi), rng.uniform(120, 280)
     if not turning:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.simulate.radar import Seen
 
 MEASURED = ("range_m", "azimuth_deg", "elevation_deg")
@@ -19,7 +20,7 @@ Columns = dict[str, tuple[str, NDArray]]
 def write_radar(seen: Seen, folder: Path) -> None:
     """Write plots.csv and truth.csv into a folder that exists."""
     write_plots(folder / "plots.csv", seen)
-    write_truth(folder / "truth.csv", seen)
+    write_truth(folder / "truth.csv", seen.times, seen.states, seen.there)
 
 
 def write_plots(path: Path, seen: Seen) -> None:
@@ -35,11 +36,14 @@ def write_plots(path: Path, seen: Seen) -> None:
     _save(path, columns)
 
 
-def write_truth(path: Path, seen: Seen) -> None:
-    """Write `scan,time_s,target_id,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s` of the targets in the coverage, ids from 1."""
-    scan, target = np.nonzero(seen.there.T)
-    states = seen.states[target, scan]
-    columns: Columns = {"scan": ("%d", scan), "time_s": ("%.6f", seen.times[scan]), "target_id": ("%d", target + 1)}
+def write_truth(path: Path, times: Floats, states: Floats, there: Mask) -> None:
+    """Write `scan,time_s,target_id,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s`, ids from 1.
+
+    times (K,) of the scans, states (targets, K, 6), there (targets, K) where a target is in the coverage
+    """
+    scan, target = np.nonzero(there.T)
+    states = states[target, scan]
+    columns: Columns = {"scan": ("%d", scan), "time_s": ("%.6f", times[scan]), "target_id": ("%d", target + 1)}
     _save(path, columns | {name: ("%.4f", states[:, k]) for k, name in enumerate(STATES)})
 
 

@@ -8,8 +8,6 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Scan
-from vidtrack.tracking.register import Register
-from vidtrack.tracks import MERGED, TENTATIVE
 
 MEMORY_S = 300.0
 """Time constant with which old scans are forgotten."""
@@ -28,8 +26,9 @@ class Rates:
     space                what the sensor surveys, in px^2, m^2, ...; None: the extent of all measurements so far
 
     P_D: scans in which tracks were seen, of all scans of confirmed tracks that share no blob. Misses count once the
-    track is seen again: those of a target that has gone say nothing of how well targets are seen. Clutter: what
-    confirmed tracks leave, one measurement before the first scan included. Old scans are forgotten exponentially.
+    track is seen again, by whatever station: those of a target that has gone say nothing of how well targets are seen.
+    Clutter: what confirmed tracks leave, one measurement before the first scan included. Old scans are forgotten
+    exponentially.
 
     Raises ConfigError for numbers that are no probability, density or area.
     """
@@ -94,31 +93,32 @@ class Rates:
         self.low = low if first else np.minimum(self.low, low)
         self.high = high if first else np.maximum(self.high, high)
 
-    def learn(
-        self, decision: Decision, shared: Ints, register: Register, alone: Mask, inside: Floats, count: int, dt: float
-    ) -> None:
-        """Learn from a decision about `count` measurements, dt seconds after the last.
+    def forget(self, dt: float) -> None:
+        """Let what is known fade by dt seconds."""
+        fade = float(np.exp(-dt / MEMORY_S))
+        self.hits *= fade
+        self.trials *= fade
+        self.false *= fade
+        self.scans *= fade
 
-        shared (K,) measurement that each row shares, -1: none
-        alone  (K,) rows of the register that count: those believed, on no shared blob; inside (K,) their P_G
+    def learn_clutter(self, decision: Decision, shared: Ints, known: Mask, count: int, runs: int) -> None:
+        """Learn from a decision about `count` measurements of a scan in which confirmed tracks are `known` (K,).
+
+        shared (K,) measurement that each row shares, -1: none; runs: number of Monte Carlo runs
         """
-        forget = float(np.exp(-dt / MEMORY_S))
-        known = alone & (register.status != TENTATIVE)
-        runs = 1 + int(register.run.max(initial=0))
         claimed = np.bincount(decision.measurement, decision.beta * known[decision.row], count)
         claimed[shared[shared >= 0]] = 1.0
-        self.false = forget * self.false + float(np.maximum(1 - claimed, 0).sum())
-        self.scans = forget * self.scans + runs
-        found = known & (register.status != MERGED) & (register.history & 1 == 1)
-        self.hits = forget * self.hits + int(found.sum())
-        self.trials = forget * self.trials + float((_gap(register.history[found]) * inside[found]).sum())
+        self.false += float(np.maximum(1 - claimed, 0).sum())
+        self.scans += runs
+
+    def learn_detection(self, missed: Ints, inside: Floats, seen: bool) -> None:
+        """Learn from tracks (N,) that have just been seen, by this station or another.
+
+        missed (N,) scans of this station without them since they were last seen, inside (N,) their P_G
+        """
+        self.hits += len(missed) * seen
+        self.trials += float(((missed + seen) * inside).sum())
 
 
 def _mean(rate: float | Floats) -> float:
     return float(rate.mean() if isinstance(rate, np.ndarray) else rate)
-
-
-def _gap(history: Ints) -> Ints:
-    """(N,) scans from the hit before the last to the last, which is the lowest bit."""
-    before = history >> 1
-    return np.frexp((before & -before).astype(float))[1].astype(np.int64)

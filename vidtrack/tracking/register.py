@@ -26,16 +26,19 @@ class Register:
     is another's, since they were not resolved), score (log-odds that it is a target), best (highest score since it was
     confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its
     own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by
-    REST of its size). Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
+    REST of its size), missed (T, S) scans of each station without it since it was last seen,
+    visible (T, S) probability that each station could see it, NaN while nothing is known.
+    Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
-             "exchange", "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s")  # fmt: skip
+             "exchange", "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s",
+             "missed", "visible")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
 
-    def __init__(self, dim: int, smooth: bool = False) -> None:
-        """dim of the positions; whether a smoother needs more."""
+    def __init__(self, dim: int, smooth: bool = False, stations: int = 1) -> None:
+        """dim of the positions; whether a smoother needs more; number of stations."""
         self.columns = self.STATE[1:] + (self.LINKS if smooth else ())
         self.next_id = 1
         self.id = np.empty(0, np.int64)
@@ -56,6 +59,8 @@ class Register:
         self.travelled = np.empty(0)
         self.rest = np.empty((0, dim))
         self.rest_s = np.empty(0)
+        self.missed = np.empty((0, stations), np.int64)
+        self.visible = np.empty((0, stations))
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
 
     def __len__(self) -> int:
@@ -84,12 +89,18 @@ class Register:
         moved = _distance(xy, self.rest) > REST * np.fmax(self.box[:, 2], self.box[:, 3])
         self.rest[moved], self.rest_s[moved] = xy[moved], t
 
-    def record_hits(self, hit: Mask, sure: Mask, t: float, dt: float) -> None:
-        """Note which rows (T,) the scan at t shows, dt seconds after the last, and which of them for sure.
+    def record_hits(self, hit: Mask, sure: Mask, looked: Mask, station: int, t: float, dt: float) -> None:
+        """Note which rows (T,) the scan of a station at t shows, dt seconds after the last, and which of them for sure.
 
-        Only sure ones keep a row alive, and confirm a tentative one.
+        Only sure ones keep a row alive, and confirm a tentative one. Rows at which the station does not look (T,) are
+        neither seen nor missed.
         """
-        _see(self.history, self.alone_s, self.updated_s, self.status, hit, sure, t, dt)
+        _see(self.history, self.alone_s, self.updated_s, self.status, hit, sure, looked, t, dt)
+        self.missed[:, station] += looked
+
+    def seen(self, rows: Mask) -> None:
+        """Begin to count misses anew for rows (T,) that have been seen."""
+        self.missed[rows] = 0
 
     def add_evidence(self, log_ratio: Floats) -> None:
         """Add evidence (T,) to the log-odds of existence: Bayes' rule."""
@@ -100,12 +111,19 @@ class Register:
         _settle(self.status, self.history, self.merged)
 
     def append(
-        self, t: float, position: Floats, box: Floats, score: float, run: Ints, label: Ints | None = None
+        self,
+        t: float,
+        position: Floats,
+        box: Floats,
+        score: float,
+        run: Ints,
+        label: Ints | None = None,
+        ids: Ints | None = None,
     ) -> Ints:
-        """Register new tentative tracks; returns their ids."""
+        """Register new tentative tracks; returns their ids, the next ones unless given."""
         count = len(position)
-        ids = np.arange(self.next_id, self.next_id + count)
-        self.next_id += count
+        ids = np.arange(self.next_id, self.next_id + count) if ids is None else ids
+        self.next_id = max(self.next_id + count, 1 + int(ids.max(initial=0)))
         new = {
             "id": ids,
             "status": TENTATIVE,
@@ -124,6 +142,7 @@ class Register:
             "travelled": 0.0,
             "rest": position,
             "rest_s": t,
+            "missed": 0,
         }
         for name in self.columns:
             old = getattr(self, name)
@@ -149,14 +168,16 @@ class Register:
 
 @kernel
 def _see(
-    history: Ints, alone_s: Floats, updated_s: Floats, status: np.ndarray, hit: Mask, sure: Mask, t: float, dt: float
-) -> None:
+    history: Ints, alone_s: Floats, updated_s: Floats, status: np.ndarray, hit: Mask, sure: Mask, looked: Mask,
+    t: float, dt: float,
+) -> None:  # fmt: skip
     for i in range(len(hit)):
         alone_s[i] += dt * hit[i]
         if hit[i] and sure[i]:
             updated_s[i] = t
         counts = hit[i] and (sure[i] or status[i] != TENTATIVE)
-        history[i] = (history[i] << 1 | counts) & SCANS
+        if looked[i]:
+            history[i] = (history[i] << 1 | counts) & SCANS
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,6 +39,7 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.snapshot import snapshot
+from vidtrack.tracking.station import Station, Stations
 from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 
@@ -79,6 +80,8 @@ class Tracker:
     threshold  controller of the detection threshold, set for each track and scan from its innovation covariance; P_D
                and clutter density then follow from it, and those given are ignored. None: all measurements are used
     surveyed   area [px^2 or m^2] over which the clutter is estimated; None: the picture, else the measurements' extent
+    stations   several sensors, each with its own P_D, clutter density and coverage; scans say by number whose they are.
+               None: one, with the P_D and clutter density given. Saved states hold the first only
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
@@ -104,6 +107,7 @@ class Tracker:
         clutter_density: Rate = 1e-5,
         threshold: ThresholdController | None = None,
         surveyed: float | None = None,
+        stations: Sequence[Station] | None = None,
         explain: bool = False,
         smooth: bool = False,
     ) -> None:
@@ -115,13 +119,16 @@ class Tracker:
         self.two_stage = two_stage or SINGLE_STAGE
         self.timing = self._timing(associate or GNN(), births)
         self.threshold = threshold
-        self.rates = Rates(detection_probability, clutter_density, self.picture.area if surveyed is None else surveyed)
+        space = self.picture.area if surveyed is None else surveyed
+        self.stations = Stations(stations or [Station(Rates(detection_probability, clutter_density, space))])
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
         self._mixture = self.bank if isinstance(self.bank, Mixture) else None  # slow to ask in every step
-        self.register = Register(self.model.dim, smooth)
+        self.register = Register(self.model.dim, smooth, len(self.stations))
         self.t: float | None = None
+        self.number: Callable[[Scan, Ints], Ints] | None = None
+        """Gives ids to the tracks that measurements of a scan begin; None: they are numbered on."""
 
     def step(self, scan: Scan) -> Tracks:
         """Take one scan and return all tracks at its time.
@@ -129,11 +136,11 @@ class Tracker:
         Raises ScanError if the scan is older than the last one, or does not fit the sensor or model.
         """
         events: list[Event] = []
-        dt = self._predict(scan, events)
+        dt, since = self._predict(scan, events), self.stations.take(scan)
         view = self.picture.view(scan, self.register, self.bank)
-        problem = self._gate(scan, view)
+        problem = self._gate(scan, view, since)
         found = self._associate(problem, view, dt, events)
-        outcome = self._update(found, scan, view, dt)
+        outcome = self._update(found, scan, view, dt, since)
         kept = self._delete(found, scan.t, events)
         born = self._register(found, scan, view, events)
         return self._tracks(scan.t, outcome.after(kept, born), events)
@@ -173,6 +180,11 @@ class Tracker:
         self.register.status[first:] = CONFIRMED
         self.t = t if self.t is None else self.t
         return self.register.id[first:].copy()
+
+    @property
+    def rates(self) -> Rates:
+        """P_D and clutter density of the first station."""
+        return self.stations.each[0].rates
 
     @property
     def road(self) -> Road | None:
@@ -221,12 +233,12 @@ class Tracker:
             raise ScanError(f"{t:.6g} s is before the last scan at {self.t:.6g} s; sort the scans by time")
         return dt
 
-    def _gate(self, scan: Scan, view: View | None) -> Problem:
+    def _gate(self, scan: Scan, view: View | None, since: float) -> Problem:
         """Which measurements each track may take, and how likely each is."""
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
-        self.rates.look(scan)
-        detection, clutter = self.rates.of(self.register.run)
+        share = self.stations.share(scan, self.bank.x, self.model)
+        detection, clutter = self.stations.expected(scan, self.register, share, since)
         problem = Problem.gated(
             self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
@@ -242,23 +254,27 @@ class Tracker:
         shared = self.sharing.unresolved(problem, shown, self.register, self.bank, dt)
         return self.timing.associate(problem, shared, view, self.register, events)
 
-    def _update(self, found: Association, scan: Scan, view: View | None, dt: float) -> Outcome:
-        """Update states, boxes and existence with the measurements that the tracks took."""
+    def _update(self, found: Association, scan: Scan, view: View | None, dt: float, since: float) -> Outcome:
+        """Update states, boxes and existence with the measurements that the tracks took.
+
+        dt, since  seconds since the last scan, and since the last one of the same station
+        """
         register = self.register
-        self.bank.update(found.decision, for_update(scan, dt), scan.sensor or POSITION)
+        self.bank.update(found.decision, for_update(scan, since), scan.sensor or POSITION)
         hit = found.taken >= 0
         rows = hit.nonzero()[0]
         sure = hit.copy()
         sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
-        register.record_hits(hit, sure, scan.t, dt)
+        share = self.stations.share(scan, self.bank.x, self.model)
+        looked = self.stations.record(scan, register, share, hit, sure, found.problem.detection, dt)
         if scan.label is not None:
             told = scan.label[found.taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
         self.picture.follow(view, found.taken, register, self.bank, dt)
         self.sharing.update(found, view, register, self.bank, dt)
-        return Outcome(found.measurement, self._weigh_evidence(found, dt), self._why(found))
+        return Outcome(found.measurement, self._weigh_evidence(found, looked, dt, since), self._why(found))
 
-    def _weigh_evidence(self, found: Association, dt: float) -> Floats:
+    def _weigh_evidence(self, found: Association, looked: Mask, dt: float, since: float) -> Floats:
         """Update the tracks' existence (Bayes' rule in log-odds) and the estimates of P_D and clutter density.
 
         Returns the normalised innovations squared (T,), NaN for a miss.
@@ -266,12 +282,8 @@ class Tracker:
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
         log_ratio[~alone] = 0.0
-        self.register.add_evidence(log_ratio)
-        if self.rates.estimated:
-            alone &= self.timing.shown(problem.rows)
-            self.rates.learn(
-                found.decision, found.shared, self.register, alone, problem.inside, problem.measurements, dt
-            )
+        self.register.add_evidence(log_ratio * self.stations.weight(problem.scan, since))
+        self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
         return nis
 
     def _why(self, found: Association) -> Choices | None:
@@ -320,7 +332,8 @@ class Tracker:
         self.bank.append(position, cov, scale)
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
         label = None if scan.label is None else scan.label[born]
-        ids = self.register.append(scan.t, position, box, self.life.birth, run, label)
+        ids = None if self.number is None else self.number(scan, born)
+        ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids)
         for track, j in zip(ids.tolist(), born.tolist(), strict=True):
             events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
 

@@ -13,6 +13,7 @@ maneuvering targets", IEEE Trans. Aerospace and Electronic Systems 43(2), 2007.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,11 +38,13 @@ from vidtrack.tracks import TENTATIVE
 class Unresolved:
     """How tracks of unresolved targets share measurements. It numbers the groups: each tracker needs its own.
 
-    cell          resolution cell of the sensor
+    cell          resolution cell of the sensor whose scan is taken
+    cells         those of all stations, if there are several
     correlations  of the errors of tracks that are not resolved
     """
 
     cell: PolarCell
+    cells: Sequence[PolarCell] = ()
     correlations: Correlations = field(default_factory=Correlations, init=False)
     _made: int = field(default=0, init=False)
     _placed: Placed | None = field(default=None, init=False)
@@ -51,6 +54,7 @@ class Unresolved:
 
     def unresolved(self, problem: Problem, shown: Mask, register: Register, bank: Estimator, dt: float) -> Ints:
         """(T,) the measurement that each row shares, as the rows that are shown (T,) have it; -1: none."""
+        self.cell = self.cells[problem.scan.station] if self.cells else self.cell
         self.correlations.predict(dt)
         rows = np.flatnonzero(shown & (register.status != TENTATIVE))
         self._placed = Placed.of(problem, bank)

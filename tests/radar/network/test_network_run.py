@@ -1,0 +1,114 @@
+"""Runs over several radars: one picture, its files, and its errors."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import vidtrack as vt
+from vidtrack.cli import cli
+from vidtrack.config.load import load
+from vidtrack.formats import read
+from vidtrack.radar.network.network import Network, read_feeds
+from vidtrack.radar.network.radars import read_radars
+from vidtrack.run.fuse import run_fusion
+from vidtrack.run.network import run_network
+from vidtrack.simulate.radar_network import simulate_network, write_network
+
+
+def finished(folder, names, out, toml="radars.toml"):
+    paths = [str(folder / f"{name}.csv") for name in names]
+    with run_network(paths, folder / toml, load(), folder / out) as run:
+        for _ in run:
+            pass
+    return folder / out
+
+
+@pytest.fixture(scope="module")
+def biased(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("biased")
+    write_network(simulate_network(500), folder)
+    finished(folder, ["north", "south"], "run")
+    return folder
+
+
+def distances(folder, run):
+    """Distances of true positions to the nearest tracks, by scan (K, targets)."""
+    result, truth = read(run), read(folder / "truth.csv")
+    found = []
+    for scan in range(30, truth.frame.max() + 1):
+        at, there = result.xy[result.frame == scan], truth.xy[truth.frame == scan][:, :2]
+        found.append(np.linalg.norm(there[:, None] - at[None], axis=-1).min(axis=1))
+    return np.array(found)
+
+
+def test_one_degree_of_bias_leaves_one_track_a_target(biased):
+    assert len(np.unique(read(biased / "run").id)) == 2
+    assert np.sqrt((distances(biased, biased / "run") ** 2).mean()) < 120
+    found = json.loads((biased / "run" / "summary.json").read_text())["radars"]
+    off = found["south"]["bias_azimuth_deg"] - 1.0
+    assert abs(off) < 3.5 * found["south"]["bias_azimuth_sigma_deg"]
+    assert found["south"]["bias_azimuth_sigma_deg"] < 0.15
+    assert found["south"]["bias_azimuth_observed"] is True
+    rows = list(csv.DictReader((biased / "run" / "registration.csv").open()))
+    assert len(rows) == 2 * 120
+    assert float(rows[0]["bias_azimuth_sigma_deg"]) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_known_bias_of_none_is_not_estimated(biased):
+    text = (biased / "radars.toml").read_text().replace("scan_s", "bias_range_m = 0\nbias_azimuth_deg = 0\nscan_s")
+    (biased / "known.toml").write_text(text)
+    network = Network(read_feeds([str(biased / "north.csv"), str(biased / "south.csv")],
+                                 read_radars(biased / "known.toml"), load().radar))  # fmt: skip
+    turns = list(network)
+    assert [turn.station for turn in turns[:4]] == [0, 1, 0, 1]
+    assert np.all(np.diff([turn.span.t for turn in turns]) > 0)
+    assert len(turns) == network.count == 120
+    feed = network.feeds[1]
+    np.testing.assert_array_equal(network.scan(turns[1]).z, feed.found.z[turns[1].span.rows])
+
+
+def test_runs_of_two_radars_are_fused(tmp_path):
+    write_network(simulate_network(500, bias=(0.0, 0.0, 0.0)), tmp_path)
+    runs = [finished(tmp_path, [name], f"run-{name}") for name in ("north", "south")]
+    with run_fusion(runs, tmp_path / "both") as run:
+        for _ in run:
+            pass
+    result = read(tmp_path / "both")
+    assert len(np.unique(result.id)) == 2
+    alone = [np.sqrt(np.median(distances_at(tmp_path, run) ** 2)) for run in runs]
+    assert np.sqrt(np.median(distances_at(tmp_path, tmp_path / "both") ** 2)) < max(alone)
+
+
+def distances_at(folder, run):
+    """Distances of tracks to the nearest true position at their time, after a minute."""
+    truth = np.genfromtxt(folder / "truth.csv", delimiter=",", names=True)
+    rows = np.genfromtxt(run / "tracks.csv", delimiter=",", names=True, dtype=None, encoding=None)
+    found = []
+    for row in rows[rows["time_s"] > 60]:
+        now = truth[np.abs(truth["time_s"] - row["time_s"]) < 1e-3]
+        found.append(np.hypot(now["x_m"] - row["x_m"], now["y_m"] - row["y_m"]).min())
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message", "code"),
+    [
+        (["radar", "north.csv", "south.csv"], "2 tables of plots need --radars", 2),
+        (["radar", "nowhere.csv", "--radars", "radars.toml"], "no radar 'nowhere'", 2),
+        (["radar", "north.csv", "north.csv", "--radars", "radars.toml"], "two files have plots of radar 'north'", 2),
+        (["radar", "north.csv", "south.csv", "--radars", "radars.toml", "--estimator", "alpha-beta"], "one gain", 2),
+        (["fuse", "run"], "two runs or more", 2),
+        (["fuse", "run", "nowhere"], "nowhere holds no tracks.parquet", 3),
+    ],
+)
+def test_what_cannot_be_right_is_refused(biased, monkeypatch, arguments, message, code):
+    monkeypatch.chdir(biased)
+    result = CliRunner().invoke(cli, [*arguments, "-o", "refused"])
+    said = f"{result.output}{result.exception}"
+    assert message in said
+    error = result.exception
+    assert (error.exit_code if isinstance(error, vt.Error) else error.code) == code
+    assert not (biased / "refused").exists()

@@ -1,0 +1,73 @@
+"""Which tracks of several runs are of one target: whole tracks are compared, not single times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+
+LEAST_COMMON = 3
+"""Fewest common times of two tracks that are compared."""
+INSIDE = 0.999
+"""Share of pairs of one target that are found, if the errors are as stated."""
+
+
+@dataclass(frozen=True, slots=True)
+class Histories:
+    """Tracks of several runs at common times.
+
+    run    (T,) run of each track
+    there  (T, K) whether a track exists at each time
+    xy     (T, K, 2) positions, cov (T, K, 2, 2) covariances; NaN where there is none
+    """
+
+    run: Ints
+    there: Mask
+    xy: Floats
+    cov: Floats
+
+
+def same_targets(histories: Histories) -> Ints:
+    """(T,) number of the target of each track, from 0 in order of the tracks.
+
+    Two tracks of different runs may be of one target if the squares of their distances, by the sum of both
+    covariances, are on average within what two errors allow. The nearest pairs are joined first. A target has at most
+    one track of each run at a time.
+    """
+    target = np.arange(len(histories.run))
+    for a, b in _by_distance(histories):
+        one, other = target == target[a], target == target[b]
+        if target[a] != target[b] and not _overlap(histories, one, other):
+            target[one | other] = min(target[a], target[b])
+    return np.unique(target, return_inverse=True)[1]
+
+
+def _by_distance(histories: Histories) -> list[tuple[int, int]]:
+    """Pairs of tracks near enough to be of one target, the nearest first."""
+    # errors of one track last, so that its times count as one: the mean is compared with the quantile of one
+    limit = 2 * float(gammaincinv(1.0, INSIDE))
+    found = []
+    for a in range(len(histories.run)):
+        others = np.flatnonzero((histories.run > histories.run[a]) & (histories.there & histories.there[a]).any(axis=1))
+        for b in others:
+            both = histories.there[a] & histories.there[b]
+            if both.sum() < LEAST_COMMON:
+                continue
+            v = histories.xy[a, both] - histories.xy[b, both]
+            S = histories.cov[a, both] + histories.cov[b, both]
+            d2 = np.einsum("ki,ki->k", v, np.linalg.solve(S, v[:, :, None])[:, :, 0]).mean()
+            if d2 < limit:
+                found.append((float(d2), a, int(b)))
+    return [(a, b) for _, a, b in sorted(found)]
+
+
+def _overlap(histories: Histories, one: Mask, other: Mask) -> bool:
+    """Whether a track of one target and one of another are of the same run at the same time."""
+    for run in np.unique(histories.run[one]):
+        mine, theirs = (histories.there[rows & (histories.run == run)].any(axis=0) for rows in (one, other))
+        if (mine & theirs).any():
+            return True
+    return False

@@ -1,0 +1,185 @@
+"""The plots of several radars as scans of one tracker, in order of time, without the biases known so far."""
+
+from __future__ import annotations
+
+import heapq
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats
+from vidtrack.config.radar import RadarSettings
+from vidtrack.errors import ConfigError
+from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.network.coverage import Sector
+from vidtrack.radar.network.radars import Placed, Radars
+from vidtrack.radar.network.registration import KINDS, Plotted, Registration
+from vidtrack.radar.plots import Plots, read_plots
+from vidtrack.radar.scans import Measurements, Span, measurements, spans
+from vidtrack.scan import Scan
+from vidtrack.tracks import TENTATIVE, Tracks
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """The plots of one radar, on the common plane.
+
+    placed    the radar and its place
+    plots     azimuths are from the common north
+    settings  those of the run, with the radar's own place and errors
+    found     the plots as measurements, without registration
+    scan_s    time of a scan
+    """
+
+    placed: Placed
+    plots: Plots
+    settings: RadarSettings
+    found: Measurements
+    scan_s: float
+
+    @property
+    def coverage(self) -> Sector:
+        """What the radar covers, by its table; without a range in it, up to its farthest plot."""
+        radar = self.placed.radar
+        farthest = float(self.plots.z[:, 0].max()) if radar.farthest_m is None else radar.farthest_m
+        return Sector(
+            self.placed.xyz[:2], farthest, self.placed.turned, np.radians(radar.sector_deg), radar.slowest_m_s
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A scan of one of several radars: `station` is the number of its feed, `span` its rows there."""
+
+    station: int
+    span: Span
+
+
+class Network:
+    """The scans of several feeds in order of time, and the registration of their radars.
+
+    `scan` makes the scan of a turn, without the biases that are known by then; `learn` learns from what the tracker
+    made of it.
+    """
+
+    def __init__(self, feeds: Sequence[Feed]) -> None:
+        self.feeds = tuple(feeds)
+        radars = [feed.placed.radar for feed in feeds]
+        sigma = np.array([(r.bias_range_m, np.radians(r.bias_azimuth_deg), r.bias_time_s) for r in radars])
+        sigma[0, 2] = 0.0  # common to all clocks nothing can be told
+        if len(feeds) == 1:
+            sigma[:] = 0.0
+        settings = feeds[0].settings
+        self.registration = Registration(
+            [feed.placed.xyz[:2] for feed in feeds], sigma, np.array([feed.scan_s for feed in feeds]),
+            jerk=2 * settings.accel**2 * settings.hold_s,
+        )  # fmt: skip
+
+    def __iter__(self) -> Iterator[Turn]:
+        """The scans of all feeds in order of their stated times."""
+        lists = (
+            [Turn(station, span) for span in spans(feed.plots.scan, feed.plots.time_s)]
+            for station, feed in enumerate(self.feeds)
+        )
+        return heapq.merge(*lists, key=lambda turn: turn.span.t)
+
+    @property
+    def count(self) -> int:
+        """Number of scans of all feeds."""
+        return sum(feed.found.count for feed in self.feeds)
+
+    def scan(self, turn: Turn) -> Scan:
+        """The scan of a turn without the known biases; what is not known of them is in its covariances."""
+        feed = self.feeds[turn.station]
+        noise = feed.found.R.mean(axis=0)
+        bias, cov = self.registration.of(turn.station)
+        if not cov.any():
+            return feed.found.scan_of(turn.span, noise, station=turn.station)
+        plots = _unbiased(feed.plots.rows(turn.span.rows), bias, cov, feed.settings.max_speed / 2)
+        own = turn.span._replace(rows=slice(0, len(plots)))
+        return measurements(plots, feed.settings).scan_of(own, noise, bias[KINDS - 1], turn.station)
+
+    def learn(self, turn: Turn, tracks: Tracks) -> None:
+        """Learn the biases from the plots that confirmed tracks took in this scan."""
+        took = np.flatnonzero((tracks.status != TENTATIVE) & (tracks.measurement >= 0) & (tracks.group < 0))
+        plots = self.feeds[turn.station].plots.rows(turn.span.rows)
+        rows = tracks.measurement[took]
+        R = np.einsum("ni,ij->nij", plots.sigma[rows, :2] ** 2, np.eye(2))
+        taken = Plotted(turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.v[took])
+        self.registration.learn(turn.span.t, taken)
+
+    def as_dict(self) -> dict[str, dict[str, float | bool]]:
+        """The biases of each radar by name, with their standard deviations, and whether the targets have told them."""
+        estimate, sigma, observed = self.registration.bias, self.registration.sigma(), self.registration.observed()
+        found: dict[str, dict[str, float | bool]] = {}
+        for k, feed in enumerate(self.feeds):
+            found[feed.placed.name] = own = {}
+            for j, (name, unit) in enumerate((("range", "m"), ("azimuth", "deg"), ("time", "s"))):
+                factor = 180 / np.pi if unit == "deg" else 1.0
+                own[f"bias_{name}_{unit}"] = round(float(estimate[k, j] * factor), 5)
+                own[f"bias_{name}_sigma_{unit}"] = round(float(sigma[k, j] * factor), 5)
+                own[f"bias_{name}_observed"] = bool(observed[k, j])
+        return found
+
+
+def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) -> list[Feed]:
+    """The feeds of tables of plots: the file NAME.csv has those of the radar NAME.
+
+    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one.
+    """
+    feeds = [_read(Path(path), radars, settings) for path in paths]
+    names = [feed.placed.name for feed in feeds]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(f"two files have plots of radar {name!r}; put them into one")
+    if len(feeds) > 1 and any(not feed.plots.polar for feed in feeds):
+        cartesian = next(feed.placed.name for feed in feeds if not feed.plots.polar)
+        raise ConfigError(f"the plots of radar {cartesian!r} have x and y; several radars need range_m and azimuth_deg")
+    return feeds
+
+
+def _read(path: Path, radars: Radars, settings: RadarSettings) -> Feed:
+    placed = radars.named(path.stem)
+    radar = placed.radar
+    known = {name: getattr(radar, name) for name in ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s")}
+    own = {name: value for name, value in known.items() if value is not None}
+    settings = settings.model_copy(update={"position": placed.xyz, **own})
+    plots = _level(read_plots(path, settings), path)
+    if plots.polar:
+        plots.z[:, 1] = wrap(plots.z[:, 1] + placed.turned)
+    found = measurements(plots, settings)
+    length_s = (plots.time_s[-1] - plots.time_s[0]) / max(1, found.count - 1)
+    return Feed(placed, plots, settings, found, radar.scan_s or max(float(length_s), 1e-3))
+
+
+def _level(plots: Plots, path: Path) -> Plots:
+    """The plots in the plane: with an elevation, the range along the ground."""
+    if plots.dim == 2 or not plots.polar:
+        return plots
+    _log.warning("%s has elevations: ranges become distances along the ground, and tracks are in the plane", path)
+    keep = [0, 1, *range(3, plots.z.shape[1])]
+    z, sigma = plots.z[:, keep], plots.sigma[:, keep]
+    r, elevation = plots.z[:, 0], plots.z[:, 2]
+    z[:, 0] = r * np.cos(elevation)
+    sigma[:, 0] = np.hypot(sigma[:, 0] * np.cos(elevation), r * np.sin(elevation) * plots.sigma[:, 2])
+    return replace(plots, z=z, sigma=sigma, dim=2)
+
+
+def _unbiased(plots: Plots, bias: Floats, cov: Floats, speed: float) -> Plots:
+    """Plots (N,) without a bias (3,), with what is not known of it, cov (3, 3), in their errors.
+
+    speed  standard deviation of a velocity [m/s]: so much an unknown time is worth
+    """
+    z, sigma = plots.z.copy(), plots.sigma.copy()
+    z[:, :2] -= bias[:2]
+    z[:, 0] = np.maximum(z[:, 0], 0.0)
+    z[:, 1] = wrap(z[:, 1])
+    late = cov[2, 2] * speed**2
+    sigma[:, 0] = np.sqrt(sigma[:, 0] ** 2 + cov[0, 0] + late)
+    sigma[:, 1] = np.sqrt(sigma[:, 1] ** 2 + cov[1, 1] + late / np.maximum(z[:, 0], 1.0) ** 2)
+    return replace(plots, z=z, sigma=sigma)

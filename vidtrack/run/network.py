@@ -1,0 +1,112 @@
+"""Tracks the plots of several radars as one picture: tables, scans in order of time, registration, tracker, sinks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+
+from vidtrack.associate.redundancy import combined
+from vidtrack.config.radar import RadarSettings
+from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError
+from vidtrack.output.linked import refuse_link
+from vidtrack.output.registration import RegistrationTable
+from vidtrack.output.sink import Sink, Step
+from vidtrack.output.summary import Summary
+from vidtrack.radar.network.network import Feed, Network, read_feeds
+from vidtrack.radar.network.radars import Radars, read_radars
+from vidtrack.radar.scans import surveyed
+from vidtrack.run.radar import build_point_tracker, radar_sinks
+from vidtrack.run.run import Extras, Pipeline, Run
+from vidtrack.tracking.rates import Rates
+from vidtrack.tracking.station import Station
+from vidtrack.tracking.tracker import Tracker
+
+
+def run_network(
+    paths: Sequence[str],
+    radars: Path,
+    settings: Settings,
+    output: Path | None = None,
+    extras: Extras | None = None,
+    *,
+    force: bool = False,
+    seed: int = 0,
+) -> Run:
+    """A run over the plot tables of the radars in a file. Raises the errors of Run, and PlotFormatError."""
+    pipeline = network_pipeline(paths, read_radars(radars), settings, extras or Extras(), seed)
+    return Run(pipeline, output, force=force)
+
+
+@contextmanager
+def network_pipeline(
+    paths: Sequence[str], radars: Radars, settings: Settings, extras: Extras, seed: int
+) -> Iterator[Pipeline]:
+    """The pipeline of several plot tables. Raises SourceError, PlotFormatError, ConfigError."""
+    network = Network(read_feeds(paths, radars, settings.radar))
+    refuse_link(settings.output, "radar runs")
+    tracker = build_network_tracker(settings, network, explain=extras.explain, seed=seed)
+    account = {
+        "plots": sum(len(feed.plots) for feed in network.feeds),
+        "bad_rows": sum(feed.plots.bad_rows for feed in network.feeds),
+        "truncated": False,
+        "origin": radars.origin,
+    }
+
+    def reading() -> dict[str, object]:
+        own = zip(network.feeds, tracker.stations.each, strict=True)
+        rates = {feed.placed.name: station.rates.as_dict() for feed, station in own}
+        biases = network.as_dict()
+        return account | {"radars": {name: rates[name] | biases[name] for name in rates}}
+
+    def summary(folder: Path) -> Summary:
+        return Summary(folder / "summary.json", ", ".join(paths), settings, reading, unit="scans")
+
+    def sinks(folder: Path) -> Iterator[Sink]:
+        places = [feed.placed.xyz[:2] for feed in network.feeds]
+        yield from radar_sinks(settings, extras, network.feeds[0].found.dim, places, folder)
+        yield RegistrationTable(folder / "registration.csv", network)
+
+    yield Pipeline(
+        name="-".join(Path(path).stem for path in paths),
+        place=Path(paths[0]),
+        count=network.count,
+        steps=network_steps(network, tracker, settings.tracker.redundant),
+        summary=summary,
+        sinks=sinks,
+    )
+
+
+def network_steps(network: Network, tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:
+    """Yields a step for each scan, numbered in order of time; the registration learns from the tracks.
+
+    redundant  probability with which two measurements of one target are combined first; None: they are not combined
+    """
+    for index, turn in enumerate(network):
+        began = perf_counter()
+        scan = network.scan(turn)
+        if redundant is not None:
+            scan, _ = combined(scan, redundant)
+        made = perf_counter()
+        tracks = tracker.step(scan)
+        network.learn(turn, tracks)
+        yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})
+
+
+def build_network_tracker(settings: Settings, network: Network, *, explain: bool = False, seed: int = 0) -> Tracker:
+    """The tracker of the settings for these radars, each a station. Raises ConfigError as `build_radar_tracker`."""
+    if settings.radar.estimator == "alpha-beta" and len(network.feeds) > 1:
+        raise ConfigError("alpha-beta has one gain for all plots; for several radars take another estimator")
+    if settings.tracker.redundant is not None and len(network.feeds) > 1:
+        raise ConfigError("tracker.redundant combines the plots of one radar's scan; leave it out for several radars")
+    stations = [_station(feed, settings.radar) for feed in network.feeds]
+    found, places = [feed.found for feed in network.feeds], [feed.placed.xyz for feed in network.feeds]
+    return build_point_tracker(settings, found, places, stations, explain=explain, seed=seed)
+
+
+def _station(feed: Feed, settings: RadarSettings) -> Station:
+    own = feed.placed.radar.detection_probability
+    detection = settings.detection_probability if own is None else own
+    return Station(Rates(detection, settings.clutter_density, surveyed(feed.found)), feed.coverage)

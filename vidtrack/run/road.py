@@ -1,0 +1,177 @@
+"""Radar and camera on one road: plots and blobs go to one tracker in metres, in order of time."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError
+from vidtrack.estimate.kalman import KalmanBank
+from vidtrack.output.linked import refuse_link
+from vidtrack.output.sink import Step
+from vidtrack.output.summary import Summary
+from vidtrack.radar.filters import estimator, motion
+from vidtrack.radar.network.network import Feed, Network, Turn, read_feeds
+from vidtrack.radar.network.radars import Radars, read_radars
+from vidtrack.radar.scans import surveyed
+from vidtrack.run.radar import radar_sinks
+from vidtrack.run.run import Extras, Pipeline, Run
+from vidtrack.run.trackers import build_blob_tracker
+from vidtrack.run.video import build_detector, video_steps
+from vidtrack.tracking.methods import gate, life, rule
+from vidtrack.tracking.picture.picture import NoPicture
+from vidtrack.tracking.rates import Rates
+from vidtrack.tracking.station import Station, Visibility
+from vidtrack.tracking.tracker import Tracker
+from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.road_scans import InPicture, RoadScans
+from vidtrack.traffic.site import read_site
+from vidtrack.video.resources import frame_by_frame
+from vidtrack.video.source import open_source
+
+ROAD: Mapping[str, Any] = {
+    "radar": {"estimator": "kalman", "max_speed": 40.0, "accel": 2.0, "hold_s": 2.0, "coast_scans": 40,
+              "unresolved": False, "detection_probability": 0.9}
+}  # fmt: skip
+"""Defaults where vehicles are tracked and not aircraft."""
+CAMERA_DETECTION = 0.9
+LASTING_S = 1.0
+"""s; the light of headlamps, a reflection or a shadow looks like a vehicle for so long."""
+BY_RADAR, BY_CAMERA = Visibility(visible_s=20.0, hidden_s=0.2), Visibility(visible_s=10.0, hidden_s=3.0)
+"""A radar loses sight of slow vehicles, of others rarely; a camera of those behind others and in the dark."""
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A calibrated camera: its steps in pixels, its blobs on the road, and what it covers."""
+
+    steps: Iterable[Step]
+    scans: RoadScans
+    coverage: InPicture
+
+
+def run_road(
+    paths: Sequence[str],
+    radars: Path,
+    video: str,
+    site: Path,
+    settings: Settings,
+    output: Path | None = None,
+    extras: Extras | None = None,
+    *,
+    force: bool = False,
+    seed: int = 0,
+) -> Run:
+    """A run over plot tables and a video of one road. Raises the errors of Run, and PlotFormatError."""
+    return Run(
+        _pipeline(paths, read_radars(radars), video, site, settings, extras or Extras(), seed), output, force=force
+    )
+
+
+@contextmanager
+def _pipeline(
+    paths: Sequence[str], radars: Radars, video: str, site: Path, settings: Settings, extras: Extras, seed: int
+) -> Iterator[Pipeline]:
+    if radars.origin is not None:
+        raise ConfigError(f"{radars.path} has latitudes; with a camera give x_m and y_m, in the metres of {site}")
+    refuse_link(settings.output, "radar runs")
+    network = Network(read_feeds(paths, radars, settings.radar))
+    with open_camera(video, site, settings) as camera:
+        tracker = build_road_tracker(settings, network.feeds, camera, explain=extras.explain, seed=seed)
+
+        def reading() -> dict[str, object]:
+            names = [*(feed.placed.name for feed in network.feeds), "camera"]
+            rates = (station.rates.as_dict() for station in tracker.stations.each)
+            return {
+                "plots": sum(len(feed.plots) for feed in network.feeds),
+                "stations": dict(zip(names, rates, strict=True)),
+            }
+
+        yield Pipeline(
+            name=Path(video).stem,
+            place=Path(video),
+            count=None,
+            steps=road_steps(network, camera, tracker),
+            summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
+            sinks=lambda folder: radar_sinks(
+                settings, extras, 2, [feed.placed.xyz[:2] for feed in network.feeds], folder
+            ),
+        )
+
+
+@contextmanager
+def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
+    """A camera whose video is tracked in pixels, so that its blobs are single vehicles.
+
+    Raises SourceError, FormatError, ConfigError, for example for a site without calibration.
+    """
+    with closing(open_source(video, settings.source)) as source, frame_by_frame(settings.detector.kind):
+        size = source.width, source.height
+        drawn = read_site(site).scaled(*size)
+        if drawn.calibration is None:
+            raise ConfigError(f"{site} has no section [calibration], so nobody knows the metres")
+        ground = calibrated(drawn)
+        steps = video_steps(source, build_detector(settings), build_blob_tracker(settings.tracker, size), settings)
+        yield Camera(steps, RoadScans(ground, size), InPicture(ground, size))
+
+
+def build_road_tracker(
+    settings: Settings, feeds: Sequence[Feed], camera: Camera | None, *, explain: bool = False, seed: int = 0
+) -> Tracker:
+    """The tracker in metres: a station for each radar, then one for the camera; each may lose sight of a vehicle."""
+    radar, common = settings.radar, settings.tracker
+    stations = [
+        Station(
+            Rates(
+                feed.placed.radar.detection_probability or radar.detection_probability,
+                radar.clutter_density,
+                surveyed(feed.found),
+            ),
+            feed.coverage,
+            BY_RADAR,
+        )
+        for feed in feeds
+    ]
+    if camera is not None:
+        stations.append(
+            Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, BY_CAMERA, LASTING_S)
+        )
+    return Tracker(
+        model=motion(radar, 2),
+        estimator=estimator(radar, feeds[0].found, seed) if feeds else KalmanBank,
+        associate=rule(common),
+        gate=gate(common, radar.euclidean_radius_m, adaptive=True),
+        life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
+        picture=NoPicture(),
+        stations=stations,
+        explain=explain,
+        smooth=settings.output.smooth,
+    )
+
+
+def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker) -> Iterator[Step]:
+    """Yields a step for each scan of a radar and each picture, numbered in order of time."""
+    plots: Iterator[tuple[float, int, Turn | Step]] = ((turn.span.t, 0, turn) for turn in network or ())
+    pictures: Iterator[tuple[float, int, Turn | Step]] = (
+        (step.time_s, 1, step) for step in (camera.steps if camera else ())
+    )
+    number = 0 if network is None else len(network.feeds)
+    for index, (_, _, seen) in enumerate(heapq.merge(plots, pictures, key=lambda one: one[:2])):
+        began = perf_counter()
+        if isinstance(seen, Turn):
+            assert network is not None
+            scan = network.scan(seen)
+        else:
+            assert camera is not None
+            scan = camera.scans.scan(seen.scan, seen.tracks, number)
+        made = perf_counter()
+        tracks = tracker.step(scan)
+        if isinstance(seen, Turn) and network is not None:
+            network.learn(seen, tracks)
+        yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})

@@ -1,0 +1,149 @@
+"""Stations: the sensors of a tracker, each with how well it detects, how much clutter it has, and what it sees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Mask
+from vidtrack.errors import ScanError
+from vidtrack.estimate.motion.model import Motion
+from vidtrack.scan import Scan
+from vidtrack.tracking.association import Association
+from vidtrack.tracking.rates import Rates
+from vidtrack.tracking.register import Register
+from vidtrack.tracks import MERGED, TENTATIVE
+
+
+class Coverage(Protocol):
+    """Where a station can detect a target."""
+
+    def share(self, xy: Floats, v: Floats) -> Floats:
+        """(T,) share of the detection probability at positions and velocities (T, d): from 0, nothing is seen, to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Everywhere:
+    """No limit."""
+
+    def share(self, xy: Floats, v: Floats) -> Floats:
+        """Ones."""
+        return np.ones(len(xy))
+
+
+@dataclass(frozen=True, slots=True)
+class Visibility:
+    """Targets that a station cannot see for a while: behind others, in the dark, too slow for Doppler.
+
+    A target is visible or hidden; a hidden one is never detected. D. Musicki, R. Evans, S. Stankovic, "Integrated
+    probabilistic data association", IEEE Trans. Automatic Control 39(6), 1994: Markov chain two.
+
+    visible_s, hidden_s  s; mean time that each lasts
+    """
+
+    visible_s: float
+    hidden_s: float
+
+    @property
+    def usual(self) -> float:
+        """Probability that a target is visible, before anything is known of it."""
+        return self.visible_s / (self.visible_s + self.hidden_s)
+
+    def predicted(self, visible: Floats, dt: float) -> Floats:
+        """(T,) probability after dt seconds."""
+        stay = np.exp(-dt * (1 / self.visible_s + 1 / self.hidden_s))
+        return np.asarray(self.usual + (visible - self.usual) * stay)
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """One of the sensors of a tracker. A scan names its station; the measurement model is the scan's own.
+
+    rates       detection probability of a visible target, and clutter density; given or estimated
+    coverage    a target outside is neither seen nor missed
+    visibility  None: targets inside are always visible
+    lasting_s   s; what looks like a target goes on to do so for this time: scans within it are together the evidence of
+                one. 0: each scan counts
+    """
+
+    rates: Rates = field(default_factory=Rates)
+    coverage: Coverage = field(default_factory=Everywhere)
+    visibility: Visibility | None = None
+    lasting_s: float = 0.0
+
+
+class Stations:
+    """The stations of a tracker by number, and when each made its last scan."""
+
+    def __init__(self, each: Sequence[Station]) -> None:
+        self.each = tuple(each)
+        self._last: dict[int, float] = {}
+
+    def __len__(self) -> int:
+        return len(self.each)
+
+    def weight(self, scan: Scan, since: float) -> float:
+        """Of the evidence of a scan, `since` seconds after the station's last one."""
+        lasting_s = self.each[scan.station].lasting_s
+        return min(1.0, since / lasting_s) if lasting_s > 0 else 1.0
+
+    def share(self, scan: Scan, x: Floats, model: Motion) -> Floats:
+        """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""
+        coverage = self.each[scan.station].coverage
+        return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
+
+    def take(self, scan: Scan) -> float:
+        """Seconds since the last scan of the same station; 0 for the first. Raises ScanError for an unknown station."""
+        if not 0 <= scan.station < len(self.each):
+            raise ScanError(f"the scan is of station {scan.station}, but the tracker has {len(self.each)}, from 0")
+        since = scan.t - self._last.get(scan.station, scan.t)
+        self._last[scan.station] = scan.t
+        return since
+
+    def expected(self, scan: Scan, register: Register, share: Floats, since: float) -> tuple[Floats, float | Floats]:
+        """P_D (T,) of the rows of which the station covers a share (T,), and its clutter density.
+
+        since  seconds after the station's last scan
+        """
+        station, number = self.each[scan.station], scan.station
+        station.rates.look(scan)
+        detection, clutter = station.rates.of(register.run)
+        if station.visibility is not None:
+            known = register.visible[:, number]
+            before = np.where(np.isnan(known), station.visibility.usual, known)
+            register.visible[:, number] = station.visibility.predicted(before, since)
+            detection = detection * register.visible[:, number]
+        return detection * share, clutter
+
+    def record(
+        self, scan: Scan, register: Register, share: Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
+    ) -> Mask:
+        """Note which rows (T,) the scan shows, of a covered share and an expected P_D (T,); returns those looked at."""
+        number = scan.station
+        looked = hit | (share >= 0.5)
+        register.record_hits(hit, sure, looked, number, scan.t, dt)
+        if self.each[number].visibility is not None:
+            known = register.visible[:, number]
+            missed = np.maximum(known - detection, 0.0) / np.maximum(1 - detection, 1e-9)
+            register.visible[:, number] = np.where(hit, 1.0, np.where(looked, missed, known))
+        return looked
+
+    def learn(self, found: Association, register: Register, alone: Mask, looked: Mask, dt: float) -> None:
+        """Learn P_D and clutter density from rows (K,) that share no measurement, dt seconds after the last scan."""
+        problem = found.problem
+        seen, known = looked & (register.history & 1 == 1), alone & (register.status != TENTATIVE)
+        count = known & seen & (register.status != MERGED)
+        for number, station in enumerate(self.each):
+            if not station.rates.estimated:
+                continue
+            now = number == problem.scan.station
+            station.rates.forget(dt)
+            if now:
+                runs = 1 + int(register.run.max(initial=0))
+                station.rates.learn_clutter(found.decision, found.shared, known, problem.measurements, runs)
+            missed = register.missed[count, number] - now  # this scan is counted, and was none
+            station.rates.learn_detection(missed, problem.inside[count], seen=now)
+        register.seen(seen)
