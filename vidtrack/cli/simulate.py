@@ -25,6 +25,7 @@ RADAR = (
     "radar-crossing",
     "radar-unresolved",
     "radar-parting",
+    "radar-weaving",
 )
 PICTURE = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "clock")
 WEATHER = ("clear", "rain", "snow", "fog")
@@ -152,6 +153,7 @@ def command(options: SimulateOptions) -> None:
     radar-crossing    two aircraft cross at a small angle in clutter
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     radar-parting     the same for 10 to 90 s, and half of the pairs have crossed when they part
+    radar-weaving     four aircraft weave from side to side all the time, with 1 to 4 g
     """
     start_log(options.verbose, options.quiet)
     scenarios = next(kind for kind in OPTIONS if options.scenario in kind)
