@@ -69,7 +69,7 @@ class RadarPlot:
 
 
 def _draw_scope(axes: Axes, radar: Floats) -> None:
-    """Draw rings at round ranges, labelled in km, and lines every 30 degrees of azimuth, within the limits there are."""
+    """Draw rings at round ranges, labelled in km, and lines every 30 degrees of azimuth, within the limits."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle
     from matplotlib.ticker import MaxNLocator
