@@ -207,3 +207,32 @@ def test_a_miss_moves_the_modes_towards_their_long_run_share_only():
 def test_models_that_cannot_interact_are_refused(models, stay_s, word):
     with pytest.raises(ConfigError, match=word):
         IMMBank(models, stay_s)
+
+
+def test_rates_between_kinds_of_targets_are_kept_and_stays_are_rates_that_are_alike():
+    stays = IMMBank([QUIET, BRISK, QUIET], [20.0, 5.0, 4.0])
+    rates = IMMBank([QUIET, BRISK, QUIET], rates=np.array([[0, 0.025, 0.025], [0.1, 0, 0.1], [0.125, 0.125, 0]]))
+    np.testing.assert_allclose(stays._switching(2.0), rates._switching(2.0))
+    np.testing.assert_allclose(stays._switching(2.0).sum(axis=1), 1.0)
+    apart = IMMBank([QUIET, BRISK, QUIET], rates=np.array([[0, 0.1, 0], [0.1, 0, 0], [1.0, 0, 0]]), prior=np.eye(3)[0])
+    apart.append(np.zeros((1, 2)), np.eye(2)[None], np.ones(1))
+    apart.predict(3.0)
+    assert apart.mode[0, 1] > 0 == apart.mode[0, 2]  # nothing leads to the third
+
+
+def test_what_an_update_tells_of_the_modes_can_be_undone():
+    bank = IMMBank([QUIET, BRISK], [20.0, 5.0])
+    bank.append(np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)), np.ones(2))
+    bank.predict(1.0)
+    before = bank.mode.copy()
+    bank.update(one_to_one(2), Scan(0.0, np.full((2, 2), 9.0), np.eye(2)), POSITION)
+    told = bank.mode[1].copy()
+    bank.forget(np.array([0]))
+    np.testing.assert_allclose(bank.mode, [before[0], told])
+    assert abs(told - before[1]).max() > 0.05
+
+
+@pytest.mark.parametrize("rates", [np.zeros((2, 2)), -np.ones((2, 2)), np.ones((3, 3))])
+def test_rates_that_are_none_are_refused(rates):
+    with pytest.raises(ConfigError, match="rate"):
+        IMMBank([QUIET, BRISK], rates=rates)

@@ -1,5 +1,6 @@
 """Motion models and estimators by name."""
 
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -8,8 +9,11 @@ import pytest
 from vidtrack.config.load import load
 from vidtrack.config.names import Model
 from vidtrack.config.radar import RadarSettings
-from vidtrack.radar.filters import motion
+from vidtrack.decision import Decision
+from vidtrack.estimate.sensor import POSITION
+from vidtrack.radar.filters import estimator, motion
 from vidtrack.run.radar import track_plots
+from vidtrack.scan import Scan
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 
@@ -58,3 +62,18 @@ def test_particles_are_the_same_for_the_same_seed(speed):
     )
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize(("swing_m", "agile"), [(1200.0, True), (0.0, False)])
+def test_plots_tell_which_targets_manoeuvre_all_the_time(swing_m, agile):
+    settings, t = RadarSettings(agile=0.01), 4.0 * np.arange(40)
+    rng = np.random.default_rng(0)
+    z = np.column_stack([200 * t, swing_m * np.sin(2 * np.pi * t / 40)]) + rng.normal(0, 50, (40, 2))
+    found = SimpleNamespace(dim=2, R=np.tile(2500 * np.eye(2), (40, 1, 1)))
+    bank = estimator(settings, found)(motion(settings, 2))
+    bank.append(z[:1], found.R[:1], np.ones(1))
+    one = np.zeros(1, np.int64)
+    for time_s, plot in zip(t[1:], z[1:], strict=True):
+        bank.predict(4.0)
+        bank.update(Decision(one, one, one, np.ones(1), np.zeros(1)), Scan(time_s, plot[None], found.R[:1]), POSITION)
+    assert (bank.mode[0, 2:].sum() > 0.9) if agile else (bank.mode[0, 2:].sum() < 0.05)

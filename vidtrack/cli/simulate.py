@@ -25,6 +25,7 @@ RADAR = (
     "radar-crossing",
     "radar-unresolved",
     "radar-parting",
+    "radar-weaving",
 )
 NETWORK = ("radar-network",)
 PICTURE = ("fps", "size", "noise", "shake", "light_steps", "weather", "light", "wet", "clock")
@@ -181,6 +182,7 @@ def command(options: SimulateOptions) -> None:
     radar-crossing    two aircraft cross at a small angle in clutter
     radar-unresolved  two aircraft fly in one resolution cell for 80 s or more: one plot for both
     radar-parting     the same for 10 to 90 s, and half of the pairs have crossed when they part
+    radar-weaving     four aircraft weave from side to side all the time, with 1 to 4 g
     radar-network     two radars 30 km apart see two aircraft; the second one's azimuths are 1 degree too large
     """
     start_log(options.verbose, options.quiet)

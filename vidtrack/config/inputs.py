@@ -84,6 +84,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.quiet_accel": ("radar.estimator", ("imm",)),
     "radar.quiet_s": ("radar.estimator", ("imm",)),
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
+    "radar.agile": ("radar.estimator", ("imm",)),
     "radar.cell_range_m": ("radar.unresolved", (True,)),
     "radar.cell_azimuth_deg": ("radar.unresolved", (True,)),
     "radar.cell_elevation_deg": ("radar.unresolved", (True,)),

@@ -58,6 +58,8 @@ class RadarSettings(Group):
     """s; mean time that imm's quiet mode lasts"""
     manoeuvre_s: float = Field(20.0, gt=0)
     """s; mean time that imm's other mode lasts"""
+    agile: float = Field(0.01, ge=0, lt=1)
+    """share of the targets that manoeuvre all the time, for which imm has modes of their own; 0: it has none"""
     particles: int = Field(2000, ge=2)
     """samples of each track in the particle filter"""
     resampling: Resampling = "systematic"

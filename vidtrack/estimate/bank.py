@@ -78,4 +78,4 @@ class Mixture(Protocol):
         """The predicted measurement of each mode; S adds R."""
 
     def forget(self, rows: Ints) -> None:
-        """Make all modes of these rows equally probable: what was observed does not tell them."""
+        """Undo what the last update has told of the modes of these rows."""

@@ -26,24 +26,47 @@ class IMMBank:
     """IMM filters, one per row (Blom and Bar-Shalom 1988).
 
     models  motion models, the first the usual one; all have the same dim
-    stay_s  mean sojourn time [s] of each model
+    stay_s  mean sojourn time [s] of each model; it is left for each other model alike
+    rates   (r, r) instead of stay_s: rates [1/s] of switching from the model of a row to that of a column
+    prior   (r,) probabilities of the models for new targets; None: in proportion to the sojourn times
 
     Models may have components beyond position and velocity. In the mixing, a component that the other model lacks
     keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
     """
 
-    def __init__(self, models: Sequence[Motion], stay_s: Sequence[float]) -> None:
-        if len(models) != len(stay_s) or len(models) < 2:
-            raise ConfigError(f"IMM: {len(models)} models, {len(stay_s)} stays; give two models or more, a stay each")
+    def __init__(
+        self,
+        models: Sequence[Motion],
+        stay_s: Sequence[float] | None = None,
+        *,
+        rates: Floats | None = None,
+        prior: Floats | None = None,
+    ) -> None:
+        r = len(models)
+        if r < 2 or (stay_s is not None and len(stay_s) != r):
+            stays = "" if stay_s is None else f", {len(stay_s)} stays"
+            raise ConfigError(f"IMM: {r} models{stays}; give two models or more, a stay each")
         if len({model.dim for model in models}) > 1:
             raise ConfigError("IMM: the models move in different numbers of dimensions")
-        if not min(stay_s) > 0:
+        if stay_s is not None and not min(stay_s) > 0:
             raise ConfigError(f"IMM: a model stays {min(stay_s):g} s; it must be above zero")
+        if (rates is None) == (stay_s is None):
+            raise ConfigError("IMM: give either stay_s or rates")
+        if stay_s is not None:
+            rates = np.repeat(1 / np.asarray(stay_s, float)[:, None] / (r - 1), r, axis=1)
+        self.rates = np.array(rates, float)
+        if self.rates.shape != (r, r) or not self.rates.min() >= 0:
+            raise ConfigError(f"IMM: rates must be ({r}, {r}), none below zero")
+        np.fill_diagonal(self.rates, 0.0)
+        self.left = self.rates.sum(axis=1, keepdims=True)
+        if not self.left.min() > 0:
+            raise ConfigError("IMM: a model is never left; each needs a rate above zero")
+        self.prior = 1 / self.left[:, 0] if prior is None else np.asarray(prior, float)
+        self.prior = self.prior / self.prior.sum()
         self.model = models[0]
         self.banks = [KalmanBank(model) for model in models]
-        self.stay_s = np.asarray(stay_s, float)
-        self.prior = self.stay_s / self.stay_s.sum()
-        self.mode = np.empty((0, len(models)))
+        self.mode = np.empty((0, r))
+        self._expected = self.mode
         self.hits = np.empty(0, np.int64)
         self.scale = np.empty(0)
         self.x, self.P = self._moments(self.banks, self.mode)
@@ -97,13 +120,14 @@ class IMMBank:
             own = replace(decision, beta=share[j] / mode[j, row], beta0=missed[j] / mode[j])
             bank.update(own, scan, sensor)
         self.mode = (mode / mode.sum(axis=0)).T
+        self._expected = before.T
         self.hits = self.hits[parent] + (decision.beta0 < 0.5)
         self.scale = self.scale[parent]
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def forget(self, rows: Ints) -> None:
-        """Make all modes of these rows equally probable: what was observed does not tell them."""
-        self.mode[rows] = 1 / len(self.banks)
+        """Undo what the last update has told of the modes of these rows."""
+        self.mode[rows] = self._expected[rows]
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
@@ -148,11 +172,8 @@ class IMMBank:
 
     def _switching(self, dt: float) -> Floats:
         """(r, r) transition probabilities of the models over dt seconds."""
-        stay = np.exp(-dt / self.stay_s)
-        r = len(stay)
-        leave = np.repeat(((1 - stay) / (r - 1))[:, None], r, axis=1)
-        np.fill_diagonal(leave, stay)
-        return leave
+        stay = np.exp(-dt * self.left)
+        return (1 - stay) * self.rates / self.left + np.diag(stay[:, 0])
 
     def _moments(self, banks: Sequence[KalmanBank], mode: Floats) -> tuple[Floats, Floats]:
         """x (T, n), P (T, n, n) of position and velocity over all modes."""

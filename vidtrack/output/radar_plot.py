@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +15,18 @@ from vidtrack.output.folder import replacing
 from vidtrack.output.sink import Step
 from vidtrack.scan import Scan
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_RINGS = 6
+"""Most rings of equal range."""
 _NUMBERED = 60
 """Largest number of ids drawn; more would be unreadable."""
 
 
 class RadarPlot:
-    """Sink that draws all plots in grey and each track in its colour, with its id at its end.
+    """Sink that draws all plots in grey and each track in its colour, with its id at its end, over rings of equal
+    range and lines of equal azimuth about the radar (a plan position indicator).
 
     radars  (x, y) of each radar
     """
@@ -56,9 +63,26 @@ class RadarPlot:
                 axes.annotate(str(track_id), (x[-1], y[-1]), color=ink, fontsize=8, zorder=4)
         axes.set(xlabel="east, km", ylabel="north, km", title=f"{len(self._tracks)} tracks")
         axes.set_aspect("equal", adjustable="datalim")
-        axes.grid(color="0.9")
+        for radar in self._radars if len(self._radars) == 1 else ():
+            _draw_scope(axes, radar / 1000)
         with replacing(self._path) as new:
             canvas.print_png(str(new))
+
+
+def _draw_scope(axes: Axes, radar: Floats) -> None:
+    """Draw rings at round ranges, labelled in km, and lines every 30 degrees of azimuth, within the limits."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Circle
+    from matplotlib.ticker import MaxNLocator
+
+    sides = np.array(axes.axis()).reshape(2, 2) - radar[:, None]
+    far = float(np.hypot(*np.abs(sides).max(axis=1)))
+    for ring in MaxNLocator(_RINGS).tick_values(0, far)[1:]:
+        axes.add_artist(Circle((radar[0], radar[1]), ring, fill=False, color="0.85", linewidth=0.8, zorder=0))
+        axes.annotate(f"{ring:g}", (radar[0], radar[1] + ring), color="0.5", fontsize=7, zorder=0, annotation_clip=True)
+    for azimuth in np.radians(np.arange(0, 360, 30)):
+        end = radar + 2 * far * np.array([np.sin(azimuth), np.cos(azimuth)])
+        axes.add_artist(Line2D(*zip(radar, end, strict=True), color="0.92", linewidth=0.8, zorder=0))
 
 
 def located(scan: Scan) -> Floats:

@@ -22,6 +22,13 @@ from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.unscented import UnscentedBank
 from vidtrack.radar.scans import Measurements
 
+AGILE_S = 20.0
+"""s; mean time that each mode of an agile target lasts."""
+HARDER = 1.5
+"""Acceleration of agile targets, over that of others."""
+BECOMES_S, REMAINS_S = 5000.0, 1000.0
+"""s; mean times after which a target becomes agile, and after which it is so no longer."""
+
 
 def motion(settings: RadarSettings, dim: int) -> Motion:
     """The motion model of the settings."""
@@ -46,11 +53,32 @@ def estimator(settings: RadarSettings, found: Measurements, seed: int = 0) -> Ca
         quiet = ConstantVelocity(
             found.dim, accel=settings.quiet_accel, hold_s=settings.hold_s, speed=settings.max_speed / 2
         )
-        return lambda model: IMMBank([quiet, model], [settings.quiet_s, settings.manoeuvre_s])
+        return partial(_imm, quiet=quiet, settings=settings)
     if settings.estimator == "alpha-beta":
         variance = np.diagonal(found.R, axis1=1, axis2=2).mean()
         return lambda model: FixedGainBank(model, float(np.sqrt(variance)))
     return KalmanBank
+
+
+def _imm(model: Motion, quiet: Motion, settings: RadarSettings) -> IMMBank:
+    """The quiet mode and the model's, as targets have them that seldom manoeuvre, and again as agile targets do.
+
+    Plots tell which kind a target is, so that the errors of one that manoeuvres all the time are stated larger, and
+    those of others are not.
+    """
+    rest, turn, share = settings.quiet_s, settings.manoeuvre_s, settings.agile
+    if share == 0:
+        return IMMBank([quiet, model], [rest, turn])
+    harder = motion(settings.model_copy(update={"accel": HARDER * settings.accel}), model.dim)
+    rates = np.array([
+        [0, 1 / rest, 1 / BECOMES_S, 0],
+        [1 / turn, 0, 0, 1 / BECOMES_S],
+        [1 / REMAINS_S, 0, 0, 1 / AGILE_S],
+        [0, 1 / REMAINS_S, 1 / AGILE_S, 0],
+    ])  # fmt: skip
+    usual = (1 - share) / (rest + turn)
+    prior = np.array([usual * rest, usual * turn, share / 2, share / 2])
+    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior)
 
 
 def _particles(model: Motion, settings: RadarSettings, seed: int) -> ParticleBank:

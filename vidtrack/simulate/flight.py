@@ -64,6 +64,18 @@ def weave(flight: Flight, amplitude: float, period_s: float, from_s: float) -> F
     return states
 
 
+def swing(flight: Flight, amplitude: ArrayLike, period_s: float, phase: float) -> Flight:
+    """The flight with a sine of this amplitude (3,) [m] in its position, at all times; phase [rad] at time 0."""
+    w, side = 2 * np.pi / period_s, np.array(amplitude, float)
+
+    def states(times: Floats) -> tuple[Floats, Floats]:
+        p, v = flight(times)
+        angle = w * times + phase
+        return p + np.outer(np.sin(angle), side), v + np.outer(w * np.cos(angle), side)
+
+    return states
+
+
 def sidestep(flight: Flight, offset: ArrayLike, near: float, times_s: Sequence[float], after: float = 1.0) -> Flight:
     """The flight displaced by `offset` [m], but by its share `near` in the middle, and by `after` of it at the end.
 

@@ -12,7 +12,7 @@ from numpy.random import Generator
 from vidtrack.amplitude.densities import Weibull
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
-from vidtrack.simulate.flight import Flight, G, Leg, fly, sidestep, weave
+from vidtrack.simulate.flight import Flight, G, Leg, fly, sidestep, swing, weave
 from vidtrack.simulate.radar import Radar, Seen, Target, observe
 
 MOST_FALSE_PLOTS = 3e6
@@ -104,6 +104,11 @@ def parting(rng: Generator) -> list[Target]:
     return [Target(sidestep(flight, side * across, near=1 / 40, times_s=times, after=after)) for side in (-1, 1)]
 
 
+def weaving(rng: Generator) -> list[Target]:
+    """Four aircraft that weave from side to side all the time, with 1 to 4 g in 20 to 60 s."""
+    return [Target(_from_side_to_side(rng)) for _ in range(4)]
+
+
 def _all_seen(seen: Seen) -> bool:
     return bool(seen.there.all())
 
@@ -130,6 +135,11 @@ def _shares_a_cell(seen: Seen, scans: int = 20) -> bool:
     return _all_seen(seen) and not ends and run >= scans
 
 
+def _any(seen: Seen) -> bool:
+    """Nothing is asked."""
+    return True
+
+
 def _meets(seen: Seen) -> bool:
     """The same, for 5 scans."""
     return _shares_a_cell(seen, 5)
@@ -143,6 +153,7 @@ SCENARIOS: dict[str, tuple[Radar, Draw, int, Holds]] = {
     "radar-crossing": (FINE, crossing, 51, _crosses),
     "radar-unresolved": (COARSE, unresolved, 51, _shares_a_cell),
     "radar-parting": (COARSE, parting, 51, _meets),
+    "radar-weaving": (COARSE, weaving, 60, _any),
 }
 """Radar, targets, number of scans, and what is guaranteed for every seed."""
 
@@ -194,3 +205,12 @@ def anywhere(rng: Generator, turning: bool) -> Flight:
     rate = 2.5 * G / speed
     turn = Leg(rng.uniform(np.pi / 3, np.pi) / rate, turn=rate * rng.choice([-1, 1]))
     return fly(place - 90 * velocity, velocity, (Leg(rng.uniform(60, 150)), turn, Leg(np.inf)))
+
+
+def _from_side_to_side(rng: Generator) -> Flight:
+    """A flight through the coverage that swings across its course."""
+    place, course, speed = _place(rng, 10e3, 45e3), rng.uniform(0, 2 * np.pi), rng.uniform(150, 280)
+    period_s = rng.uniform(20, 60)
+    amplitude = rng.uniform(1, 4) * G * (period_s / (2 * np.pi)) ** 2
+    across = amplitude * np.array([np.cos(course), -np.sin(course), 0.0])
+    return swing(_through(place, course, speed, 120.0), across, period_s, rng.uniform(0, 2 * np.pi))
