@@ -128,17 +128,22 @@ class Footprints:
         seen   what was seen of them; None: velocities follow from u alone
         """
         box = np.where(self._cut(box)[:, None], np.nan, box)
-        headings = self._headings(track, xy, u, P, box)
         with np.errstate(invalid="ignore"):
+            paced = None if seen is None else self._paced(track, seen)
+            headings = self._headings(track, xy, u, P, box, paced)
             stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
-            return stand if seen is None else self._paced(stand, track, seen)
+            return stand if paced is None else self._at_pace(stand, *paced)
 
-    def _paced(self, stand: Stand, track: Ints, seen: Seen) -> Stand:
-        """The same with velocities that were filtered on the road, where their errors are smaller."""
+    def _paced(self, track: Ints, seen: Seen) -> tuple[Floats, Floats]:
+        """(N, 2) velocities that were filtered on the road, and (N, 2, 2) their covariances."""
         ground, (left, _, right, bottom) = self._ground, uncut(seen.edge, self._size).T
         foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
         v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
-        cov = cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
+        return v, cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
+
+    def _at_pace(self, stand: Stand, v: Floats, cov: Floats) -> Stand:
+        """The same with these velocities, where their errors are smaller."""
+        ground = self._ground
         better = np.trace(cov, axis1=1, axis2=2) < np.trace(stand.v_own, axis1=1, axis2=2)
         ahead, behind = stand.xy + v / 2, stand.xy - v / 2  # half a second
         shared = ground.by_shared_error(ahead) - ground.by_shared_error(behind)
@@ -187,18 +192,19 @@ class Footprints:
             width=sides[:, 1],
         )
 
-    def _headings(self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats) -> Floats:
+    def _headings(
+        self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats, paced: tuple[Floats, Floats] | None
+    ) -> Floats:
         """(N, 3) unit vectors along the vehicles, and the angle's standard deviation; NaN for those that have not
-        moved yet."""
-        with np.errstate(invalid="ignore"):
-            middle, _ = footprint(self._ground, box, np.full((len(box), 2), np.nan), _SLENDER)
-            v, M = velocity(self._ground, xy, middle, u)
-            speed = np.linalg.norm(v, axis=1)
-            e = v / speed[:, None]
-            n = np.column_stack([-e[:, 1], e[:, 0]])
-            sigma = np.sqrt(np.einsum("ni,nij,nj->n", n, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2), n)) / speed
-        found = np.column_stack([e, sigma])
-        found[~(sigma < _HEADING_SIGMA)] = np.nan
+        moved yet. The direction of the tracker's velocity, or of that on the road, whichever is better known."""
+        middle, _ = footprint(self._ground, box, np.full((len(box), 2), np.nan), _SLENDER)
+        v, M = velocity(self._ground, xy, middle, u)
+        found = _direction(v, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2))
+        if paced is not None:
+            other = _direction(*paced)
+            better = other[:, 2] < np.where(np.isnan(found[:, 2]), np.inf, found[:, 2])
+            found[better] = other[better]
+        found[~(found[:, 2] < _HEADING_SIGMA)] = np.nan
         return self._remembered(track, found)
 
     def _remembered(self, track: Ints, e: Floats) -> Floats:
@@ -284,6 +290,14 @@ def _nearer(up: Floats, w: Floats, middle: Floats, offset: Floats) -> Floats:
 def _seen_by(ground: Ground, xy: Floats, middle: Floats, u: Floats) -> Floats:
     """(N, 4) position and velocity with one calibration."""
     return np.column_stack([ground.metres(middle), velocity(ground, xy, middle, u)[0]])
+
+
+def _direction(v: Floats, cov: Floats) -> Floats:
+    """(N, 3) unit vectors along velocities (N, 2), and the angle's standard deviation by their covariances."""
+    speed = np.linalg.norm(v, axis=1)
+    e = v / speed[:, None]
+    n = np.column_stack([-e[:, 1], e[:, 0]])
+    return np.column_stack([e, np.sqrt(np.einsum("ni,nij,nj->n", n, cov, n)) / speed])
 
 
 def _turned(e: Floats, angle: Floats) -> Floats:
