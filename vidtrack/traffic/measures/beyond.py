@@ -20,6 +20,8 @@ REACH_S = 1.5
 _LEAST_M_S, _SURE = 1.5, 3.0
 """m/s; of the vehicle, and standard deviations of its velocity in it"""
 _LIKELY = 0.5
+_ELSEWHERE_S = 4.0
+"""s; the mean time in which a vehicle has come from elsewhere, such as out of another one's blob"""
 _ALONE_S, _ALONE_M = 1.0, 1.75
 """s, m along the gate; another passing so near is that of the same vehicle."""
 
@@ -34,7 +36,8 @@ def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floa
     parts = [_extended(gates, end, free, spans, way) for end, free, way in
              ((lives.head, before, -1), (lives.tail, after, 1))]  # fmt: skip
     found = parts[0].and_also(parts[1])
-    sure = confidence(found)
+    ends = np.where(found.t < lives.head.t[found.track], lives.head.t[found.track], lives.tail.t[found.track])
+    sure = confidence(found) * np.exp(-np.abs(found.t - ends) / _ELSEWHERE_S)
     likely = (sure > _LIKELY) & gates.role("entry", "exit", "both")[found.gate] & (found.t <= lives.until[found.track])
     found, sure = found.only(likely), sure[likely]
     alone = _alone(found, passed)

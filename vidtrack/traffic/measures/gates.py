@@ -41,6 +41,15 @@ class Gates:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def inward(self) -> Ints:
+        """(G,) the side of each gate on which the middle of all entries and exits lies, as `Passed` has it."""
+        ends = np.stack([self.segment[self.first[:-1], :2], self.segment[self.first[1:] - 1, 2:]])
+        within = self.role("entry", "exit", "both")
+        middle = ends[:, within].mean(axis=(0, 1)) if within.any() else np.zeros(2)
+        (dx, dy), (x, y) = (ends[1] - ends[0]).T, (middle - ends[0]).T
+        return (dx * y - dy * x >= 0).astype(np.int64)
+
     def role(self, *wanted: str) -> Mask:
         """(G,) whether a gate has one of these roles."""
         return np.isin(np.array(self.roles, dtype=str), wanted)

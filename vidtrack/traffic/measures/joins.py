@@ -20,10 +20,10 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.rows import Rows, off_road
-from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M, MODEL_M_S, STANDING_JOLT, End, Lives
+from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M_S, STANDING_JOLT, End, Lives
 
-LONGEST_S = 6.0
-_LOST_S = 1.5
+LONGEST_S = 8.0
+_LOST_S = 2.0
 """s; mean time that a track is lost for"""
 OVERLAP_S = 0.3
 """s; a track that is lost may be seen so long after the one began that goes on"""
@@ -84,7 +84,7 @@ def odds(tail: End, head: End, length: Floats, a: Ints, b: Ints) -> Floats:
     pace = head.v[b] - tail.v[a]
     jolt = STANDING_JOLT + JOLT_PER_M_S * np.linalg.norm(tail.v[a], axis=1)
     (xx, xv, vv), (x2, xv2, v2) = tail.spread[a].T, head.spread[b].T
-    sxx = xx + 2 * gap * xv + gap**2 * vv + jolt * gap**3 / 3 + x2 + MODEL_M**2
+    sxx = xx + 2 * gap * xv + gap**2 * vv + jolt * gap**3 / 3 + x2
     sxv = xv + gap * vv + jolt * gap**2 / 2 + xv2
     svv = vv + jolt * gap + v2 + MODEL_M_S**2
     det = sxx * svv - sxv**2

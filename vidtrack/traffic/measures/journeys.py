@@ -69,8 +69,9 @@ _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats) -> Joins:
     """Joins of stretches that end before an exit, and of those that begin after an entry."""
     left, entered = np.zeros((2, len(lives.track)), bool)
-    left[passed.track[gates.role("exit", "both")[passed.gate]]] = True
-    entered[passed.track[gates.role("entry", "both")[passed.gate]]] = True
+    both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
+    left[passed.track[gates.role("exit")[passed.gate] | (both & ~inwards)]] = True
+    entered[passed.track[gates.role("entry")[passed.gate] | (both & inwards)]] = True
     ends = ~left & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
     begins = ~entered & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
     return joined(lives, ends, begins, float(np.diff(spans).sum()))

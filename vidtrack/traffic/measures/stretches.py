@@ -6,7 +6,8 @@ shared, and where a row is far from the prediction, a second filter begins. If i
 the first one leads to, the rest of the track is another stretch: of which vehicle is decided by `joins`.
 
 The noise of the two axes is the same and independent, so a filter has six numbers beside its time: position,
-velocity, and for each axis the variances of both and their covariance.
+velocity, and for each axis the variances of both and their covariance. Errors of footprints last, so the variance of
+the last row is added where two states are compared.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from vidtrack.compiled import kernel
 from vidtrack.traffic.lengths import length_sums, mean_length
 from vidtrack.traffic.measures.rows import Rows
 
-_PLACE_M = 0.2
+_PLACE_M = 0.3
 """m; standard deviation of a position beside its stated one"""
 _FIRST_M_S = 15.0
 """m/s; of a velocity before the second row"""
@@ -33,9 +34,9 @@ _FAR = 25.0
 """Squared distance beyond which a row is of something else"""
 _OTHER = 30.0
 """Squared distance of two states, beyond which they are of two vehicles: of one, one in 200,000"""
-MODEL_M, MODEL_M_S = 0.5, 1.0
-"""m, m/s; standard deviations of states beside their stated ones: the errors of footprints last"""
-T, X, Y, VX, VY, PXX, PXV, PVV = range(8)
+MODEL_M_S = 1.0
+"""m/s; standard deviation of the difference of two velocities beside what they say"""
+T, X, Y, VX, VY, PXX, PXV, PVV, LASTING = range(9)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,10 +81,10 @@ class Stretches:
 
     def __init__(self, metres: bool) -> None:
         self._metres = metres
-        self._state = np.full((0, 2, 8), np.nan)
+        self._state = np.full((0, 2, 9), np.nan)
         self._since = np.full((0, 4), np.nan)
         self._current = np.empty(0, np.int64)
-        self._head, self._tail = np.full((2, 0, 8), np.nan)
+        self._head, self._tail = np.full((2, 0, 9), np.nan)
         self._track, self._until = np.empty(0, np.int64), np.empty(0)
         self._sums = np.zeros((0, 2))
         self._count = 0
@@ -106,24 +107,29 @@ class Stretches:
     def lives(self) -> Lives:
         """Of all stretches so far."""
         n = self._count
-        ends = (End(s[:, T], s[:, X : Y + 1], s[:, VX : VY + 1], s[:, PXX:]) for s in (self._head[:n], self._tail[:n]))
+        ends = _end(self._head[:n]), _end(self._tail[:n])
         return Lives(*ends, mean_length(self._sums[:n]), self._track[:n], self._until[:n])
 
     def _make_room(self, tracks: int, rows: int) -> None:
         """For tracks (K), and for as many stretches as these rows can have: one begins with some rows of its own."""
         if tracks > len(self._current):
             more = max(tracks, 2 * len(self._current)) - len(self._current)
-            self._state = np.concatenate([self._state, np.full((more, 2, 8), np.nan)])
+            self._state = np.concatenate([self._state, np.full((more, 2, 9), np.nan)])
             self._since = np.concatenate([self._since, np.full((more, 4), np.nan)])
             self._current = np.concatenate([self._current, np.full(more, -1)])
         stretches = self._count + tracks + rows // _CHECK_ROWS
         if stretches > len(self._track):
             more = max(stretches, 2 * len(self._track)) - len(self._track)
-            unknown = np.full((more, 8), np.nan)
+            unknown = np.full((more, 9), np.nan)
             self._head, self._tail = np.vstack([self._head, unknown]), np.vstack([self._tail, unknown])
             self._track = np.concatenate([self._track, np.full(more, -1)])
             self._until = np.concatenate([self._until, np.full(more, np.inf)])
             self._sums = np.concatenate([self._sums, np.zeros((more, 2))])
+
+
+def _end(states: Floats) -> End:
+    spread = np.column_stack([states[:, PXX] + states[:, LASTING], states[:, PXV : PVV + 1]])
+    return End(states[:, T], states[:, X : Y + 1], states[:, VX : VY + 1], spread)
 
 
 @kernel
@@ -134,7 +140,7 @@ def _follow(
     """Number rows by stretches; returns how many there are.
 
     values  (N, 4) t, x, y and the variance of a position
-    state   (K, 2, 8) the two filters of each track
+    state   (K, 2, 9) the two filters of each track
     since   (K, 4) when they began, the rows of the second one, and 1 after rows in which the track was not alone
     """
     for i in range(len(track)):
@@ -175,7 +181,7 @@ def _follow(
         since[k, 2] += 1
         if t - since[k, 1] < _CHECK_S or since[k, 2] < _CHECK_ROWS:
             continue
-        begun = np.empty(8)
+        begun = np.empty(9)
         _write_back(second, since[k, 1], begun)
         if _apart(first, begun) > _OTHER:
             until[current[k]] = first[T]
@@ -195,14 +201,14 @@ def _follow(
 def _begin(state: Floats, row: Floats) -> None:
     """Write the state of a vehicle of which one row (4,) is known."""
     state[T], state[X], state[Y], state[VX], state[VY] = row[0], row[1], row[2], 0.0, 0.0
-    state[PXX], state[PXV], state[PVV] = row[3], 0.0, _FIRST_M_S**2
+    state[PXX], state[PXV], state[PVV], state[LASTING] = row[3], 0.0, _FIRST_M_S**2, row[3]
 
 
 @kernel
 def _predict(state: Floats, dt: float, to: Floats) -> None:
     """Write the state dt [s] later."""
     jolt = STANDING_JOLT + JOLT_PER_M_S * np.hypot(state[VX], state[VY])
-    to[T], to[VX], to[VY] = state[T] + dt, state[VX], state[VY]
+    to[T], to[VX], to[VY], to[LASTING] = state[T] + dt, state[VX], state[VY], state[LASTING]
     to[X], to[Y] = state[X] + dt * state[VX], state[Y] + dt * state[VY]
     to[PXX] = state[PXX] + 2 * dt * state[PXV] + dt * dt * state[PVV] + jolt * dt**3 / 3
     to[PXV] = state[PXV] + dt * state[PVV] + jolt * dt**2 / 2
@@ -212,7 +218,7 @@ def _predict(state: Floats, dt: float, to: Floats) -> None:
 @kernel
 def _step(state: Floats, row: Floats) -> float:
     """Predict and update with a row (4,), unless it is far off; returns its squared distance."""
-    now = np.empty(8)
+    now = np.empty(9)
     _predict(state, row[0] - state[T], now)
     dx, dy, s = row[1] - now[X], row[2] - now[Y], now[PXX] + row[3]
     distance = (dx * dx + dy * dy) / s
@@ -221,7 +227,7 @@ def _step(state: Floats, row: Floats) -> float:
     place, pace = now[PXX] / s, now[PXV] / s
     now[X], now[Y], now[VX], now[VY] = now[X] + place * dx, now[Y] + place * dy, now[VX] + pace * dx, now[VY] + pace * dy
     now[PVV] -= pace * now[PXV]
-    now[PXX], now[PXV] = (1 - place) * now[PXX], (1 - place) * now[PXV]
+    now[PXX], now[PXV], now[LASTING] = (1 - place) * now[PXX], (1 - place) * now[PXV], row[3]
     state[:] = now
     return distance
 
@@ -239,9 +245,9 @@ def _write_back(state: Floats, t: float, begun: Floats) -> None:
 @kernel
 def _apart(first: Floats, second: Floats) -> float:
     """Squared distance of the second state from where the first one leads to."""
-    then = np.empty(8)
+    then = np.empty(9)
     _predict(first, second[T] - first[T], then)
-    xx, xv = then[PXX] + second[PXX] + MODEL_M**2, then[PXV] + second[PXV]
+    xx, xv = then[PXX] + second[PXX] + then[LASTING] + second[LASTING], then[PXV] + second[PXV]
     vv = then[PVV] + second[PVV] + MODEL_M_S**2
     total = 0.0
     for place, pace in ((X, VX), (Y, VY)):
