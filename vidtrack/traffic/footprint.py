@@ -19,14 +19,16 @@ z, and the derivative of its picture point gives velocities, u in the picture an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.pace import Pace
+from vidtrack.traffic.vehicles.naming import Naming
 
 _SLENDER, _SLENDER_SIGMA = 0.4, 0.1
 """Width over length of vehicles, from motorcycles and cars (0.4) to lorries (0.25), and its standard deviation."""
@@ -61,6 +63,7 @@ class Stand:
     heading                 (N,) of the vehicle, radians clockwise from north; of one that stands, the last one known
     length, length_sigma    (N,) m; NaN without a heading
     width                   (N,) m; taken from the length
+    kind                    (N,) class by all lengths of the track so far; "" before there is one
     """
 
     xy: Floats
@@ -73,6 +76,7 @@ class Stand:
     length: Floats
     length_sigma: Floats
     width: Floats
+    kind: NDArray[np.str_]
 
     @property
     def speed(self) -> Floats:
@@ -110,10 +114,14 @@ class Footprints:
 
     ground  the calibrated picture
     size    (width, height) px of the picture, whose border cuts boxes
+    classes low and high length of each class of the site [m]; none: those of `classes.CLASSES`
     """
 
-    def __init__(self, ground: Ground, size: tuple[int, int]) -> None:
+    def __init__(
+        self, ground: Ground, size: tuple[int, int], classes: Mapping[str, tuple[float, float]] | None = None
+    ) -> None:
         self._ground = ground
+        self._naming = Naming(classes or {})
         self._size = size
         self._heading: dict[int, Floats] = {}
         self._pace = Pace()
@@ -132,7 +140,8 @@ class Footprints:
             paced = None if seen is None else self._paced(track, seen)
             headings = self._headings(track, xy, u, P, box, paced)
             stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
-            return stand if paced is None else self._at_pace(stand, *paced)
+            stand = stand if paced is None else self._at_pace(stand, *paced)
+            return replace(stand, kind=self._naming.named(track, stand.length, stand.length_sigma, stand.speed))
 
     def _paced(self, track: Ints, seen: Seen) -> tuple[Floats, Floats]:
         """(N, 2) velocities that were filtered on the road, and (N, 2, 2) their covariances."""
@@ -190,6 +199,7 @@ class Footprints:
             length=sides[:, 0],
             length_sigma=np.linalg.norm(length_errors, axis=0)[:, 0],
             width=sides[:, 1],
+            kind=np.full(len(xy), ""),
         )
 
     def _headings(

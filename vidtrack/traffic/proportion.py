@@ -9,9 +9,7 @@ from scipy.special import betaincinv
 from vidtrack.arrays.types import Floats
 
 
-def clopper_pearson(
-    part: Floats | float, whole: Floats | float, below: float, above: float
-) -> tuple[Floats, Floats]:
+def clopper_pearson(part: Floats | float, whole: Floats | float, below: float, above: float) -> tuple[Floats, Floats]:
     """(N,) bounds of the shares that `part` (N,) of `whole` (N,) trials are samples of.
 
     below, above  probabilities that the share lies below, and above the bounds

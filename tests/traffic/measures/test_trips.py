@@ -24,6 +24,9 @@ def test_a_whole_trip_and_three_that_are_not(tmp_path):
     assert (rows[1]["entry_gate"], rows[1]["exit_gate"], rows[1]["complete"]) == ("west", "east", True)
     assert (rows[1]["begin_s"], rows[1]["end_s"]) == pytest.approx((10.5, 14.5), abs=1e-3)
     assert rows[1]["possible"] is True
+    assert rows[1]["mean_speed_kmh"] == pytest.approx(36.0, abs=0.01)
+    assert rows[1]["mean_speed_sigma_kmh"] == pytest.approx(3.6 * np.hypot(0.05, 0.05) / 4, abs=0.01)
+    assert rows[2]["mean_speed_kmh"] is None
     assert {track: row["reason"] for track, row in rows.items()} == {
         1: "",
         2: "was there when watching ended",
@@ -43,7 +46,11 @@ def test_who_comes_in_where_a_track_left_is_another_vehicle(tmp_path):
     )}  # fmt: skip
     t = np.arange(0, 20, 0.04)
     turning = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20), np.where(t < 10, 240, 360))
-    rows = measured([write_run(tmp_path / "run", [turning])], site({"site": PLACE["site"], "gates": gates})).tables["trips"].to_pylist()
+    rows = (
+        measured([write_run(tmp_path / "run", [turning])], site({"site": PLACE["site"], "gates": gates}))
+        .tables["trips"]
+        .to_pylist()
+    )
     assert [(row["entry_gate"], row["exit_gate"], row["track_id"]) for row in rows] == [
         ("west_in", "east_out", 1),
         ("east_in", "west_out", 1),
@@ -81,6 +88,7 @@ def test_a_broken_track_is_joined_and_its_gate_counted(tmp_path):
     row = next(row for row in found.tables["trips"].to_pylist() if row["track_id"] == 1)
     assert (row["complete"], row["tracks"], row["exit_gate"]) == (True, 2, "east")
     assert 0.5 < row["join_confidence"] < 1
+    assert row["mean_speed_kmh"] == pytest.approx(36.0, abs=0.3)
     middle = [r for r in found.tables["crossings"].to_pylist() if r["gate"] == "middle" and r["track_id"] == 1]
     assert [r["reason"] for r in middle] == ["joined"]
     assert middle[0]["confidence"] == row["join_confidence"]

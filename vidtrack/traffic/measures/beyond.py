@@ -1,7 +1,7 @@
 """Gates that vehicles must have passed just before their track began, or just after it ended.
 
-A track begins when its vehicle has been seen for a while, and where another one hides it only afterwards. One that begins
-a little beyond a gate and drives away from it has come through. Such passings are inferred, and say so.
+A track begins when its vehicle has been seen for a while, and where another one hides it only afterwards. One that
+begins a little beyond a gate and drives away from it has come through. Such passings are inferred, and say so.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Pa
     passing = Passing(gates, REACH_M)
     passing.add(step_rows(far, known) if way < 0 else step_rows(known, far))
     found = passing.passed()
-    return found.of(who[found.track])
+    return found.of(who[found.track]).nowhere()
 
 
 def _alone(found: Passed, passed: Passed) -> Mask:

@@ -48,7 +48,7 @@ def journeys(gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: 
     across = _across(gates, lives, joins)
     probability = np.concatenate([confidence(passed), joins.probability[across.track]])
     reason = [*reasons(passed), *(["joined"] * len(across))]
-    passed = passed.and_also(across.of(joins.before[across.track]))
+    passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
     if metres:
         inferred, sure = beyond(gates, passed, lives, joins, spans)
         probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
@@ -93,7 +93,9 @@ def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floa
     order = np.lexsort((passed.t, vehicle))
     nth = np.cumsum(again[order])
     number = np.empty(len(vehicle), np.int64)
-    number[order] = np.where(nth > nth[np.searchsorted(vehicle[order], vehicle[order])], len(begin) - 1 + nth, vehicle[order])
+    number[order] = np.where(
+        nth > nth[np.searchsorted(vehicle[order], vehicle[order])], len(begin) - 1 + nth, vehicle[order]
+    )
     later = order[again[order]]
     before = order[np.flatnonzero(again[order]) - 1]
     owner = np.concatenate([np.arange(len(begin)), vehicle[later]])

@@ -20,13 +20,14 @@ from vidtrack.traffic.measures.crossings import following, section_speeds, way_n
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.stretches import Lives, Stretches
 from vidtrack.traffic.measures.tables import stamps, table
+from vidtrack.traffic.measures.trip_speeds import TripSpeeds, trip_speeds
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.classes import named, named_by_length
 from vidtrack.traffic.vehicles.vehicles import Vehicles
@@ -62,8 +63,8 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
         for part in (passing, staying, meeting):
             part.add(rows)
         vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
-    passed, lives = passing.passed(), stretches.lives()
-    return _Figures(day, site, gates, ground, reader, passed, lives, staying, meeting, vehicles).measures()
+    lives = stretches.lives()
+    return _Figures(day, site, gates, ground, reader, passing, lives, staying, meeting, vehicles).measures()
 
 
 class _Figures:
@@ -76,7 +77,7 @@ class _Figures:
         gates: Gates,
         ground: Ground | None,
         reader: Reader,
-        passed: Passed,
+        passing: Passing,
         lives: Lives,
         staying: Staying,
         meeting: Meeting,
@@ -84,6 +85,7 @@ class _Figures:
     ) -> None:
         self.day, self.site, self.gates, self.ground = day, site, gates, ground
         self.staying, self.meeting = staying, meeting
+        self.lives, self.ways = lives, passing.ways(len(lives.track))
         self.metres = ground is not None
         self.spans = day.spans
         sessions, track_ids = reader.names
@@ -92,7 +94,7 @@ class _Figures:
         length = self.length = lives.length
         self.kind: list[str | None] = class_of(length, site.classes)
         self.kind_probability = np.full(len(length), np.nan)
-        driven = journeys(gates, passed, lives, self.spans, self.metres)
+        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres)
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
@@ -201,7 +203,7 @@ class _Figures:
         count = np.bincount(whole_tracks, minlength=len(self.vehicle))[trips.vehicle]
         sure = np.ones(len(self.vehicle))
         np.multiply.at(sure, self.vehicle[self.joins.after], self.joins.probability)
-        length = self.length[trips.vehicle]
+        length, pace = self.length[trips.vehicle], self._trip_speeds()
         return table(
             {
                 "run": ("n", self.session[trips.vehicle]),
@@ -216,6 +218,9 @@ class _Figures:
                 "end_s": ("s", trips.to_s),
                 "begin_utc": ("utc", stamps(self.day.utc, trips.from_s)),
                 "end_utc": ("utc", stamps(self.day.utc, trips.to_s)),
+                "mean_speed_kmh": ("km/h", 3.6 * pace.speed),
+                "mean_speed_sigma_kmh": ("km/h", 3.6 * pace.own),
+                "mean_speed_shared_sigma_kmh": ("km/h", 3.6 * pace.shared),
                 "complete": ("yes", complete),
                 "possible": ("yes", possible),
                 "reason": ("", trips.reasons()),
@@ -223,6 +228,12 @@ class _Figures:
                 "join_confidence": ("1", sure[trips.vehicle]),
             }
         )
+
+    def _trip_speeds(self) -> TripSpeeds:
+        if self.metres:
+            return trip_speeds(self.trips, self.passed, self.gates, self.lives, self.vehicle, self.ways)
+        unknown = np.full(len(self.trips.vehicle), np.nan)
+        return TripSpeeds(unknown, unknown, unknown)
 
     def _intervals(self) -> pa.Table:
         gates, bins = self.gates, len(self.watched)

@@ -225,7 +225,12 @@ def _step(state: Floats, row: Floats) -> float:
     if distance > _FAR:
         return distance
     place, pace = now[PXX] / s, now[PXV] / s
-    now[X], now[Y], now[VX], now[VY] = now[X] + place * dx, now[Y] + place * dy, now[VX] + pace * dx, now[VY] + pace * dy
+    now[X], now[Y], now[VX], now[VY] = (
+        now[X] + place * dx,
+        now[Y] + place * dy,
+        now[VX] + pace * dx,
+        now[VY] + pace * dy,
+    )
     now[PVV] -= pace * now[PXV]
     now[PXX], now[PXV], now[LASTING] = (1 - place) * now[PXX], (1 - place) * now[PXV], row[3]
     state[:] = now
