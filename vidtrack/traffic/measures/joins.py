@@ -6,8 +6,8 @@ The odds that they are, against a vehicle that is lost for good and another that
 
 with h the density of the time that a track is lost for, t that of place and velocity in which it is found (Student's
 t of four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after a motion of nearly constant velocity, d
-the difference of the lengths in standard deviations, and the rate at which tracks begin between the gates, per second and
-unit of place and velocity. Stretches of one track are SAME times as likely one vehicle. With other stretches
+the difference of the lengths in standard deviations, and the rate at which tracks begin between the gates, per second
+and unit of place and velocity. Two stretches of one track are SAME times as likely one vehicle. With other stretches
 that compete for the same ends, the probability of a pair is R over 1 + the sum of all R that share an end with it. At
 most one pair of an end is likelier than not, so it is joined.
 """
