@@ -31,7 +31,6 @@ def write(run: RoadRun, folder: Path) -> None:
                     "track_id": piece.track,
                     "piece": piece.number,
                     "class": piece.kind,
-                    "class_probability": piece.sure,
                     "start": start,
                     "time_s": np.round(piece.rows.time, 6).tolist(),
                     "speed_kmh": numbers(3.6 * piece.rows.speed, 3),

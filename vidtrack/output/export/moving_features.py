@@ -51,10 +51,7 @@ def _feature(piece: Piece, start: datetime, lonlat: Floats) -> dict[str, object]
     return {
         "type": "Feature",
         "id": piece.name,
-        "properties": {
-            **{"track_id": piece.track, "piece": piece.number, "name": piece.name},
-            **{"class": piece.kind, "class_probability": piece.sure},
-        },
+        "properties": {"track_id": piece.track, "piece": piece.number, "name": piece.name, "class": piece.kind},
         "temporalGeometry": {
             "type": "MovingPoint",
             "datetimes": datetimes,

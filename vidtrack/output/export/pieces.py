@@ -13,16 +13,11 @@ from vidtrack.output.export.road_run import RoadRun, Rows
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """The rows of a track in frames without a gap.
-
-    number  of the track's pieces, from 1
-    sure    probability of its class; None: not known
-    """
+    """The rows of a track in frames without a gap. `number`: of the track's pieces, from 1."""
 
     track: int
     number: int
     kind: str
-    sure: float | None
     rows: Rows
 
     @property
@@ -41,10 +36,8 @@ def pieces(run: RoadRun) -> Iterator[Piece]:
 
     def ended(track: int) -> Piece:
         counts[track] = counts.get(track, 0) + 1
-        (row,) = run.vehicles.row(np.array([track])).tolist()
-        sure = float(run.vehicles.sure[row])
-        kind, known = str(run.vehicles.kind[row]), np.isfinite(sure)
-        return Piece(track, counts[track], kind, round(sure, 4) if known else None, _joined(parts.pop(track)))
+        (kind,) = run.vehicles.kind[run.vehicles.row(np.array([track]))].tolist()
+        return Piece(track, counts[track], kind, _joined(parts.pop(track)))
 
     for rows in run.batches():
         for part in _unbroken(rows):

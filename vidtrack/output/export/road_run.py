@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,9 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
-from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.lengths import class_of, length_sums, mean_length
-from vidtrack.traffic.measures.rows import Reader
-from vidtrack.traffic.measures.runs import open_day
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
-from vidtrack.traffic.vehicles.classes import named, named_by_length
-from vidtrack.traffic.vehicles.vehicles import Vehicles as Fits
 
 _BATCH = 1 << 16
 """Rows in memory at a time."""
@@ -92,15 +87,13 @@ class Vehicles:
     track    (T,)
     until    (T,) the last frame in which the track was seen; what follows is a guess that nothing confirmed
     length   (T,) m, mean over the track, weighted by the inverse variances; NaN where it is not known
-    kind     (T,) class of the whole track, as `vidtrack measure` has it; by the length where there are no edges
-    sure     (T,) its probability; NaN where it is not known
+    kind     (T,) class by the length, from the site's classes
     """
 
     track: Ints
     until: Ints
     length: Floats
     kind: np.ndarray
-    sure: Floats
 
     def row(self, track: Ints) -> Ints:
         """(N,) where tracks (N,) are in these arrays."""
@@ -174,7 +167,7 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
         raise SourceError(
             f"{folder} has no positions in metres: no vehicle was found inside the points of the site's calibration"
         )
-    vehicles = _whole_tracks(look.vehicles(drawn), folder, drawn)
+    vehicles = look.vehicles(drawn)
     return RoadRun(
         folder, drawn, summary.get("fps"), vehicles, look.low, look.high - look.low, look.rows, look.positions
     )
@@ -212,36 +205,7 @@ class _FirstLook:
         np.maximum.at(until, index, parts[:, 1].astype(np.int64))
         length = mean_length(np.column_stack([np.bincount(index, parts[:, k]) for k in (2, 3)]))
         kind = np.array([name or UNKNOWN for name in class_of(length, site.classes)])
-        return Vehicles(track, until, length, kind, np.full(len(track), np.nan))
-
-
-def _whole_tracks(vehicles: Vehicles, folder: Path, site: Site) -> Vehicles:
-    """The same with lengths and classes by all boxes of each track; unchanged without the columns for it."""
-    day = open_day([str(folder)], site.camera.start)
-    size = day.recordings[0].size
-    drawn = site.scaled(*size)
-    if drawn.calibration is None:
-        return vehicles
-    ground = calibrated(drawn)
-    reader, fits = Reader(day, {size: ground}), Fits(ground)
-    for rows in reader:
-        fits.add(rows.track, rows.t, rows.xy, rows.edge)
-    track = reader.names[1]
-    found = fits.fitted(np.arange(len(track)), np.empty(0, int), np.empty(0))
-    if found is None:
-        return vehicles
-    length, sigma = found.classes.size[:, 0], found.classes.sigma[:, 0]
-    kind, sure = named_by_length(length, sigma, site.classes) if site.classes else named(found.classes)
-    order = np.argsort(track)
-    row = order[np.searchsorted(track[order], vehicles.track)]
-    fitted = np.isfinite(length[row])
-    names = np.array([name or UNKNOWN for name in kind])[row]
-    return replace(
-        vehicles,
-        length=np.where(fitted, length[row], vehicles.length),
-        kind=np.where(fitted, names, vehicles.kind),
-        sure=np.where(fitted, sure[row], np.nan),
-    )
+        return Vehicles(track, until, length, kind)
 
 
 def _known(table: pa.Table) -> Mask:
