@@ -10,8 +10,8 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.rows import Rows
 
 _PLACE_M, _LENGTH_M, _SPEED_M_S = 1.0, 1.5, 3.0
-"""m, m, m/s; standard deviations from which on a rectangle is not known: half the width of a car, a third of its length,
-and the speed of a bicycle. Beyond them most of what comes close in the simulated roads does not."""
+"""m, m, m/s; standard deviations from which on a rectangle is not known: half the width of a car, a third of its
+length, and the speed of a bicycle. Beyond them most of what comes close on the simulated roads does not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
