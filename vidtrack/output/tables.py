@@ -107,6 +107,7 @@ ROAD = (
     _real("length_m", "m"),
     _real("length_sigma_m", "m"),
     _real("width_m", "m"),
+    Column("class", "1", pa.string()),
 )
 """Columns of video tracks at a calibrated site; empty where the calibration is not valid."""
 
@@ -168,7 +169,7 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
     return pa.Table.from_arrays([_array(c, values[c.name]) for c in columns], schema=schema(columns))
 
 
-def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[str, Floats]:
+def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[str, np.ndarray]:
     """The values of ROAD, all (N,); edge (N, 4) px that were seen."""
     from vidtrack.traffic.footprint import Seen
 
@@ -193,6 +194,7 @@ def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[
         "length_m": stand.length,
         "length_sigma_m": stand.length_sigma,
         "width_m": stand.width,
+        "class": np.where(stand.kind == "", None, stand.kind),
     }
 
 

@@ -19,14 +19,16 @@ z, and the derivative of its picture point gives velocities, u in the picture an
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.pace import Pace
+from vidtrack.traffic.vehicles.naming import Naming
 
 _SLENDER, _SLENDER_SIGMA = 0.4, 0.1
 """Width over length of vehicles, from motorcycles and cars (0.4) to lorries (0.25), and its standard deviation."""
@@ -61,6 +63,7 @@ class Stand:
     heading                 (N,) of the vehicle, radians clockwise from north; of one that stands, the last one known
     length, length_sigma    (N,) m; NaN without a heading
     width                   (N,) m; taken from the length
+    kind                    (N,) class by all lengths of the track so far; "" before there is one
     """
 
     xy: Floats
@@ -73,6 +76,7 @@ class Stand:
     length: Floats
     length_sigma: Floats
     width: Floats
+    kind: NDArray[np.str_]
 
     @property
     def speed(self) -> Floats:
@@ -110,10 +114,14 @@ class Footprints:
 
     ground  the calibrated picture
     size    (width, height) px of the picture, whose border cuts boxes
+    classes low and high length of each class of the site [m]; none: those of `classes.CLASSES`
     """
 
-    def __init__(self, ground: Ground, size: tuple[int, int]) -> None:
+    def __init__(
+        self, ground: Ground, size: tuple[int, int], classes: Mapping[str, tuple[float, float]] | None = None
+    ) -> None:
         self.ground = ground
+        self._naming = Naming(classes or {})
         self._size = size
         self._heading: dict[int, Floats] = {}
         self._pace = Pace()
@@ -128,17 +136,23 @@ class Footprints:
         seen   what was seen of them; None: velocities follow from u alone
         """
         box = np.where(self._cut(box)[:, None], np.nan, box)
-        headings = self._headings(track, xy, u, P, box)
         with np.errstate(invalid="ignore"):
+            paced = None if seen is None else self._paced(track, seen)
+            headings = self._headings(track, xy, u, P, box, paced)
             stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
-            return stand if seen is None else self._paced(stand, track, seen)
+            stand = stand if paced is None else self._at_pace(stand, *paced)
+            return replace(stand, kind=self._naming.named(track, stand.length, stand.length_sigma, stand.speed))
 
-    def _paced(self, stand: Stand, track: Ints, seen: Seen) -> Stand:
-        """The same with velocities that were filtered on the road, where their errors are smaller."""
+    def _paced(self, track: Ints, seen: Seen) -> tuple[Floats, Floats]:
+        """(N, 2) velocities that were filtered on the road, and (N, 2, 2) their covariances."""
         ground, (left, _, right, bottom) = self.ground, uncut(seen.edge, self._size).T
         foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
         v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
-        cov = cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
+        return v, cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
+
+    def _at_pace(self, stand: Stand, v: Floats, cov: Floats) -> Stand:
+        """The same with these velocities, where their errors are smaller."""
+        ground = self.ground
         better = np.trace(cov, axis1=1, axis2=2) < np.trace(stand.v_own, axis1=1, axis2=2)
         ahead, behind = stand.xy + v / 2, stand.xy - v / 2  # half a second
         shared = ground.by_shared_error(ahead) - ground.by_shared_error(behind)
@@ -185,20 +199,22 @@ class Footprints:
             length=sides[:, 0],
             length_sigma=np.linalg.norm(length_errors, axis=0)[:, 0],
             width=sides[:, 1],
+            kind=np.full(len(xy), ""),
         )
 
-    def _headings(self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats) -> Floats:
+    def _headings(
+        self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats, paced: tuple[Floats, Floats] | None
+    ) -> Floats:
         """(N, 3) unit vectors along the vehicles, and the angle's standard deviation; NaN for those that have not
-        moved yet."""
-        with np.errstate(invalid="ignore"):
-            middle, _ = footprint(self.ground, box, np.full((len(box), 2), np.nan), _SLENDER)
-            v, M = velocity(self.ground, xy, middle, u)
-            speed = np.linalg.norm(v, axis=1)
-            e = v / speed[:, None]
-            n = np.column_stack([-e[:, 1], e[:, 0]])
-            sigma = np.sqrt(np.einsum("ni,nij,nj->n", n, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2), n)) / speed
-        found = np.column_stack([e, sigma])
-        found[~(sigma < _HEADING_SIGMA)] = np.nan
+        moved yet. The direction of the tracker's velocity, or of that on the road, whichever is better known."""
+        middle, _ = footprint(self.ground, box, np.full((len(box), 2), np.nan), _SLENDER)
+        v, M = velocity(self.ground, xy, middle, u)
+        found = _direction(v, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2))
+        if paced is not None:
+            other = _direction(*paced)
+            better = other[:, 2] < np.where(np.isnan(found[:, 2]), np.inf, found[:, 2])
+            found[better] = other[better]
+        found[~(found[:, 2] < _HEADING_SIGMA)] = np.nan
         return self._remembered(track, found)
 
     def _remembered(self, track: Ints, e: Floats) -> Floats:
@@ -284,6 +300,14 @@ def _nearer(up: Floats, w: Floats, middle: Floats, offset: Floats) -> Floats:
 def _seen_by(ground: Ground, xy: Floats, middle: Floats, u: Floats) -> Floats:
     """(N, 4) position and velocity with one calibration."""
     return np.column_stack([ground.metres(middle), velocity(ground, xy, middle, u)[0]])
+
+
+def _direction(v: Floats, cov: Floats) -> Floats:
+    """(N, 3) unit vectors along velocities (N, 2), and the angle's standard deviation by their covariances."""
+    speed = np.linalg.norm(v, axis=1)
+    e = v / speed[:, None]
+    n = np.column_stack([-e[:, 1], e[:, 0]])
+    return np.column_stack([e, np.sqrt(np.einsum("ni,nij,nj->n", n, cov, n)) / speed])
 
 
 def _turned(e: Floats, angle: Floats) -> Floats:

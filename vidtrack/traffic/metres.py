@@ -42,7 +42,7 @@ def used_site(site: Path, width: int, height: int) -> UsedSite:
     drawn = parse_site(text, site).scaled(width, height)
     if drawn.calibration is None:
         return UsedSite(text, None, {})
-    return UsedSite(text, Footprints(calibrated(drawn), (width, height)), drawn.classes)
+    return UsedSite(text, Footprints(calibrated(drawn), (width, height), drawn.classes), drawn.classes)
 
 
 def footprints_of(site: Path | None, width: int, height: int) -> Footprints | None:

@@ -46,6 +46,7 @@ def way(track, frames, *, length=4.5, heading_deg=30.0, speed=10.0, start=(EAST,
         "length_m": np.full(count, length),
         "length_sigma_m": np.full(count, 0.3),
         "width_m": np.full(count, 1.8),
+        "class": np.full(count, "car", object),
     }
     return rows
 
@@ -54,7 +55,7 @@ def hide(rows, frames, *columns):
     """Empty cells in the given frames; without columns, in all of the road."""
     empty = np.isin(rows["frame"], frames)
     for name in columns or [column.name for column in ROAD]:
-        rows[name] = np.where(empty, np.nan, rows[name])
+        rows[name] = np.where(empty, None if name == "class" else np.nan, rows[name])
     return rows
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from drawn_runs import CALIBRATED, along, site, straight, write_run
 
-from vidtrack.traffic.measures.joins import joined, odds
-from vidtrack.traffic.measures.lives import End
+from vidtrack.traffic.measures.joins import LONGEST_S, joined, odds
 from vidtrack.traffic.measures.measure import measured
+from vidtrack.traffic.measures.stretches import End, Lives
 
 PLACE = CALIBRATED | {"movements": {"allowed": [["west", "east"]]}}
 
@@ -24,6 +24,9 @@ def test_a_whole_trip_and_three_that_are_not(tmp_path):
     assert (rows[1]["entry_gate"], rows[1]["exit_gate"], rows[1]["complete"]) == ("west", "east", True)
     assert (rows[1]["begin_s"], rows[1]["end_s"]) == pytest.approx((10.5, 14.5), abs=1e-3)
     assert rows[1]["possible"] is True
+    assert rows[1]["mean_speed_kmh"] == pytest.approx(36.0, abs=0.01)
+    assert rows[1]["mean_speed_sigma_kmh"] == pytest.approx(3.6 * np.hypot(0.05, 0.05) / 4, abs=0.01)
+    assert rows[2]["mean_speed_kmh"] is None
     assert {track: row["reason"] for track, row in rows.items()} == {
         1: "",
         2: "was there when watching ended",
@@ -35,10 +38,29 @@ def test_a_whole_trip_and_three_that_are_not(tmp_path):
     assert found.report["impossible_movements"] == []
 
 
-def test_at_most_one_trip_a_vehicle(tmp_path):
+def test_who_comes_in_where_a_track_left_is_another_vehicle(tmp_path):
+    """The track of one that leaves goes on as one that comes in on the same leg."""
+    gates = {name: {"line": [[x, y], [x, y + 100]], "leg": leg, "role": role} for name, x, y, leg, role in (
+        ("west_in", 100, 200, "west", "entry"), ("west_out", 100, 300, "west", "exit"),
+        ("east_in", 500, 300, "east", "entry"), ("east_out", 500, 200, "east", "exit"),
+    )}  # fmt: skip
     t = np.arange(0, 20, 0.04)
-    x = np.interp(t, [0, 5, 10, 15, 20], [50, 550, 550, 50, 550])
-    found = measured([write_run(tmp_path / "run", [along(1, t, x)], metres=True)], site(PLACE))
+    turning = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20), np.where(t < 10, 240, 360))
+    rows = (
+        measured([write_run(tmp_path / "run", [turning])], site({"site": PLACE["site"], "gates": gates}))
+        .tables["trips"]
+        .to_pylist()
+    )
+    assert [(row["entry_gate"], row["exit_gate"], row["track_id"]) for row in rows] == [
+        ("west_in", "east_out", 1),
+        ("east_in", "west_out", 1),
+    ]
+
+
+def test_at_most_one_trip_a_vehicle(tmp_path):
+    t = np.arange(0, 25, 0.04)
+    to_and_fro = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20))
+    found = measured([write_run(tmp_path / "run", [to_and_fro], metres=True)], site(PLACE))
     assert len(found.tables["trips"]) == 1
 
 
@@ -66,6 +88,7 @@ def test_a_broken_track_is_joined_and_its_gate_counted(tmp_path):
     row = next(row for row in found.tables["trips"].to_pylist() if row["track_id"] == 1)
     assert (row["complete"], row["tracks"], row["exit_gate"]) == (True, 2, "east")
     assert 0.5 < row["join_confidence"] < 1
+    assert row["mean_speed_kmh"] == pytest.approx(36.0, abs=0.3)
     middle = [r for r in found.tables["crossings"].to_pylist() if r["gate"] == "middle" and r["track_id"] == 1]
     assert [r["reason"] for r in middle] == ["joined"]
     assert middle[0]["confidence"] == row["join_confidence"]
@@ -79,33 +102,81 @@ def test_tracks_that_do_not_fit_stay_apart(tmp_path, gap_s, aside_px):
     assert found.report["joins"] == 0
 
 
-def ends(t, x):
+def end(t, x, v):
     n = len(t)
-    return End(np.array(t), np.column_stack([x, np.zeros(n)]), np.full(n, 0.3), np.tile([10.0, 0.0], (n, 1)))
+    along = (np.column_stack([values, np.zeros(n)]) for values in (x, v))
+    return End(np.array(t), *along, np.tile([0.09, 0.0, 0.25], (n, 1)))
+
+
+def lives(tail, head):
+    n = len(tail.t)
+    return Lives(head, tail, np.full(n, 4.0), np.arange(n), np.full(n, np.inf))
 
 
 def test_of_two_that_fit_alike_neither_is_joined():
-    tail, head = ends([1.0, 0, 0], [0.0, 0, 0]), ends([0.0, 1.5, 1.5], [0.0, 5.0, 5.0])
+    tail, head = end([1.0, 0, 0], [0.0, 0, 0], [10.0] * 3), end([0.0, 1.5, 1.5], [0.0, 5.0, 5.0], [10.0] * 3)
     one, two = np.array([True, False, False]), np.array([False, True, True])
-    assert len(joined(tail, head, np.full(3, 4.0), one, two, 3600.0).before) == 0
-    alone = joined(tail, head, np.full(3, 4.0), one, np.array([False, True, False]), 3600.0)
+    assert len(joined(lives(tail, head), one, two, 3600.0).before) == 0
+    alone = joined(lives(tail, head), one, np.array([False, True, False]), 3600.0)
     assert (alone.before.tolist(), alone.after.tolist()) == ([0], [1])
     assert alone.probability[0] > 0.9
 
 
-def test_odds_are_a_density_over_time_and_place():
-    """The sum over all places and times is the chance to be found again: a half, less the part after 4 s."""
-    gaps, step = np.arange(0.05, 4, 0.1), 0.5
-    x, y = np.meshgrid(np.arange(-60, 60, step), np.arange(-60, 60, step))
-    total = 0.0
-    for gap in gaps:
-        n = x.size + 1
-        t = np.append(0.0, np.full(x.size, gap))
-        xy = np.vstack([[0, 0], np.column_stack([x.ravel(), y.ravel()])])
-        end = End(t, xy, np.full(n, 1.0), np.zeros((n, 2)))
-        pairs = odds(end, end, np.full(n, 4.0), np.zeros(x.size, int), np.arange(1, n))
-        total += pairs.sum() * step**2 * 0.1
-    assert total == pytest.approx(0.5 * (1 - np.exp(-4)), rel=0.01)
+def test_one_that_comes_back_is_another():
+    """At the place where the first one was heading for, but with the opposite velocity."""
+    tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [-10.0] * 2)
+    assert len(joined(lives(tail, head), np.array([True, False]), np.array([False, True]), 60.0).before) == 0
+
+
+def test_odds_are_a_density_over_time_place_and_velocity():
+    """The sum over all states, drawn around the likely ones, is the chance to be found again: a half, less what is
+    later than LONGEST_S."""
+    rng = np.random.default_rng(1)
+    n = 200_000
+    gap = rng.uniform(0, LONGEST_S, n)
+    wide = 3 * np.sqrt([2 + 2 * gap**2 + gap**3, 3 + gap])
+    drawn = rng.standard_normal((2, n, 2))
+    weight = LONGEST_S * (2 * np.pi) ** 2 * np.exp(np.sum(drawn**2, axis=(0, 2)) / 2) * np.prod(wide, axis=0) ** 2
+    xy, v = (np.vstack([[0, 0], values]) for values in wide[:, :, None] * drawn)
+    head = End(np.append(0.0, gap), xy, v, np.tile([1.0, 0.0, 1.0], (n + 1, 1)))
+    pairs = odds(head, head, np.full(n + 1, 4.0), np.zeros(n, int), np.arange(1, n + 1))
+    assert np.mean(pairs * weight) == pytest.approx(0.5 * (1 - np.exp(-LONGEST_S / 2)), rel=0.06)
+
+
+def met(tmp_path, swapped):
+    """Two vehicles that meet in one blob for 0.6 s; their tracks change vehicles there, or not."""
+    t = np.arange(10.0, 15.02, 0.04)
+    east = np.column_stack([50 + 100 * (t - 10), np.full(len(t), 220.0)])
+    west = np.column_stack([550 - 100 * (t - 10), np.full(len(t), 260.0)])
+    later = t > 12.5
+    one = np.where(later[:, None] & swapped, west, east)
+    other = np.where(later[:, None] & swapped, east, west)
+    status = np.where(np.abs(t - 12.5) < 0.3, "merged", "confirmed")
+    return write_run(tmp_path / "run", [along(1, t, *one.T), along(2, t, *other.T)], metres=True, status=status)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_tracks_that_change_vehicles_are_broken_and_joined(tmp_path, swapped):
+    gates = PLACE["gates"] | {name: PLACE["gates"][name] | {"role": "both"} for name in ("west", "east")}
+    found = measured([met(tmp_path, swapped)], site(PLACE | {"gates": gates}))
+    rows = found.tables["trips"].to_pylist()
+    assert sorted((row["entry_gate"], row["exit_gate"], row["complete"]) for row in rows) == [
+        ("east", "west", True),
+        ("west", "east", True),
+    ]
+    assert found.report["joins"] == (2 if swapped else 0)
+    assert {row["tracks"] for row in rows} == ({2} if swapped else {1})
+
+
+def test_a_gate_just_before_a_track_began_is_inferred(tmp_path):
+    late = [straight(k, 10.0 * k, 115 + 70 * (k == 3), 240, 100, 4.8 - 0.8 * (k == 3)) for k in (1, 2, 3)]
+    found = measured([write_run(tmp_path / "run", late, metres=True)], site(PLACE))
+    rows = [row for row in found.tables["crossings"].to_pylist() if row["gate"] == "west"]
+    assert [(row["track_id"], row["reason"]) for row in rows] == [(1, "inferred"), (2, "inferred"), (3, "inferred")]
+    assert [row["time_s"] for row in rows] == pytest.approx([9.85, 19.85, 29.15], abs=0.02)
+    assert all(0.5 < row["confidence"] <= 1 for row in rows)
+    assert rows[2]["confidence"] < rows[1]["confidence"]
+    assert [row["complete"] for row in found.tables["trips"].to_pylist()] == [True] * 3
 
 
 def test_the_balance_is_of_what_was_lost_and_made(tmp_path):

@@ -24,7 +24,7 @@ def fitted(parts, at, track=0, noise=0.0, seed=0):
     edge = np.concatenate([edges_of(part[1], part[2], part[3]) for part in parts])
     edge += noise * rng.standard_normal(edge.shape)
     vehicles.add(np.full(len(t), track), t, xy, edge)
-    found = vehicles.fitted(track + 1, np.full(len(at), track), np.asarray(at, float))
+    found = vehicles.fitted(np.arange(track + 1), np.full(len(at), track), np.asarray(at, float))
     return found.speeds, found.classes
 
 
@@ -94,7 +94,7 @@ def traffic(ground):
         size = np.array(VAN if track % 5 == 4 else CAR) * (1 + 0.01 * (track % 3 - 1))
         edge = edges_of(xy + np.array([0.0, 0.3 * track]), heading, size)
         vehicles.add(np.full(len(t), track), t + 3.0 * track, ground.metres(edge[:, [0, 3]]), edge)
-    return vehicles.fitted(14, np.zeros(0, int), np.zeros(0))
+    return vehicles.fitted(np.arange(14), np.zeros(0, int), np.zeros(0))
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.3, 3.28])
@@ -110,7 +110,7 @@ def test_a_few_vehicles_say_nothing_about_the_scale():
     t, xy, heading = DRIVES["away"]
     vehicles = Vehicles(GROUND)
     vehicles.add(np.zeros(len(t), int), t, xy, edges_of(xy, heading, CAR))
-    assert vehicles.fitted(1, np.zeros(0, int), np.zeros(0)).scale is None
+    assert vehicles.fitted(np.arange(1), np.zeros(0, int), np.zeros(0)).scale is None
 
 
 def test_nothing_is_said_of_boxes_that_are_of_no_vehicle_or_too_few_or_outside_the_points():
@@ -124,5 +124,5 @@ def test_nothing_is_said_of_boxes_that_are_of_no_vehicle_or_too_few_or_outside_t
 
 
 def test_nothing_without_edges_or_without_a_calibration():
-    assert Vehicles(GROUND).fitted(1, np.zeros(1, int), np.zeros(1)) is None
-    assert Vehicles(None).fitted(1, np.zeros(1, int), np.zeros(1)) is None
+    assert Vehicles(GROUND).fitted(np.arange(1), np.zeros(1, int), np.zeros(1)) is None
+    assert Vehicles(None).fitted(np.arange(1), np.zeros(1, int), np.zeros(1)) is None

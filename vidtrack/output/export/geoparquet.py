@@ -41,6 +41,8 @@ def write(run: RoadRun, folder: Path) -> None:
 def _with_points(run: RoadRun) -> Iterator[pa.Table]:
     for table in run.tables():
         kind = run.vehicles.kind[run.vehicles.row(table["track_id"].to_numpy())]
+        if "class" in table.column_names:  # of the row; here it is that of the whole track
+            table = table.drop_columns("class")
         table = table.append_column("class", pa.array(kind, pa.string()))
         if run.start is not None:
             since = np.round(1e6 * table["time_s"].to_numpy()).astype("timedelta64[us]")

@@ -9,6 +9,10 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.rows import Rows
 
+_PLACE_M, _LENGTH_M, _SPEED_M_S = 1.0, 1.5, 3.0
+"""m, m, m/s; standard deviations from which on a rectangle is not known: half the width of a car, a third of its
+length, and the speed of a bicycle. Beyond them most of what comes close on the simulated roads does not."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bodies:
@@ -39,8 +43,11 @@ class Bodies:
 
     @classmethod
     def of(cls, rows: Rows) -> Bodies:
-        """The rows that the picture shows, with a place, a heading and a length."""
+        """The rows that the picture shows, with a place, a heading and a length that are known well enough."""
         known = rows.seen & np.isfinite(rows.length + rows.width + rows.xy[:, 0] + rows.v[:, 0] + rows.spread[:, 0])
+        with np.errstate(invalid="ignore"):
+            known &= rows.spread[:, :2].sum(axis=1) / 2 < _PLACE_M**2
+            known &= (rows.length_sigma < _LENGTH_M) & (rows.speed_sigma < _SPEED_M_S)
         return cls(
             *(rows.track[known], rows.t[known], rows.xy[known], rows.v[known], rows.ahead[known]),
             np.column_stack([rows.length[known], rows.width[known]]),

@@ -86,7 +86,7 @@ def _look(
             dx, dy, wx, wy = xy[j, 0] - xy[i, 0], xy[j, 1] - xy[i, 1], v[j, 0] - v[i, 0], v[j, 1] - v[i, 1]
             far, nearing, w2 = dx * dx + dy * dy, -dx * wx - dy * wy, wx * wx + wy * wy
             reach = own + np.hypot(sides[j, 0], sides[j, 1]) / 2
-            if far > reach * reach and (nearing <= 0 or far - nearing * nearing / w2 > reach * reach):
+            if far > reach * reach and (nearing <= 0 or (far - reach * reach) * w2 > nearing * nearing):
                 continue  # the circles around them never meet
             ttc, nx, ny = _touch(dx, dy, wx, wy, ahead[i], ahead[j], sides[i], sides[j])
             if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(sigma[i], sigma[j]):

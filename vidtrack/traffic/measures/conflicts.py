@@ -16,6 +16,8 @@ _ACROSS_RAD, _AGAINST_RAD = np.radians(85), np.radians(150)
 """Angles from which on vehicles cross (SSAM), and meet head-on"""
 _KINDS = np.array(["rear-end", "merging", "crossing", "head-on"])
 TTC, PET = range(2)
+_CLEAR = 2.0
+"""Standard deviations from 0"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,13 +82,15 @@ class Meeting:
         """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break.
 
         Two that are in one place at one time have no post-encroachment time: vehicles are not, so it is their error.
+        So have those whose time does not differ from 0 by _CLEAR of its standard deviations.
         """
         if self._recent is not None and len(self._recent):
             self._look(self._recent, until=np.inf)
         both = (Encounters.together(found).between(vehicle) for found in (self._closed, self._encroached))
         closed, encroached = (found.only(found.least()) for found in both)
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
-        return _joined(closed, encroached.only((span[0] == span[1]) & (encroached.rank > 0)))
+        clear = (encroached.rank > 0) & (encroached.value > _CLEAR * encroached.sigma)
+        return _joined(closed, encroached.only((span[0] == span[1]) & clear))
 
     def settled(self) -> Conflicts:
         """What was found of tracks that have not come closer for PET_S, once; it is forgotten then."""

@@ -41,6 +41,24 @@ class Gates:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def inward(self) -> Ints:
+        """(G,) the side of each gate on which the middle of all entries and exits lies, as `Passed` has it."""
+        ends = np.stack([self.segment[self.first[:-1], :2], self.segment[self.first[1:] - 1, 2:]])
+        within = self.role("entry", "exit", "both")
+        middle = ends[:, within].mean(axis=(0, 1)) if within.any() else np.zeros(2)
+        (dx, dy), (x, y) = (ends[1] - ends[0]).T, (middle - ends[0]).T
+        return (dx * y - dy * x >= 0).astype(np.int64)
+
+    def place(self, gate: Ints, along: Floats) -> Floats:
+        """(N, 2) the places on gates (N,) so far along them (N,)."""
+        owner = np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
+        apart = self.begin.max(initial=0) + np.abs(along).max(initial=0) + 1.0  # one axis for all gates
+        s = np.searchsorted(self.begin + apart * owner, along + apart * gate, side="right") - 1
+        start, end = self.segment[s, :2], self.segment[s, 2:]
+        ahead = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
+        return np.asarray(start + (along - self.begin[s])[:, None] * ahead)
+
     def role(self, *wanted: str) -> Mask:
         """(G,) whether a gate has one of these roles."""
         return np.isin(np.array(self.roles, dtype=str), wanted)

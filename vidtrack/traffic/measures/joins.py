@@ -2,10 +2,12 @@
 
 The odds that they are, against a vehicle that is lost for good and another that begins by chance, are
 
-    R = 1/2 h(gap) N(difference of positions; 0, S) exp(-d^2 / 2) / rate
+    R = 1/2 h(gap) t(difference of states; S) exp(-d^2 / 2) / rate
 
-with h the density of the time that a track is lost for, N that of where it is found (m^-2), d the difference of the
-lengths in standard deviations, and the rate at which tracks begin between the gates (s^-1 m^-2). With other tracks
+with h the density of the time that a track is lost for, t that of place and velocity in which it is found (Student's
+t of four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after a motion of nearly constant velocity, d
+the difference of the lengths in standard deviations, and the rate at which tracks begin between the gates, per second
+and unit of place and velocity. Two stretches of one track are SAME times as likely one vehicle. With other stretches
 that compete for the same ends, the probability of a pair is R over 1 + the sum of all R that share an end with it. At
 most one pair of an end is likelier than not, so it is joined.
 """
@@ -17,16 +19,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.traffic.measures.lives import End
 from vidtrack.traffic.measures.rows import Rows, off_road
+from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M_S, STANDING_JOLT, End, Lives
 
-LONGEST_S = 4.0
-_LOST_S = 1.0
+LONGEST_S = 8.0
+_LOST_S = 2.0
 """s; mean time that a track is lost for"""
-_SPEED_SIGMA = 1.0
-"""m/s; of the velocity with which a track ends"""
-_ACCELERATION = 2.0
-"""m/s2; standard deviation of what a driver does meanwhile"""
+OVERLAP_S = 0.3
+"""s; a track that is lost may be seen so long after the one began that goes on"""
+SAME = 10.0
+_FREEDOM = 4.0
+"""of Student's t: states of tracks that have just shared a blob are off by more than they say"""
+_VELOCITIES = 400.0
+"""(m/s)2; over which the velocities of tracks that begin are spread"""
 _LENGTH_SIGMA = 0.25
 """Standard deviation of the logarithm of a length, from one track of a vehicle to another"""
 
@@ -48,24 +53,24 @@ class Joins:
         return first
 
 
-def joined(tail: End, head: End, length: Floats, ends: Mask, begins: Mask, watched_s: float) -> Joins:
-    """The joins of T tracks.
+def joined(lives: Lives, ends: Mask, begins: Mask, watched_s: float) -> Joins:
+    """The joins of T stretches.
 
-    length         (T,) m
-    ends, begins   (T,) tracks that end, and that begin, between the gates
+    ends, begins   (T,) those that end, and that begin, between the gates
     watched_s      s; time in which they began
     """
+    tail, head = lives.tail, lives.head
     last, first = np.flatnonzero(ends), np.flatnonzero(begins)
     last, first = last[np.argsort(tail.t[last])], first[np.argsort(head.t[first])]
-    begin = np.searchsorted(head.t[first], tail.t[last], side="right")
+    begin = np.searchsorted(head.t[first], tail.t[last] - OVERLAP_S, side="right")
     count = np.searchsorted(head.t[first], tail.t[last] + LONGEST_S, side="right") - begin
     a = np.repeat(last, count)
     b = first[np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - begin, count)]
     if len(a) == 0:
         return Joins(a, b, np.empty(0))
     area = np.prod(np.ptp(head.xy[first], axis=0) + 1.0)
-    rate = len(first) / (watched_s * area)
-    R = odds(tail, head, length, a, b) / rate
+    rate = len(first) / (watched_s * area * _VELOCITIES)
+    R = odds(tail, head, lives.length, a, b) * np.where(lives.track[a] == lives.track[b], SAME, 1.0) / rate
     shared = np.bincount(a, R, len(ends))[a] + np.bincount(b, R, len(ends))[b] - R
     probability = R / (1 + shared)
     likely = probability > 0.5
@@ -73,30 +78,45 @@ def joined(tail: End, head: End, length: Floats, ends: Mask, begins: Mask, watch
 
 
 def odds(tail: End, head: End, length: Floats, a: Ints, b: Ints) -> Floats:
-    """(J,) density with which the vehicle of track a is found again as track b, 1/(s m2)."""
-    gap = head.t[b] - tail.t[a]
-    off = head.xy[b] - tail.xy[a] - gap[:, None] * np.nan_to_num(tail.v[a])
-    variance = tail.sigma[a] ** 2 + head.sigma[b] ** 2
-    variance += (_SPEED_SIGMA * gap) ** 2 + (_ACCELERATION * gap**2 / 2) ** 2
-    place = np.exp(-np.sum(off**2, axis=1) / (2 * variance)) / (2 * np.pi * variance)
+    """(J,) density with which the vehicle of stretch a is found again as stretch b, 1/(s m2 (m/s)2)."""
+    gap = np.maximum(head.t[b] - tail.t[a], 0.0)
+    place = head.xy[b] - tail.xy[a] - gap[:, None] * tail.v[a]
+    pace = head.v[b] - tail.v[a]
+    jolt = STANDING_JOLT + JOLT_PER_M_S * np.linalg.norm(tail.v[a], axis=1)
+    (xx, xv, vv), (x2, xv2, v2) = tail.spread[a].T, head.spread[b].T
+    sxx = xx + 2 * gap * xv + gap**2 * vv + jolt * gap**3 / 3 + x2
+    sxv = xv + gap * vv + jolt * gap**2 / 2 + xv2
+    svv = vv + jolt * gap + v2 + MODEL_M_S**2
+    det = sxx * svv - sxv**2
+    square = (svv * _dot(place, place) - 2 * sxv * _dot(place, pace) + sxx * _dot(pace, pace)) / det
+    found = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det * (1 + square / _FREEDOM) ** -(2 + _FREEDOM / 2)
     size = np.nan_to_num(np.log(length[b] / length[a]) / _LENGTH_SIGMA)
-    return np.asarray(0.5 * np.exp(-gap / _LOST_S) / _LOST_S * place * np.exp(-(size**2) / 2))
+    return np.asarray(0.5 * np.exp(-gap / _LOST_S) / _LOST_S * found * np.exp(-(size**2) / 2))
 
 
-def gap_rows(tail: End, head: End, joins: Joins) -> Rows:
-    """(2 J,) rows that bridge the gaps: the end of the one track and the beginning of the other, `track` the join.
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.sum(a * b, axis=1))
 
-    How fast a vehicle went meanwhile is not known.
-    """
-    last, first = joins.before, joins.after
 
-    def both(name: str) -> Floats:
-        return np.stack([getattr(tail, name)[last], getattr(head, name)[first]], axis=1).reshape(
-            2 * len(last), *getattr(tail, name).shape[1:]
-        )
+def gap_rows(lives: Lives, joins: Joins) -> Rows:
+    """(2 J,) rows that bridge the gaps: the end of the one stretch and the beginning of the other, `track` the join."""
+    tail, head = (_at(end, who) for end, who in ((lives.tail, joins.before), (lives.head, joins.after)))
+    return step_rows(tail, head)
 
-    rows = 2 * len(last)
+
+def step_rows(begin: End, end: End) -> Rows:
+    """(2 J,) rows of J steps from a state to another, `track` the step. How fast a vehicle went is not known."""
+
+    def both(*columns: Floats) -> Floats:
+        return np.stack(columns, axis=1).reshape(2 * len(begin.t), *columns[0].shape[1:])
+
+    rows = 2 * len(begin.t)
     yes = np.ones(rows, bool)
-    number = np.repeat(np.arange(len(last)), 2)
-    state = both("xy"), both("sigma"), np.zeros(rows), np.full((rows, 2), np.nan)
-    return Rows(number, both("t"), yes, ~yes, *state, *off_road(rows))
+    number = np.repeat(np.arange(len(begin.t)), 2)
+    sigma = np.sqrt(both(begin.spread[:, 0], end.spread[:, 0]))
+    state = both(begin.xy, end.xy), sigma, np.zeros(rows), np.full((rows, 2), np.nan)
+    return Rows(number, both(begin.t, end.t), yes, ~yes, *state, *off_road(rows))
+
+
+def _at(end: End, who: Ints) -> End:
+    return End(end.t[who], end.xy[who], end.v[who], end.spread[who])

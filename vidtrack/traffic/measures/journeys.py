@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.traffic.measures.beyond import beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
-from vidtrack.traffic.measures.lives import End
 from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
+from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, trips_of
 
 
@@ -21,8 +22,8 @@ class Journeys:
 
     passed        P passings, those within gaps too
     probability   (P,) that the vehicle passed; reason (P,) what this rests on
-    joins         which tracks go on as others
-    vehicle       (T,) number of the first track of the vehicle that each track is of
+    joins         which stretches go on as others
+    vehicle       (T,) number of the first stretch of the vehicle that each stretch is of
     trips         of the vehicles
     """
 
@@ -34,48 +35,84 @@ class Journeys:
     trips: Trips
 
 
-def journeys(
-    gates: Gates, passed: Passed, head: End, tail: End, length: Floats, spans: Floats, metres: bool
-) -> Journeys:
-    """The journeys of T tracks.
+def journeys(gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool) -> Journeys:
+    """The journeys of T stretches of tracks.
 
-    passed       passings of tracks
-    head, tail   where tracks began and ended
-    length       (T,) m
-    spans        (S, 2) s; what was watched
-    metres       positions are on the road; else broken tracks are not joined
+    passed   passings of stretches
+    spans    (S, 2) s; what was watched
+    metres   positions are on the road; else broken tracks are not joined
     """
-    joins = _joins(gates, passed, head, tail, length, spans) if metres else _NONE
-    vehicle = joins.vehicles(len(head.t))
-    across = _across(gates, head, tail, joins)
+    passed = passed.only(passed.t <= lives.until[passed.track])
+    joins = _joins(gates, passed, lives, spans) if metres else _NONE
+    vehicle = joins.vehicles(len(lives.track))
+    across = _across(gates, lives, joins)
     probability = np.concatenate([confidence(passed), joins.probability[across.track]])
     reason = [*reasons(passed), *(["joined"] * len(across))]
-    passed = passed.and_also(across.of(joins.before[across.track]))
+    passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
+    if metres:
+        inferred, sure = beyond(gates, passed, lives, joins, spans)
+        probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
+        passed = passed.and_also(inferred)
     order = np.argsort(passed.t, kind="stable")
     passed, probability, reason = passed.only(order), probability[order], [reason[k] for k in order.tolist()]
     begin = np.full(len(vehicle), np.inf)
     end = -begin
-    np.fmin.at(begin, vehicle, head.t)
-    np.fmax.at(end, vehicle, tail.t)
-    trips = trips_of(passed, gates, vehicle[passed.track], begin, end, spans)
+    np.fmin.at(begin, vehicle, lives.head.t)
+    np.fmax.at(end, vehicle, lives.tail.t)
+    trips = _trips(gates, passed, vehicle[passed.track], begin, end, spans)
     return Journeys(passed, probability, reason, joins, vehicle, trips)
 
 
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 
-def _joins(gates: Gates, passed: Passed, head: End, tail: End, length: Floats, spans: Floats) -> Joins:
-    """Joins of tracks that end before an exit, and of those that begin after an entry."""
-    left, entered = np.zeros((2, len(head.t)), bool)
-    left[passed.track[gates.role("exit", "both")[passed.gate]]] = True
-    entered[passed.track[gates.role("entry", "both")[passed.gate]]] = True
-    ends = ~left & np.isfinite(tail.t) & ~at_edge(tail.t, spans[:, 1])
-    begins = ~entered & np.isfinite(head.t) & ~at_edge(head.t, spans[:, 0])
-    return joined(tail, head, length, ends, begins, float(np.diff(spans).sum()))
+def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats) -> Joins:
+    """Joins of stretches that end before an exit, and of those that begin after an entry."""
+    left, entered = np.zeros((2, len(lives.track)), bool)
+    both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
+    left[passed.track[gates.role("exit")[passed.gate] | (both & ~inwards)]] = True
+    entered[passed.track[gates.role("entry")[passed.gate] | (both & inwards)]] = True
+    ends = ~left & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
+    begins = ~entered & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
+    return joined(lives, ends, begins, float(np.diff(spans).sum()))
 
 
-def _across(gates: Gates, head: End, tail: End, joins: Joins) -> Passed:
+def _across(gates: Gates, lives: Lives, joins: Joins) -> Passed:
     """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
     passing = Passing(gates, REACH_M)
-    passing.add(gap_rows(tail, head, joins))
+    passing.add(gap_rows(lives, joins))
     return passing.passed()
+
+
+def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
+    """The trips of vehicles; those of one that comes in again where it has left are of another vehicle.
+
+    A track that leaves the picture may go on as a vehicle that comes in there.
+    """
+    again = _comes_again(gates, passed, vehicle)
+    order = np.lexsort((passed.t, vehicle))
+    nth = np.cumsum(again[order])
+    number = np.empty(len(vehicle), np.int64)
+    number[order] = np.where(
+        nth > nth[np.searchsorted(vehicle[order], vehicle[order])], len(begin) - 1 + nth, vehicle[order]
+    )
+    later = order[again[order]]
+    before = order[np.flatnonzero(again[order]) - 1]
+    owner = np.concatenate([np.arange(len(begin)), vehicle[later]])
+    end = np.concatenate([end, end[vehicle[later]]])
+    end[number[before]] = passed.t[before]
+    trips = trips_of(passed, gates, number, np.concatenate([begin, passed.t[later]]), end, spans)
+    return replace(trips, vehicle=owner[trips.vehicle])
+
+
+def _comes_again(gates: Gates, passed: Passed, vehicle: Ints) -> Mask:
+    """(P,) whether a vehicle passes an entry of the leg whose exit it passed last, another gate."""
+    legs = np.unique(np.array(gates.legs), return_inverse=True)[1]
+    role = np.flatnonzero(gates.role("entry", "exit")[passed.gate])
+    order = role[np.lexsort((passed.t[role], vehicle[role]))]
+    gate, who = passed.gate[order], vehicle[order]
+    again = np.zeros(len(vehicle), bool)
+    if len(order) > 1:
+        same = (who[1:] == who[:-1]) & (legs[gate[1:]] == legs[gate[:-1]]) & (gate[1:] != gate[:-1])
+        again[order[1:]] = same & gates.role("exit")[gate[:-1]] & gates.role("entry")[gate[1:]]
+    return again

@@ -20,13 +20,14 @@ from vidtrack.traffic.measures.crossings import following, section_speeds, way_n
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.lives import Lives
-from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
+from vidtrack.traffic.measures.stretches import Lives, Stretches
 from vidtrack.traffic.measures.tables import stamps, table
+from vidtrack.traffic.measures.trip_speeds import TripSpeeds, trip_speeds
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.classes import named, named_by_length
 from vidtrack.traffic.vehicles.vehicles import Vehicles
@@ -54,16 +55,16 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
     reach = REACH_PX if site.calibration is None else REACH_M
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
-    reader, passing, lives = Reader(day, grounds), Passing(gates, reach), Lives()
-    staying = Staying(outlines, metres=site.calibration is not None)
-    ground = grounds[sizes[0]]
-    meeting, vehicles = Meeting(), Vehicles(ground)
-    for rows in reader:
-        for part in (passing, lives, staying, meeting):
+    metres, ground = site.calibration is not None, grounds[sizes[0]]
+    reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, reach)
+    staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
+    for whole in reader:
+        rows = stretches.add(whole)
+        for part in (passing, staying, meeting):
             part.add(rows)
         vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
-    passed = passing.passed()
-    return _Figures(day, site, gates, ground, reader, passed, lives, staying, meeting, vehicles).measures()
+    lives = stretches.lives()
+    return _Figures(day, site, gates, ground, reader, passing, lives, staying, meeting, vehicles).measures()
 
 
 class _Figures:
@@ -76,7 +77,7 @@ class _Figures:
         gates: Gates,
         ground: Ground | None,
         reader: Reader,
-        passed: Passed,
+        passing: Passing,
         lives: Lives,
         staying: Staying,
         meeting: Meeting,
@@ -84,25 +85,27 @@ class _Figures:
     ) -> None:
         self.day, self.site, self.gates, self.ground = day, site, gates, ground
         self.staying, self.meeting = staying, meeting
+        self.lives, self.ways = lives, passing.ways(len(lives.track))
         self.metres = ground is not None
         self.spans = day.spans
-        self.session, self.track_id = reader.names
-        tracks = len(self.track_id)
-        length = self.length = lives.length(tracks)
+        sessions, track_ids = reader.names
+        self.tracks = len(track_ids)
+        self.session, self.track_id = sessions[lives.track], track_ids[lives.track]
+        length = self.length = lives.length
         self.kind: list[str | None] = class_of(length, site.classes)
-        self.kind_probability = np.full(tracks, np.nan)
-        found = vehicles.fitted(tracks, passed.track, passed.t)
+        self.kind_probability = np.full(len(length), np.nan)
+        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres)
+        self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
+        self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
+        found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
         self.scale = None if found is None else found.scale
         if found is not None:
-            passed = passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
+            self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
             self.length = np.where(np.isnan(found.classes.size[:, 0]), length, found.classes.size[:, 0])
             if site.classes:
                 self.kind, self.kind_probability = named_by_length(self.length, found.classes.sigma[:, 0], site.classes)
             else:
                 self.kind, self.kind_probability = named(found.classes)
-        driven = journeys(gates, passed, lives.head(tracks), lives.tail(tracks), length, self.spans, self.metres)
-        self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
-        self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
         zone = site.camera.start
@@ -138,7 +141,7 @@ class _Figures:
             ],
             "utc_of_time_0": None if self.day.utc is None else self.day.utc.isoformat(),
             "watched_s": round(float(np.diff(self.spans).sum()), 3),
-            "tracks": len(self.track_id),
+            "tracks": self.tracks,
             "crossings": len(self.passed),
             "trips": len(self.trips.vehicle),
             "complete_trips": int(self.trips.complete.sum()),
@@ -196,10 +199,11 @@ class _Figures:
             (pair in allowed) if whole and allowed else None
             for whole, pair in zip(complete, zip(from_leg, to_leg, strict=True), strict=True)
         ]
-        count = np.bincount(self.vehicle, minlength=len(self.vehicle))[trips.vehicle]
+        whole_tracks = np.unique(np.column_stack([self.vehicle, self.session, self.track_id]), axis=0)[:, 0]
+        count = np.bincount(whole_tracks, minlength=len(self.vehicle))[trips.vehicle]
         sure = np.ones(len(self.vehicle))
         np.multiply.at(sure, self.vehicle[self.joins.after], self.joins.probability)
-        length = self.length[trips.vehicle]
+        length, pace = self.length[trips.vehicle], self._trip_speeds()
         return table(
             {
                 "run": ("n", self.session[trips.vehicle]),
@@ -214,6 +218,9 @@ class _Figures:
                 "end_s": ("s", trips.to_s),
                 "begin_utc": ("utc", stamps(self.day.utc, trips.from_s)),
                 "end_utc": ("utc", stamps(self.day.utc, trips.to_s)),
+                "mean_speed_kmh": ("km/h", 3.6 * pace.speed),
+                "mean_speed_sigma_kmh": ("km/h", 3.6 * pace.own),
+                "mean_speed_shared_sigma_kmh": ("km/h", 3.6 * pace.shared),
                 "complete": ("yes", complete),
                 "possible": ("yes", possible),
                 "reason": ("", trips.reasons()),
@@ -221,6 +228,12 @@ class _Figures:
                 "join_confidence": ("1", sure[trips.vehicle]),
             }
         )
+
+    def _trip_speeds(self) -> TripSpeeds:
+        if self.metres:
+            return trip_speeds(self.trips, self.passed, self.gates, self.lives, self.vehicle, self.ways)
+        unknown = np.full(len(self.trips.vehicle), np.nan)
+        return TripSpeeds(unknown, unknown, unknown)
 
     def _intervals(self) -> pa.Table:
         gates, bins = self.gates, len(self.watched)

@@ -19,7 +19,10 @@ from vidtrack.traffic.measures.rows import Rows
 REACH_M, REACH_PX = 10.0, 100.0
 """How far from a gate distances are looked at: many times what positions are off."""
 
-TIME, ALONG, SIGMA, SPEED, SPEED_SIGMA, SPEED_SHARED, BEFORE, AFTER = range(8)
+_CORNER = 2.0
+"""Distance of the corners along which ways are measured: jitter of positions lengthens them by little."""
+
+TIME, ALONG, SIGMA, SPEED, SPEED_SIGMA, SPEED_SHARED, BEFORE, AFTER, WAY = range(9)
 GATE, TRACK, SIDE, LAST, SEEN, SHOWN, MERGED = range(7)
 _T, _X, _Y, _SIGMA, _SPEED, _SPEED_SIGMA, _SPEED_SHARED = range(7)
 
@@ -36,6 +39,7 @@ class Passed:
     before, after (P,) largest distances from the gate that the track was seen at before and after
     shown, merged (P,) the picture shows the track just then; it shares a blob
     speed, speed_sigma, speed_shared   (P,) in the unit of positions per second
+    way           (P,) what the track had driven since it began; NaN where that is not known
     """
 
     t: Floats
@@ -51,6 +55,7 @@ class Passed:
     speed: Floats
     speed_sigma: Floats
     speed_shared: Floats
+    way: Floats
 
     def __len__(self) -> int:
         return len(self.t)
@@ -71,6 +76,10 @@ class Passed:
     def of(self, track: Ints) -> Passed:
         """The same passings of other tracks (P,)."""
         return replace(self, track=track)
+
+    def nowhere(self) -> Passed:
+        """The same passings, outside of what the tracks drove."""
+        return replace(self, way=np.full(len(self), np.nan))
 
     def with_speeds(self, speed: Floats, own: Floats, shared: Floats) -> Passed:
         """The same passings with other speeds (P,) and standard deviations."""
@@ -98,7 +107,8 @@ class Passing:
         self._state = np.full((0, 7), np.nan)
         self._far = np.zeros((0, len(gates)))
         self._last = np.full((0, len(gates)), -1)
-        self._real = np.zeros((0, 8))
+        self._way = np.full((0, 3), np.nan)
+        self._real = np.zeros((0, 9))
         self._whole = np.zeros((0, 7), np.int64)
         self._count = 0
 
@@ -110,7 +120,7 @@ class Passing:
         if tracks > len(self._state):
             more = max(tracks, 2 * len(self._state))
             self._state, self._far = _longer(self._state, more, np.nan), _longer(self._far, more, 0.0)
-            self._last = _longer(self._last, more, -1)
+            self._last, self._way = _longer(self._last, more, -1), _longer(self._way, more, np.nan)
         speed = np.hypot(rows.v[:, 0], rows.v[:, 1])
         values = np.column_stack([rows.t, rows.xy, rows.sigma, speed, rows.speed_sigma, rows.speed_shared])
         row = 0
@@ -121,7 +131,7 @@ class Passing:
             row, self._count = _look(
                 row, self._count, values, rows.track, rows.margin, rows.seen, rows.merged,
                 self._gates.segment, self._gates.begin, self._gates.first, self._frame, self._reach,
-                self._state, self._far, self._last, self._real, self._whole,
+                self._state, self._way, self._far, self._last, self._real, self._whole,
             )  # fmt: skip
 
     def passed(self) -> Passed:
@@ -146,7 +156,15 @@ class Passing:
             speed=real[:, SPEED],
             speed_sigma=real[:, SPEED_SIGMA],
             speed_shared=real[:, SPEED_SHARED],
+            way=real[:, WAY],
         )
+
+    def ways(self, tracks: int) -> Floats:
+        """(T,) what each track has driven in all, with corners _CORNER apart; 0 for those of which nothing is known."""
+        way = _longer(self._way, max(tracks, len(self._way)), np.nan)[:tracks]
+        state = _longer(self._state, max(tracks, len(self._state)), np.nan)[:tracks]
+        rest = np.hypot(state[:, _X] - way[:, 0], state[:, _Y] - way[:, 1])
+        return np.asarray(np.nan_to_num(way[:, 2] + rest))
 
 
 def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:
@@ -160,11 +178,12 @@ def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:
 def _look(
     row: int, count: int, values: Floats, track: Ints, margin: Floats, seen: Mask, merged: Mask,
     segment: Floats, begin: Floats, first: Ints, frame: Floats, reach: float,
-    state: Floats, far: Floats, last: Ints, real: Floats, whole: Ints,
+    state: Floats, way: Floats, far: Floats, last: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the passings need more room; the next row and passing.
 
     values  (N, 7) of rows; state (T, 7) the last ones of each track
+    way     (T, 3) of each track the corner passed last, x, y, and what it had driven there
     frame   (G, 4) around each gate, `reach` beyond it
     far     (T, G) largest distance from the gate since the track passed it last; last (T, G) that passing, or -1
     real, whole   the passings: columns TIME... and GATE...
@@ -177,6 +196,8 @@ def _look(
         if np.isnan(x):
             continue
         x0, y0 = state[k, _X], state[k, _Y]
+        if np.isnan(way[k, 0]):
+            way[k, 0], way[k, 1], way[k, 2] = x, y, 0.0
         for g in range(gates):
             left, low, right, high = frame[g, 0], frame[g, 1], frame[g, 2], frame[g, 3]
             side = -1
@@ -197,6 +218,8 @@ def _look(
                 else:
                     _note(real[count], values[i], state[k], share)
                     real[count, ALONG] = along
+                    px, py = x0 + share * (x - x0), y0 + share * (y - y0)
+                    real[count, WAY] = way[k, 2] + np.hypot(px - way[k, 0], py - way[k, 1])
                     real[count, BEFORE] = far[k, g]
                     whole[count, GATE], whole[count, TRACK], whole[count, SIDE] = g, k, side
                     whole[count, LAST], whole[count, SEEN] = passing, 0
@@ -213,6 +236,9 @@ def _look(
                 real[passing, AFTER] = far[k, g]
                 whole[passing, SEEN] |= seen[i]
         state[k] = values[i]
+        step = np.hypot(x - way[k, 0], y - way[k, 1])
+        if step >= _CORNER:
+            way[k, 0], way[k, 1], way[k, 2] = x, y, way[k, 2] + step
     return len(track), count
 
 

@@ -14,11 +14,11 @@ from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.checks import movements
 from vidtrack.traffic.measures.gates import gates_of
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.lives import Lives
 from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passed, Passing
 from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import has_tracks, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
+from vidtrack.traffic.measures.stretches import Stretches
 from vidtrack.traffic.site import Calibration, Fault, Gate, Point, Site
 
 MOST_ROWS = 4_000_000
@@ -72,10 +72,10 @@ class Recount:
         self._lay_on(site, ground)
         faults = self._look_over_gates(site, ground) + self._look_into_zones(site, ground)
         gates = {name: gate for name, gate in site.gates.items() if gate.line in self._passed}
-        vehicle, counts, moved, trips = np.arange(len(self._ends[0].t)), {}, [], 0
+        vehicle, counts, moved, trips = np.arange(len(self._lives.track)), {}, [], 0
         if gates:
             all_gates = gates_of(site.model_copy(update={"gates": gates}), ground)
-            found = journeys(all_gates, self._passings(gates), *self._ends, self._day.spans, ground is not None)
+            found = journeys(all_gates, self._passings(gates), self._lives, self._day.spans, ground is not None)
             vehicle, trips = found.vehicle, len(found.trips.vehicle)
             ways = np.bincount(2 * found.passed.gate + found.passed.side, minlength=2 * len(gates)).reshape(-1, 2)
             counts = {
@@ -128,15 +128,13 @@ class Recount:
                 return
 
     def _read(self, calibration: Calibration | None, ground: Ground | None) -> None:
-        reader, lives, blocks = Reader(self._day, {self.size: ground}), Lives(), list[Rows]()
-        for rows in reader:
+        stretches, blocks = Stretches(metres=ground is not None), list[Rows]()
+        for rows in Reader(self._day, {self.size: ground}):
             if sum(map(len, blocks)) >= self._most:
                 self.until_s = float(blocks[-1].t[-1])
                 break
-            blocks.append(rows)
-            lives.add(rows)
-        tracks = len(reader.names[0])
-        self._ends = lives.head(tracks), lives.tail(tracks), lives.length(tracks)
+            blocks.append(stretches.add(rows))
+        self._lives = stretches.lives()
         self._calibration, self._rows = calibration, blocks
         self._passed: dict[tuple[Point, ...], Passed] = {}
         self._stays: dict[tuple[Point, ...], Staying] = {}

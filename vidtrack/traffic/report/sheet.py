@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import betaincinv
 
 from vidtrack.arrays.types import Floats, Mask
+from vidtrack.traffic.proportion import clopper_pearson
 from vidtrack.traffic.report.findings import Findings
 from vidtrack.traffic.report.turns import TURNS
 
@@ -121,8 +121,7 @@ def peak_hour_factor(counts: Floats) -> tuple[float, float, float]:
     volume, n = counts.sum(), len(counts)
     if volume == 0:
         return np.nan, np.nan, np.nan
-    low = betaincinv(np.maximum(counts, 0.5), volume - counts + 1, _TAIL / n) * (counts > 0)
-    high = np.where(counts < volume, betaincinv(counts + 1, np.maximum(volume - counts, 0.5), 1 - _TAIL), 1.0)
+    low, high = clopper_pearson(counts, volume, _TAIL / n, _TAIL)
     share = n * np.array([counts.max() / volume, high.max(), max(low.max(), 1 / n)])
     factor, least, most = (1 / share).tolist()
     return factor, least, most

@@ -10,10 +10,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import betaincinv, gammaincinv
+from scipy.special import gammaincinv
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError
+from vidtrack.traffic.proportion import clopper_pearson
 from vidtrack.traffic.validation.event_matching import match
 from vidtrack.traffic.validation.event_tables import Events, written
 
@@ -152,9 +153,8 @@ def figures_of(tally: Ints, hours: float) -> Figures:
 
 
 def proportion(part: float, whole: float) -> Estimate:
-    """A share with the exact interval of Clopper and Pearson (1934), which holds the truth in at least 95 %."""
-    low = betaincinv(part, whole - part + 1, _TAIL) if part > 0 else 0.0
-    high = betaincinv(part + 1, whole - part, 1 - _TAIL) if part < whole else 1.0
+    """A share with an interval that holds the truth in at least 95 %."""
+    low, high = clopper_pearson(part, whole, _TAIL, _TAIL)
     return Estimate(part / whole, float(low), float(high))
 
 

@@ -48,10 +48,14 @@ class Vehicles:
         if self._ground is not None:
             self._knotting.add(track, t, xy, edge)
 
-    def fitted(self, tracks: int, track: Ints, t: Floats) -> Fitted | None:
-        """Speeds of tracks (W,) at times (W,) s, and the classes of all `tracks`; None without edges."""
+    def fitted(self, vehicle: Ints, track: Ints, t: Floats) -> Fitted | None:
+        """Speeds of tracks (W,) at times (W,) s, and the classes of all T; None without edges.
+
+        vehicle  (T,) number of the first track of the vehicle that each track is of: they have one size
+        """
         if self._ground is None:
             return None
+        tracks = len(vehicle)
         knots = self._knotting.knots(tracks)
         if len(knots.t) == 0:
             return None
@@ -62,18 +66,20 @@ class Vehicles:
             speeds[:, asked], found = _fitted(self._ground, some, track[asked] - begin, t[asked])
             sizes.append(replace(found, track=found.track + begin))
         told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
+        told = _best(replace(told, track=vehicle[told.track]))
         scale = scale_of(told.information, told.vector, told.speed)
-        return Fitted(Speeds(*speeds), _classes(told, tracks), scale)
+        return Fitted(Speeds(*speeds), _classes(told, vehicle), scale)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sizes:
     """What B tracks (B,) say about the size s of their vehicles, exp(-s' A s / 2 + b' s), and their mean speeds [m/s].
 
-    information (B, 3, 3) A, vector (B, 3) b, speed (B,)
+    worth (B,) how much, information (B, 3, 3) A, vector (B, 3) b, speed (B,)
     """
 
     track: Ints
+    worth: Floats
     information: Floats
     vector: Floats
     speed: Floats
@@ -118,8 +124,7 @@ def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats
 def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov: Floats, misfit: Floats) -> _Sizes:
     """By the piece of each track that tells most; without what was known beforehand."""
     worth = np.nan_to_num(np.diff(first) / misfit)
-    order = np.lexsort((worth, owner))
-    best = order[np.diff(owner[order], append=-1) != 0]
+    best = _last(worth, owner)
     best = best[worth[best] > 0]
     begin, end = first[best], first[best + 1] - 1
     known = np.diag(1 / SIGMA[:3] ** 2)
@@ -127,20 +132,33 @@ def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov:
     vector = np.einsum("tij,tj->ti", inverse, size[best, :3]) - known @ MEAN[:3]
     return _Sizes(
         owner[best],
+        worth[best],
         (inverse - known) / misfit[best, None, None],
         vector / misfit[best, None],
         np.linalg.norm(path[end] - path[begin], axis=1) / (t[end] - t[begin]),
     )
 
 
-def _classes(told: _Sizes, tracks: int) -> Classified:
-    """The classes of all tracks; NaN for those that tell nothing."""
+def _best(told: _Sizes) -> _Sizes:
+    """Of each track only what tells most."""
+    best = _last(told.worth, told.track)
+    return _Sizes(*(getattr(told, name)[best] for name in _Sizes.__slots__))
+
+
+def _last(worth: Floats, owner: Ints) -> Ints:
+    """The indices of those that are worth most, one of each owner."""
+    order = np.lexsort((worth, owner))
+    return order[np.diff(owner[order], append=-1) != 0]
+
+
+def _classes(told: _Sizes, vehicle: Ints) -> Classified:
+    """The classes of all tracks (T,), each of a vehicle; NaN for those that tell nothing."""
     found = classified(told.information, told.vector, told.speed)
     parts = found.probability, found.size, found.sigma
-    result = [np.full((tracks, part.shape[1]), np.nan) for part in parts]
+    result = [np.full((len(vehicle), part.shape[1]), np.nan) for part in parts]
     for whole, part in zip(result, parts, strict=True):
         whole[told.track] = part
-    return Classified(*result)
+    return Classified(*(whole[vehicle] for whole in result))
 
 
 def _piece_of(knots: Knots, first: Ints, owner: Ints, track: Ints, t: Floats) -> Ints:

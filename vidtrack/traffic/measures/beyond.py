@@ -1,0 +1,77 @@
+"""Gates that vehicles must have passed just before their track began, or just after it ended.
+
+A track begins when its vehicle has been seen for a while, and where another one hides it only afterwards. One that
+begins a little beyond a gate and drives away from it has come through. Such passings are inferred, and say so.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Mask
+from vidtrack.traffic.measures.crossings import confidence
+from vidtrack.traffic.measures.gates import Gates
+from vidtrack.traffic.measures.joins import Joins, step_rows
+from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
+from vidtrack.traffic.measures.stretches import End, Lives
+
+REACH_S = 1.5
+"""s; longest time between the passing and the track"""
+_LEAST_M_S, _SURE = 1.5, 3.0
+"""m/s; of the vehicle, and standard deviations of its velocity in it"""
+_LIKELY = 0.5
+_ELSEWHERE_S = 4.0
+"""s; the mean time in which a vehicle has come from elsewhere, such as out of another one's blob"""
+_ALONE_S, _ALONE_M = 1.0, 1.75
+"""s, m along the gate; another passing so near is that of the same vehicle."""
+
+
+def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats) -> tuple[Passed, Floats]:
+    """What stretches passed before they began and after they ended, and how likely (P,).
+
+    passed  what they passed, also in gaps
+    """
+    before, after = np.ones((2, len(lives.track)), bool)
+    before[joins.after] = after[joins.before] = False
+    parts = [_extended(gates, end, free, spans, way) for end, free, way in
+             ((lives.head, before, -1), (lives.tail, after, 1))]  # fmt: skip
+    found = parts[0].and_also(parts[1])
+    ends = np.where(found.t < lives.head.t[found.track], lives.head.t[found.track], lives.tail.t[found.track])
+    sure = confidence(found) * np.exp(-np.abs(found.t - ends) / _ELSEWHERE_S)
+    likely = (sure > _LIKELY) & gates.role("entry", "exit", "both")[found.gate] & (found.t <= lives.until[found.track])
+    found, sure = found.only(likely), sure[likely]
+    alone = _alone(found, passed)
+    return found.only(alone), sure[alone]
+
+
+def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Passed:
+    """The gates on the way of stretches for REACH_S before (way -1) or after (1) an end of theirs."""
+    speed = np.linalg.norm(end.v, axis=1)
+    with np.errstate(invalid="ignore"):
+        moves = (speed > _LEAST_M_S) & (speed > _SURE * np.sqrt(end.spread[:, 2]))
+    who = np.flatnonzero(free & moves)
+    span = np.clip(np.searchsorted(spans[:, 0], end.t[who], side="right") - 1, 0, None)
+    room = np.abs(spans[span, 0 if way < 0 else 1] - end.t[who])
+    known = End(end.t[who], end.xy[who], end.v[who], end.spread[who])
+    far = known.after(way * np.minimum(REACH_S, room))
+    passing = Passing(gates, REACH_M)
+    passing.add(step_rows(far, known) if way < 0 else step_rows(known, far))
+    found = passing.passed()
+    return found.of(who[found.track]).nowhere()
+
+
+def _alone(found: Passed, passed: Passed) -> Mask:
+    """(F,) whether nobody else passed the same gate the same way just then; of two such only the first one."""
+    both = passed.and_also(found)
+    order = np.lexsort((both.t, both.side, both.gate))
+    way = (2 * both.gate + both.side)[order]
+    t, along, new = both.t[order], both.along[order], order >= len(passed)
+    alone = np.ones(len(order), bool)
+    for back in range(1, min(8, len(order))):
+        near = (way[back:] == way[:-back]) & (t[back:] - t[:-back] < _ALONE_S)
+        near &= np.abs(along[back:] - along[:-back]) < _ALONE_M
+        alone[back:][near & new[back:]] = False
+        alone[:-back][near & new[:-back] & ~new[back:]] = False
+    result = np.empty(len(order), bool)
+    result[order] = alone
+    return result[len(passed) :]

@@ -1,0 +1,63 @@
+"""The class of a vehicle while it is tracked: by the lengths of its track so far, and by nothing that comes later."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vidtrack.arrays.types import Floats, Ints
+from vidtrack.traffic.vehicles.classes import SURE, UNKNOWN, classified, named, named_by_length
+
+_LEAST_SIGMA_M = 0.01
+
+
+class Naming:
+    """Takes rows in order of time; remembers the sums over each track that is still there.
+
+    classes  low and high length of each class of the site [m]; empty: those of `classes.CLASSES`
+    """
+
+    def __init__(self, classes: Mapping[str, tuple[float, float]]) -> None:
+        self._classes = dict(classes)
+        self._sums: dict[int, Floats] = {}
+
+    def named(self, track: Ints, length: Floats, sigma: Floats, speed: Floats) -> NDArray[np.str_]:
+        """(N,) classes; UNKNOWN where none is sure, "" before a track has a length.
+
+        track (N,), length and sigma (N,) m, NaN where it is not known; speed (N,) m/s
+        """
+        weight = np.nan_to_num(1 / np.maximum(sigma, _LEAST_SIGMA_M) ** 2) * np.isfinite(length)
+        sums = self._added(track, np.column_stack([weight, weight * np.nan_to_num(length), weight > 0]))
+        known = sums[:, 2] > 0
+        total, by_length, rows = sums[known].T
+        mean, information = by_length / total, total / rows  # errors last: many rows are no better than one
+        names = np.full(len(track), "", dtype=object)
+        names[known] = self._class_of(mean, information, np.nan_to_num(speed[known]))
+        return names.astype(str)
+
+    def _class_of(self, mean: Floats, information: Floats, speed: Floats) -> list[str]:
+        if self._classes:
+            found, sure = named_by_length(mean, 1 / np.sqrt(information), self._classes)
+            return [name if name and p >= SURE else UNKNOWN for name, p in zip(found, sure.tolist(), strict=True)]
+        about = np.zeros((len(mean), 3, 3))
+        about[:, 0, 0] = information
+        vector = np.column_stack([information * mean, np.zeros((len(mean), 2))])
+        return [name or UNKNOWN for name in named(classified(about, vector, speed))[0]]
+
+    def _added(self, track: Ints, terms: Floats) -> Floats:
+        """(N, 3) sums of the terms of each track to each row; those of tracks that are gone are forgotten."""
+        ids = np.unique(track)
+        nothing = np.zeros(terms.shape[1])
+        before = np.array([self._sums.get(one, nothing) for one in ids.tolist()]).reshape(-1, terms.shape[1])
+        order = np.argsort(track, kind="stable")
+        running = np.cumsum(terms[order], axis=0)
+        first = np.searchsorted(track[order], ids)
+        slot = np.searchsorted(ids, track[order])
+        running += (before + terms[order][first] - running[first])[slot] if len(ids) else 0
+        sums = np.empty_like(terms)
+        sums[order] = running
+        ends = np.append(first[1:], len(track)) - 1
+        self._sums = dict(zip(ids.tolist(), running[ends], strict=True)) if len(ids) else {}
+        return sums
