@@ -106,7 +106,7 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         detector = build_detector(settings)
         if isinstance(source, Recording):
             source.restore = Checkpoint(detector, tracker, source.like).restore
-        subject = file_subject(path, source, tracker, settings, detector.scene)
+        subject = file_subject(extras.source or path, source, tracker.rates.as_dict, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S
         yield Pipeline(

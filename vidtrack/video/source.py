@@ -34,6 +34,29 @@ def open_source(path: str, settings: SourceSettings) -> Source:
         raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
 
+def open_part(path: str, settings: SourceSettings) -> Source:
+    """Open the part of a video file from `start_s` to `end_s`, decoded from the key picture before it.
+
+    The frames have the times of the whole file; they are numbered from that key picture. Raises as `open_source`.
+    """
+    stats = SourceStats()
+    try:
+        return Source(VideoFile(Path(path), settings, stats, from_s=settings.start_s), settings, stats)
+    except OSError as error:
+        raise SourceError(f"cannot read {path}: {error.strerror}") from None
+
+
+def duration_s(path: str) -> float | None:
+    """Length of a video file [s]; None where it does not state one, and for images. Raises as `open_source`."""
+    if not Path(path).is_file():
+        return None
+    video = VideoFile(Path(path), SourceSettings(), SourceStats())
+    try:
+        return video.duration_s
+    finally:
+        video.close()
+
+
 class Excerpts:
     """Frames of spans of time out of an input, with the times that `open_source` gives them; for one thread.
 
