@@ -66,7 +66,10 @@ class FolderPlace:
         """Lock the folder, made if necessary, and delete what a killed batch left. Raises OutputError."""
         with exclusive(usable(self.root)):
             shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
-            yield
+            try:
+                yield
+            finally:
+                shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
 
     def names(self, under: str) -> set[str]:
         """What is in a folder; nothing if there is none."""

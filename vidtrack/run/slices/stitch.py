@@ -61,8 +61,9 @@ def stitched_pipeline(
 ) -> Iterator[Pipeline]:
     """The pipeline of a video that was tracked in slices; `path` as the user wrote it. Raises FormatError."""
     slices = [Slice(*pair, read_about(pair[0])) for pair in zip(folders, cuts, strict=True)]
+    source = Whole(slices)
     slices = [slice for slice in slices if slice.about.ends]  # those beyond the true end are empty
-    source, last = Whole(slices), slices[-1]
+    last = slices[-1]
     motion = build_blob_tracker(settings.tracker, (source.width, source.height)).model
     subject = file_subject(path, source, lambda: last.about.rates, settings, scene=lambda: np.load(last.folder / SCENE))
     yield Pipeline(

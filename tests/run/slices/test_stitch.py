@@ -1,0 +1,83 @@
+"""Slices give the files of a single run."""
+
+import filecmp
+import json
+
+import pyarrow.parquet as pq
+import pytest
+from command_line import SAMPLES
+
+from vidtrack.config.load import load
+from vidtrack.errors import FormatError
+from vidtrack.run.files import run_file
+from vidtrack.run.run import Run
+from vidtrack.run.slices.cuts import cuts
+from vidtrack.run.slices.kept import read_about
+from vidtrack.run.slices.stitch import stitched_pipeline
+from vidtrack.run.slices.track import track_slice
+
+VIDEO = str(SAMPLES / "crossing.avi")
+SETTINGS = load(assignments=[("output.lines", ["middle:160,0,160,240"])])
+
+
+def finish(run):
+    with run:
+        for _ in run:
+            pass
+
+
+def stitched(folder, found):
+    """The run of these slices, in `folder`."""
+    parts = [folder / str(one.number) for one in found]
+    for one, part in zip(found, parts, strict=True):
+        part.mkdir(parents=True)
+        track_slice(VIDEO, SETTINGS, one, part, lambda _: None)
+    finish(Run(stitched_pipeline(VIDEO, found, parts, SETTINGS), folder / "whole"))
+    return folder / "whole"
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("single")
+    finish(run_file(VIDEO, SETTINGS, folder))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def halves(tmp_path_factory):
+    return stitched(tmp_path_factory.mktemp("halves"), cuts(0.0, None, 10.0, 5.0, 4.0))
+
+
+def test_one_slice_is_the_single_run_bit_by_bit(single, tmp_path):
+    whole = stitched(tmp_path, cuts(0.0, None, 10.0, 10.0, 0.0))
+    files = {path.name for path in single.iterdir()} - {"summary.json", "tracks.parquet"}
+    assert {path.name for path in whole.iterdir()} == {path.name for path in single.iterdir()}
+    assert set(filecmp.cmpfiles(single, whole, files, shallow=False)[0]) == files
+    assert pq.read_table(whole / "tracks.parquet").equals(pq.read_table(single / "tracks.parquet"))
+    told = [json.loads((folder / "summary.json").read_text()) for folder in (single, whole)]
+    for once in ("stages", "seconds"):
+        assert all(one.pop(once) for one in told)
+    assert told[0] == told[1]
+
+
+def test_two_halves_give_the_same_crossings_and_tracks(single, halves):
+    counts = [(folder / "counts.csv").read_text().splitlines() for folder in (single, halves)]
+    assert len(counts[0]) > 1
+    assert [line.split(",")[1:4] for line in counts[0]] == [line.split(",")[1:4] for line in counts[1]]
+    tables = [pq.read_table(folder / "tracks.parquet").to_pydict() for folder in (single, halves)]
+    assert len(set(tables[0]["track_id"])) == len(set(tables[1]["track_id"]))
+    assert set(zip(tables[1]["frame"], tables[1]["time_s"], strict=True)) <= {
+        (frame, round(frame / 15, 6)) for frame in range(150)
+    }
+
+
+def test_a_slice_beyond_the_end_of_the_file_is_empty(single, tmp_path):
+    whole = stitched(tmp_path, cuts(0.0, None, 30.0, 15.0, 4.0))
+    assert (whole / "tracks.csv").read_bytes() == (single / "tracks.csv").read_bytes()
+    assert json.loads((whole / "summary.json").read_text())["truncated"]
+
+
+def test_a_damaged_slice_says_so(tmp_path):
+    (tmp_path / "slice.json").write_text('{"fps": ')
+    with pytest.raises(FormatError, match="damaged"):
+        read_about(tmp_path)
