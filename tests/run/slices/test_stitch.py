@@ -2,19 +2,23 @@
 
 import filecmp
 import json
+from dataclasses import asdict
 
 import pyarrow.parquet as pq
 import pytest
 from command_line import SAMPLES
+from synthetic_steps import make_step
 
 from vidtrack.config.load import load
 from vidtrack.errors import FormatError
 from vidtrack.run.files import run_file
 from vidtrack.run.run import Run
-from vidtrack.run.slices.cuts import cuts
-from vidtrack.run.slices.kept import read_about
-from vidtrack.run.slices.stitch import stitched_pipeline
+from vidtrack.run.slices.cuts import Cut, cuts
+from vidtrack.run.slices.kept import About, KeptSteps, read_about
+from vidtrack.run.slices.stitch import Slice, stitched_pipeline
+from vidtrack.run.slices.stitch import stitched as stitch
 from vidtrack.run.slices.track import track_slice
+from vidtrack.video.stats import SourceStats
 
 VIDEO = str(SAMPLES / "crossing.avi")
 SETTINGS = load(assignments=[("output.lines", ["middle:160,0,160,240"])])
@@ -75,6 +79,26 @@ def test_a_slice_beyond_the_end_of_the_file_is_empty(single, tmp_path):
     whole = stitched(tmp_path, cuts(0.0, None, 30.0, 15.0, 4.0))
     assert (whole / "tracks.csv").read_bytes() == (single / "tracks.csv").read_bytes()
     assert json.loads((whole / "summary.json").read_text())["truncated"]
+
+
+def test_a_vehicle_that_comes_after_the_seam_takes_no_number_of_another(tmp_path):
+    """Left 7 comes after the seam, so it is known only as the later slice's 0; its 1 is new."""
+    rows = {0: {7: (12, 40), 3: (0, 8)}, 1: {0: (12, 40), 1: (25, 40)}}
+    slices = []
+    for number, lives in rows.items():
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        kept = KeptSteps(folder)
+        for k in range(40):
+            alive = [(i, "c", 4.0 * k, 40.0 * (i % 7)) for i, (a, b) in sorted(lives.items()) if a <= k < b]
+            kept.step(make_step(k, alive))
+        kept.close()
+        kept.about(About(25.0, 320, 240, asdict(SourceStats()), {}))
+        slices.append(Slice(folder, Cut(number, 0.0, 0.4 * number, 0.4 if number == 0 else None), read_about(folder)))
+    steps = list(stitch(slices))
+    assert [step.index for step in steps] == list(range(40))
+    assert all(len(set(step.tracks.id.tolist())) == len(step.tracks) for step in steps)
+    assert len({int(i) for step in steps for i in step.tracks.id}) == 3
 
 
 def test_a_damaged_slice_says_so(tmp_path):

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 from vidtrack.errors import SourceError
@@ -42,7 +43,7 @@ class Portion:
         """The folders of the runs on this machine, as `vidtrack measure` takes them: FOLDER or FOLDER@TIME."""
         with ExitStack() as stack:
             folders = [stack.enter_context(self.place.local(f"{RESULTS}/{row.folder}")) for row in self.rows]
-            times = ["" if row.start is None else f"@{row.start.isoformat()}" for row in self.rows]
+            times = ["" if row.start is None else f"@{row.start}" for row in self.rows]
             yield [f"{folder}{time}" for folder, time in zip(folders, times, strict=True)]
 
 
@@ -69,7 +70,7 @@ def portions(text: str, site: Path | None) -> list[Portion]:
     if not groups:
         raise SourceError(f"no run in {place.shown} was tracked with a site; give --site SITE.toml")
     return [
-        Portion(place, name, day, tuple(sorted(group, key=lambda row: (str(row.start), row.source))))
+        Portion(place, name, day, tuple(sorted(group, key=_order)))
         for (name, day), group in sorted(groups.items())
     ]
 
@@ -81,7 +82,11 @@ def _site_name(place: Place, row: Row) -> str:
 
 
 def _day(row: Row) -> str:
-    return f"{UNDATED}-{row.folder}" if row.start is None else row.start.date().isoformat()
+    return f"{UNDATED}-{row.folder}" if row.start is None else datetime.fromisoformat(row.start).date().isoformat()
+
+
+def _order(row: Row) -> tuple[float, str]:
+    return 0.0 if row.start is None else datetime.fromisoformat(row.start).timestamp(), row.source
 
 
 def folder_name(text: str) -> str:

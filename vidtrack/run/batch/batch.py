@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import CancelledError, Future
 from dataclasses import asdict, dataclass, field, fields, replace
-from datetime import datetime
 from queue import Empty, Queue
 from typing import Any
 
@@ -186,14 +185,11 @@ class Batch:
 
     def _row(self, task: Task, known: Row | None, again: bool) -> Row:
         """The row of a source at the start: done if its results are there and nothing has changed."""
-        row = Row(
-            **{name: value for name, value in task.about.items() if name != "start"}, key=task.key, version=VERSION
-        )
-        row.start = None if task.about["start"] is None else datetime.fromisoformat(task.about["start"])
+        row = Row(**task.about, key=task.key, version=VERSION)
         if again:
             return row
         if known is not None and known.state == DONE and known.key == task.key and known.folder in self._folders:
-            return replace(known, start=row.start)
+            return replace(known, start=row.start, site=row.site)
         if task.name in self._folders:  # done by a batch that was killed before it could say so
             about = json.loads(self.place.read(f"{task.result}/{ABOUT}") or "{}")
             if about.get("key") == task.key:
@@ -245,9 +241,8 @@ def _outcome(future: Future[Outcome], engine: Engine) -> Outcome:
 
 
 def about(row: Row) -> dict[str, Any]:
-    """What a task knows of its source: columns of the index that are there before it is done, as JSON has them."""
-    given = {name: value for name, value in asdict(row).items() if name in _BEFORE}
-    return given | {"start": None if row.start is None else row.start.isoformat()}
+    """What a task knows of its source: columns of the index that are there before it is done."""
+    return {name: value for name, value in asdict(row).items() if name in _BEFORE}
 
 
 _BEFORE = ("source", "folder", "site", "start", "bytes", "stamp")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
-from datetime import datetime
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -24,7 +23,7 @@ class Row:
     source     its address, without credentials
     folder     of its results, below `results`
     site       path of its site; None: tracked without one
-    start      time of its first picture; None: not known
+    start      time of its first picture with its zone, as ISO 8601 has it; None: not known
     state      WAITING, DONE or SET_ASIDE
     error      why it was set aside
     attempts   how often it, or a part of it, was begun in the last batch that tried
@@ -39,7 +38,7 @@ class Row:
     source: str
     folder: str
     site: str | None = None
-    start: datetime | None = None
+    start: str | None = None
     state: str = WAITING
     error: str | None = None
     attempts: int = 0
@@ -60,7 +59,6 @@ _KINDS = {
     "int": pa.int64(),
     "float": pa.float64(),
     "bool": pa.bool_(),
-    "datetime": pa.timestamp("us", "UTC"),
 }
 _UNITS = {"seconds": "s", "media_s": "s", "bytes": "byte"}
 SCHEMA = pa.schema(

@@ -43,7 +43,8 @@ class Plan:
         for source in sources:
             settings, digest = loaded(source.settings, source.site, source.address.lower().endswith(".txt"))
             site = settings["output"]["site"]
-            row = Row(source.shown, source.name, site, source.start, bytes=source.size, stamp=source.stamp)
+            start = None if source.start is None else source.start.isoformat()
+            row = Row(source.shown, source.name, site, start, bytes=source.size, stamp=source.stamp)
             what = digest, source.size, source.stamp, VERSION, self.slice_s, self.warm_s if self.slice_s else 0.0
             key = sha256(json.dumps(what).encode()).hexdigest()[:16]
             yield Task(

@@ -123,6 +123,7 @@ class _Naming:
     def go_on(self, seam: Seam) -> None:
         """The next steps are of the slice after this seam."""
         names = self._named(seam.left)
+        self._next_id = max(self._next_id, int(names.max(initial=-1)) + 1)  # also those that came after the seam
         self._first_id, self._first_group = self._next_id, self._next_group
         order = np.argsort(seam.right)
         self._known, self._names = seam.right[order], names[order]
