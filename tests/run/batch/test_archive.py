@@ -39,8 +39,7 @@ def archive(tmp_path_factory):
     (folder / "site.toml").write_text(SITE)
     (folder / "third.avi").write_bytes((folder / "cam1" / "08-00.avi").read_bytes())
     (folder / "list.csv").write_text(
-        "source,start\ncam1/08-00.avi,2026-06-01T08:00:00+02:00\n"
-        "cam2/08-00.avi,2026-06-02T00:30:00+02:00\nthird.avi,\n"
+        "source,start\ncam1/08-00.avi,2026-06-01T08:00:00+02:00\ncam2/08-00.avi,2026-06-02T00:30:00+02:00\nthird.avi,\n"
     )
     (folder / "cam2" / "08-00.avi").write_bytes((folder / "third.avi").read_bytes())
     out = tmp_path_factory.mktemp("out")

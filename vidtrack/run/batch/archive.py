@@ -70,8 +70,7 @@ def portions(text: str, site: Path | None) -> list[Portion]:
     if not groups:
         raise SourceError(f"no run in {place.shown} was tracked with a site; give --site SITE.toml")
     return [
-        Portion(place, name, day, tuple(sorted(group, key=_order)))
-        for (name, day), group in sorted(groups.items())
+        Portion(place, name, day, tuple(sorted(group, key=_order))) for (name, day), group in sorted(groups.items())
     ]
 
 
