@@ -21,7 +21,7 @@ class BatchOptions(WithSettings):
     dask: str | None
     workers: int | None
     slice_s: float
-    warm_s: float
+    warm_s: float | None
     patience_s: float
 
 
@@ -60,10 +60,9 @@ Examples:
     "--warm-up",
     "warm_s",
     type=click.FloatRange(min=0),
-    default=120.0,
-    show_default=True,
     metavar="S",
-    help="Track each slice from so much before its beginning [s].",
+    help="Do a file's slices at the same time, each from so much before its beginning [s]; results then differ a "
+    "little from a single run's.  [default: one after the other, exactly as one run]",
 )
 @click.option(
     "--patience",

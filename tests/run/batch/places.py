@@ -47,7 +47,7 @@ def engine_of(executor):
     return Engine(executor, "this process", lambda: 1000, lambda out: None, lambda: None)
 
 
-def batch_of(sources, out, given=(), slice_s=0.0, warm_s=0.0, **options):
+def batch_of(sources, out, given=(), slice_s=0.0, warm_s=None, **options):
     """A batch of these sources."""
     plan = Plan(str(out), None, tuple(given), slice_s, warm_s, 60.0)
     return Batch(place_of(str(out)), list(plan.tasks(listed([str(source) for source in sources]))), **options)

@@ -120,7 +120,8 @@ def test_an_error_of_the_engine_costs_one_source(videos, tmp_path):
     assert "the worker died" in next(row.error for row in batch.rows.values() if row.error)
 
 
-def test_a_long_file_is_cut_and_goes_on_with_the_missing_slices(videos, tmp_path):
+@pytest.mark.parametrize("warm_s", [None, 0.5])
+def test_a_long_file_is_cut_and_goes_on_with_the_missing_slices(videos, tmp_path, warm_s):
     source = videos / "cam1" / "08-00.avi"
     stops = ["slice 1"]
 
@@ -131,8 +132,8 @@ def test_a_long_file_is_cut_and_goes_on_with_the_missing_slices(videos, tmp_path
         return work(told, lambda: None)
 
     with pytest.raises(KeyboardInterrupt):
-        do(batch_of([source], tmp_path, slice_s=1.0, warm_s=0.5), AtOnce(stop))
-    batch = batch_of([source], tmp_path, slice_s=1.0, warm_s=0.5)
+        do(batch_of([source], tmp_path, slice_s=1.0, warm_s=warm_s), AtOnce(stop))
+    batch = batch_of([source], tmp_path, slice_s=1.0, warm_s=warm_s)
     assert [(kind, number) for kind, _, number in do(batch)] == [("file", 0), ("slice", 1), ("stitch", 0)]
     assert batch.rows[str(source)].frames == FRAMES
     assert not (tmp_path / "slices" / batch.rows[str(source)].folder).exists()

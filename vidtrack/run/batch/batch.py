@@ -159,17 +159,23 @@ class Batch:
         there = self.place.names(task.slices)
         left = {cut.number for cut in task.cuts if f"{cut.number:05d}" not in there}
         self._cutting[task.name] = _Cutting(task, left)
-        self._waiting.extendleft(task.slice(number) for number in sorted(left, reverse=True))
-        if not left:
-            self._waiting.appendleft(replace(task, kind="stitch"))
+        if left and task.warm_s is not None:
+            self._waiting.extendleft(task.slice(number) for number in sorted(left, reverse=True))
+        else:
+            self._next(self._cutting[task.name])
 
     def _sliced(self, name: str, number: int) -> None:
         cutting = self._cutting.get(name)
         if cutting is None:  # set aside meanwhile
             return
         cutting.left.discard(number)
-        if not cutting.left:
-            self._waiting.appendleft(replace(cutting.task, kind="stitch"))
+        if not cutting.left or cutting.task.warm_s is None:
+            self._next(cutting)
+
+    def _next(self, cutting: _Cutting) -> None:
+        """Do the next slice of a file whose slices go on from each other; stitch them if all are there."""
+        task = cutting.task
+        self._waiting.appendleft(task.slice(min(cutting.left)) if cutting.left else replace(task, kind="stitch"))
 
     def _failed(self, task: Task, row: Row, outcome: Outcome) -> None:
         """Try again at the end where that may help, else set the source aside."""

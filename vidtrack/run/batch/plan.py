@@ -26,7 +26,8 @@ class Plan:
 
     out          place of the batch
     config_file, given   of the settings, see `config.load`
-    slice_s, warm_s      lengths of slices and of their warm-up [s]; slice_s 0: no file is cut
+    slice_s, warm_s      lengths of slices and of their warm-up [s]; slice_s 0: no file is cut; warm_s None: each
+                         slice goes on from the state of the one before it
     patience_s   longest time without a frame [s]
     """
 
@@ -34,7 +35,7 @@ class Plan:
     config_file: Path | None
     given: tuple[str | tuple[str, Any], ...]
     slice_s: float
-    warm_s: float
+    warm_s: float | None
     patience_s: float
 
     def tasks(self, sources: Iterable[Source]) -> Iterator[Task]:
@@ -45,7 +46,7 @@ class Plan:
             site = settings["output"]["site"]
             start = None if source.start is None else source.start.isoformat()
             row = Row(source.shown, source.name, site, start, bytes=source.size, stamp=source.stamp)
-            what = digest, source.size, source.stamp, VERSION, self.slice_s, self.warm_s if self.slice_s else 0.0
+            what = digest, source.size, source.stamp, VERSION, self.slice_s, self.warm_s if self.slice_s else None
             key = sha256(json.dumps(what).encode()).hexdigest()[:16]
             yield Task(
                 "file", self.out, source.name, source.address, about(row), settings, key,

@@ -30,7 +30,8 @@ class Task:
     about     what is written beside the results: the source's row of the index
     settings  of the run, nested
     key       digest of source, settings and version
-    slice_s, warm_s   lengths of slices and of their warm-up [s]; slice_s 0: never cut
+    slice_s, warm_s   lengths of slices and of their warm-up [s]; slice_s 0: never cut; warm_s None: each slice goes on
+             from the state of the one before it
     patience_s   longest time without a frame
     cuts      all slices of the file
     number    of the slice
@@ -44,7 +45,7 @@ class Task:
     settings: dict[str, Any]
     key: str
     slice_s: float
-    warm_s: float
+    warm_s: float | None
     patience_s: float
     cuts: tuple[Cut, ...] = ()
     number: int = 0
@@ -59,6 +60,10 @@ class Task:
     def slices(self) -> str:
         """Folder of the slices in the place; other settings have another one."""
         return f"{SLICES}/{self.name}/{self.key}"
+
+    def slice_folder(self, number: int) -> str:
+        """Folder of one slice in the place."""
+        return f"{self.slices}/{number:05d}"
 
     def slice(self, number: int) -> Task:
         """The task of one slice."""

@@ -19,6 +19,7 @@ from vidtrack.run.run import Extras, Run
 from vidtrack.run.slices.cuts import cuts
 from vidtrack.run.slices.stitch import stitched_pipeline
 from vidtrack.run.slices.track import track_slice
+from vidtrack.video.resources import OPENCV
 from vidtrack.video.source import duration_s
 
 ABOUT = "source.json"
@@ -52,7 +53,7 @@ def work(told: dict[str, object], beat: Callable[[], None]) -> Outcome:
 def _file(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
     """Track a file as `vidtrack track` does, or say where it is to be cut."""
     settings = parse(task.settings)
-    if not is_remote(task.address) and task.slice_s:
+    if _can_be_cut(task, settings):
         length_s = duration_s(task.address) if Path(task.address).suffix.lower() != ".txt" else None
         if length_s is not None and length_s > _LEAST * task.slice_s:
             span = settings.source.start_s, settings.source.end_s
@@ -64,17 +65,26 @@ def _file(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
         return _finished(run, task, place, folder, beat)
 
 
+def _can_be_cut(task: Task, settings: Settings) -> bool:
+    """Whether a slice can be read by itself, and begin with the state of another one if it is to."""
+    states = task.warm_s is not None or settings.detector.kind not in OPENCV
+    return bool(task.slice_s) and states and not is_remote(task.address)
+
+
 def _slice(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
-    with place.workspace() as folder:
-        track_slice(task.address, parse(task.settings), task.cuts[task.number], folder, lambda _: beat())
-        place.put(folder, f"{task.slices}/{task.number:05d}", last=_ABOUT_SLICE)
+    cut = task.cuts[task.number]
+    with ExitStack() as stack:
+        before = stack.enter_context(place.local(task.slice_folder(cut.number - 1))) if cut.goes_on else None
+        folder = stack.enter_context(place.workspace())
+        track_slice(task.address, parse(task.settings), cut, folder, before, beat)
+        place.put(folder, task.slice_folder(cut.number), last=_ABOUT_SLICE)
     return {"sliced": task.number}
 
 
 def _stitch(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
     settings: Settings = parse(task.settings)
     with ExitStack() as stack:
-        folders = [stack.enter_context(place.local(f"{task.slices}/{one.number:05d}")) for one in task.cuts]
+        folders = [stack.enter_context(place.local(task.slice_folder(one.number))) for one in task.cuts]
         folder = stack.enter_context(place.workspace())
         run = Run(stitched_pipeline(task.address, task.cuts, folders, settings), folder, force=True)
         outcome = _finished(run, task, place, folder, beat)
@@ -117,7 +127,7 @@ def _coverage(summary: dict[str, object]) -> float:
 
 
 def _as_list(cut: object) -> dict[str, object]:
-    return {name: getattr(cut, name) for name in ("number", "from_s", "begin_s", "end_s")}
+    return {name: getattr(cut, name) for name in ("number", "begin_s", "end_s", "warm_s")}
 
 
 def _one_line(error: BaseException) -> str:

@@ -27,6 +27,7 @@ class Seam:
     shift        what is added to the later slice's frame numbers
     plane        (2, 3) from the later slice's scene to the earlier one's [px]; None: identity
     left, right  (K,) ids of the earlier and of the later slice for the same vehicles
+    same_ids     the later slice goes on from the earlier one's state: all its ids are those of the earlier one
     """
 
     time_s: float
@@ -34,6 +35,15 @@ class Seam:
     plane: Floats | None
     left: Ints
     right: Ints
+    same_ids: bool = False
+
+
+_NOBODY = np.empty(0, np.int64)
+
+
+def handed_on(last: Step, first: Step) -> Seam:
+    """The seam before the first step of a slice that goes on from the state after the last step of another one."""
+    return Seam(first.time_s, last.index + 1 - first.index, None, _NOBODY, _NOBODY, same_ids=True)
 
 
 def seam(left: Sequence[Step], right: Sequence[Step], begin_s: float, fps: float) -> Seam:
@@ -47,7 +57,7 @@ def seam(left: Sequence[Step], right: Sequence[Step], begin_s: float, fps: float
     if not pairs:
         gap = round((right[0].time_s - left[-1].time_s) * fps) if left and right else 0
         shift = left[-1].index + gap - right[0].index if left and right else 0
-        return Seam(begin_s, shift, None, np.empty(0, np.int64), np.empty(0, np.int64))
+        return Seam(begin_s, shift, None, _NOBODY, _NOBODY)
     plane = _plane(pairs)
     ids = [np.unique(np.concatenate([pair[side].tracks.id for pair in pairs])) for side in (0, 1)]
     a, b = _matched(pairs, plane, *ids)

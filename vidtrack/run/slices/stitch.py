@@ -20,7 +20,7 @@ from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.sinks import file_sinks, file_subject
 from vidtrack.run.slices.cuts import OVERLAP_S, Cut
 from vidtrack.run.slices.kept import About, kept_steps, read_about
-from vidtrack.run.slices.seam import Seam, seam
+from vidtrack.run.slices.seam import Seam, handed_on, seam
 from vidtrack.run.slices.track import SCENE
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.tracks import Tracks
@@ -97,6 +97,9 @@ def stitched(slices: Sequence[Slice]) -> Iterator[Step]:
 
 def _seam_of(left: Slice, right: Slice) -> Seam:
     """The seam between neighbours, by their steps around the cut."""
+    if right.cut.goes_on:
+        *_, last = left.steps(left.about.ends[-1], np.inf)
+        return handed_on(last, next(right.steps(-np.inf, np.inf)))
     begin_s = right.cut.begin_s
     window = begin_s - OVERLAP_S, begin_s + OVERLAP_S
     return seam(list(left.steps(*window)), list(right.steps(*window)), begin_s, left.about.fps)
@@ -122,12 +125,14 @@ class _Naming:
 
     def go_on(self, seam: Seam) -> None:
         """The next steps are of the slice after this seam."""
+        self._shift += seam.shift
+        if seam.same_ids:
+            return
         names = self._named(seam.left)
         self._next_id = max(self._next_id, int(names.max(initial=-1)) + 1)  # also those that came after the seam
         self._first_id, self._first_group = self._next_id, self._next_group
         order = np.argsort(seam.right)
         self._known, self._names = seam.right[order], names[order]
-        self._shift += seam.shift
         if seam.plane is not None:
             self._plane = seam.plane if self._plane is None else affine.after(self._plane, seam.plane)
 
