@@ -2,8 +2,9 @@
 
     python tools/benchmark_slices.py VIDEO... [--slice 60 300] [--warm-up 0 30 120] [--set A.B=VALUE]
 
-Each video is tracked once whole, and in slices that go on from each other, and in slices with each warm-up. A track differs if no track of the other run agrees
-with it, one to one, in 90 % of the frames that either has (boxes with an intersection over union of at least 0.5).
+Each video is tracked once whole, in slices that go on from each other, and in slices with each warm-up. A track differs
+if no track of the other run agrees with it, one to one, in 90 % of the frames that either has (boxes with an
+intersection over union of at least 0.5).
 Crossings are those of three lines across and three down the picture; they are paired by line and direction within 2 s,
 and are shifted from 0.1 s on. CPU time is that of this process.
 """

@@ -27,8 +27,8 @@ def telling(batch: Batch, engine: str, quiet: bool) -> Iterator[Callable[[Progre
         yield lambda now: None
         return
     before = f"{progress.before} of {progress.total} are done; " if progress.before else ""
-    click.echo(f"vidtrack: {before}{progress.total - progress.before} to do on {engine}", err=True)
     try:
+        click.echo(f"vidtrack: {before}{progress.total - progress.before} to do on {engine}", err=True)
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.live import Live

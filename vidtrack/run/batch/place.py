@@ -15,8 +15,8 @@ from vidtrack.output.folder import replacing, usable, writing
 from vidtrack.output.lock import exclusive
 from vidtrack.run.batch.remote import download, is_remote, local_path, reading, store, upload, without_secrets
 
-PARTIAL = "partial"
-"""Folder of what is not complete."""
+PARTIAL, SLICES = "partial", "slices"
+"""Folders of what is not complete, and of slices that wait to be stitched."""
 
 
 class Place(Protocol):
@@ -70,6 +70,8 @@ class FolderPlace:
                 yield
             finally:
                 shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
+                with suppress(OSError):  # there is none, or slices in it
+                    (self.root / SLICES).rmdir()
 
     def names(self, under: str) -> set[str]:
         """What is in a folder; nothing if there is none."""

@@ -6,10 +6,11 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any, Literal
 
+from vidtrack.run.batch.place import SLICES
 from vidtrack.run.slices.cuts import Cut
 
-RESULTS, SLICES = "results", "slices"
-"""Folders of a place: finished runs, and slices that wait to be stitched."""
+RESULTS = "results"
+"""Folder of the finished runs in a place."""
 
 VERSION = version("vidtrack")
 
