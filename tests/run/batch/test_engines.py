@@ -3,7 +3,7 @@
 import pytest
 from places import batch_of, do, small_videos
 
-from vidtrack.errors import ConfigError
+from vidtrack.errors import ConfigError, StoppedEarly
 from vidtrack.run.batch import engines
 
 pytest.importorskip("distributed", reason="dask[distributed] is not installed: pip install 'vidtrack[dask]'")
@@ -37,6 +37,15 @@ def test_workers_of_another_version_are_refused(monkeypatch, cluster):
     monkeypatch.setattr(engines, "worker_version", lambda: "0.0.1")
     with pytest.raises(ConfigError, match=r"has vidtrack 0\.0\.1"), engines.engine(cluster, None):
         pass
+
+
+def test_a_scheduler_that_is_gone_is_told_in_one_line(cluster):
+    with engines.engine(cluster, None) as engine:
+        engine.executor._client.close()
+        with pytest.raises(StoppedEarly, match=f"{cluster} is gone; run the same command again"):
+            engine.check()
+        engine.end("out")
+        assert engine.width() == 0
 
 
 @pytest.mark.parametrize(

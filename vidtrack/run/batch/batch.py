@@ -6,7 +6,7 @@ import json
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import CancelledError, Future
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from queue import Empty, Queue
 from typing import Any
 
@@ -252,4 +252,3 @@ def about(row: Row) -> dict[str, Any]:
 
 
 _BEFORE = ("source", "folder", "site", "start", "bytes", "stamp")
-assert set(_BEFORE) <= {column.name for column in fields(Row)}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,12 +84,10 @@ def _alive() -> None:
 
 @contextmanager
 def _dask(where: str, workers: int) -> Iterator[Engine]:
-    try:
-        import distributed
-    except ImportError:
-        raise ConfigError(
-            "--dask needs Dask: pip install 'vidtrack[dask]'; without --dask all cores are used"
-        ) from None
+    if find_spec("distributed") is None:
+        raise ConfigError("--dask needs Dask: pip install 'vidtrack[dask]'; without --dask all cores are used")
+    for name in ("distributed", "tornado"):  # what concerns the user is raised
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with _cluster(where, workers) as client:
         _same_version(client)
 
@@ -103,7 +103,6 @@ def _dask(where: str, workers: int) -> Iterator[Engine]:
             lambda out: _end_all(client, out),
             check,
         )
-    del distributed
 
 
 @contextmanager
@@ -145,7 +144,6 @@ def worker_version() -> str:
 
 def _end_all(client: Any, out: str) -> None:
     """End what runs for a place on all workers; a scheduler that is gone cannot be told."""
-    try:
-        client.run(end_children, out, on_error="ignore")
-    except (OSError, TimeoutError, RuntimeError):
-        return
+    if client.status == "running":
+        with suppress(OSError, TimeoutError, RuntimeError):
+            client.run(end_children, out, on_error="ignore")
