@@ -86,8 +86,6 @@ def _alive() -> None:
 def _dask(where: str, workers: int) -> Iterator[Engine]:
     if find_spec("distributed") is None:
         raise ConfigError("--dask needs Dask: pip install 'vidtrack[dask]'; without --dask all cores are used")
-    for name in ("distributed", "tornado"):  # what concerns the user is raised
-        logging.getLogger(name).setLevel(logging.CRITICAL)
     with _cluster(where, workers) as client:
         _same_version(client)
 
@@ -110,6 +108,8 @@ def _cluster(where: str, workers: int) -> Iterator[Client]:
     """A client of the cluster that is asked for; one of its own is closed at the end."""
     from distributed import Client, LocalCluster
 
+    for name in ("distributed", "distributed.client", "tornado"):  # what concerns the user is raised
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if where == _LOCAL:
         cluster = LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0", silence_logs=50
