@@ -30,13 +30,13 @@ def test_interrupted_it_goes_on(tmp_path):
     first = start(*command, cwd=tmp_path)
     assert "3 to do on 1 core" in first.stderr.readline()
     first.send_signal(signal.SIGINT)
-    _, said = first.communicate(timeout=60)
+    _, said = first.communicate(timeout=600)
     assert first.returncode == 130
     assert "run the same command again to go on" in said
     assert "Traceback" not in said
     assert sorted(os.listdir(tmp_path / "out")) == ["index.parquet"]
     second = start(*command, cwd=tmp_path)
-    out, said = second.communicate(timeout=120)
+    out, said = second.communicate(timeout=600)
     assert second.returncode == 1
     assert "1 of 3 sources are set aside" in said
     assert out == f"{tmp_path / 'out'}\n"
