@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import score_highway
+from road_lines import crossings, leg_lines
 from score_events import Event, read_truth
 
 from vidtrack import formats
@@ -105,7 +106,16 @@ def simulated_road(folder: Path, road: str, seeds: Iterable[int]) -> list[Clip]:
     def draw(place: Path, seed: int) -> None:
         write_road(simulate_road(road, seed=seed), place)
 
-    return [_drawn(folder, road, seed, draw, last="site.toml") for seed in seeds]
+    drawn = [_drawn(folder, road, seed, draw, last="site.toml") for seed in seeds]
+    return [with_legs(clip) for clip in drawn]
+
+
+def with_legs(clip: Clip) -> Clip:
+    """A simulated road whose legs are counted."""
+    assert clip.truth is not None
+    lines = leg_lines(clip.video.parent / "site.toml")
+    told = tuple(f"{leg}:{','.join(f'{value:g}' for value in ends.ravel())}" for leg, ends in lines.items())
+    return replace(clip, lines=told, events=tuple(crossings(clip.truth, lines)))
 
 
 def _drawn(folder: Path, label: str, seed: int, draw: Callable[[Path, int], None], last: str) -> Clip:

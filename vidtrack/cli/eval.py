@@ -101,11 +101,14 @@ Examples:
 def command(options: EvalOptions) -> None:
     """Score RESULT (MOT text, CSV, Parquet or a run folder) against TRUTH (MOT gt.txt or CSV).
 
+    For a run folder of `vidtrack radar --radar-position`, TRUTH can be ADS-B (ASTERIX CAT 021), CAT 062 or AIS.
     Scores are fractions, not percent. Truth rows with conf 0 are ignored. Boxes are matched by
     intersection over union, positions (radar) by distance. Of a run folder mot.txt is scored, and
     the tracks table gives the consistency of the covariances (NIS, NEES).
     """
     from vidtrack import formats, score
+    from vidtrack.radar.feeds.recording import is_feed
+    from vidtrack.radar.feeds.truth import read_truth
 
     start_log(options.verbose, options.quiet)
     result, truth = options.result, options.truth
@@ -114,7 +117,7 @@ def command(options: EvalOptions) -> None:
     states = formats.read_states(result) if result.is_dir() else None
     scores = score.evaluate(
         found,
-        formats.read(truth),
+        read_truth(truth, result) if is_feed(truth) else formats.read(truth),
         iou=options.iou,
         points=options.points,
         max_distance=options.max_distance,

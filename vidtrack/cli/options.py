@@ -31,6 +31,7 @@ SETTING = {
     "mask": "source.mask",
     "fps": "source.fps",
     "skip_bad_rows": "radar.skip_bad_rows",
+    "radar_position": "radar.geodetic",
     "smooth": "output.smooth",
     "link": "output.link",
     "lines": "output.lines",
@@ -130,6 +131,29 @@ def page_options(function: Function) -> Function:
     ):
         function = option(function)
     return function
+
+
+class _Geodetic(click.ParamType):
+    """LAT,LON or LAT,LON,HEIGHT as three numbers."""
+
+    name = "LAT,LON[,HEIGHT]"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float, float]:
+        try:
+            latitude, longitude, *height = map(float, str(value).split(","))
+            (above,) = height or [0.0]
+        except ValueError:
+            self.fail(f"{value!r} is not LAT,LON or LAT,LON,HEIGHT such as 52.36,13.51,48", param, ctx)
+        if not (abs(latitude) <= 90 and abs(longitude) <= 180 and abs(above) <= 1e5):
+            self.fail(f"{value!r}: a latitude is in -90..90, a longitude in -180..180 degrees", param, ctx)
+        return latitude, longitude, above
+
+
+def radar_position_option(help_text: str) -> Callable[[Function], Function]:
+    """--radar-position, for commands that put radar tracks on the earth."""
+    return click.option("--radar-position", type=_Geodetic(), help=help_text)
 
 
 def seed_option(function: Function) -> Function:

@@ -147,3 +147,15 @@ def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") 
             raise
     report_outcome(run.folder, quiet, none)
     click.echo(run.folder)
+
+
+def finish_feed(run: Run, stop: Callable[[], None], quiet: bool) -> None:
+    """Complete a run over what comes from the network; Ctrl-C and SIGTERM call `stop`, which is its normal end."""
+    from vidtrack.cli.progress import progress, report_outcome
+    from vidtrack.cli.signals import stopping
+
+    with run, stopping(stop):
+        for _ in progress(run, run.count, run.name, quiet, "scan"):
+            pass  # the run has passed the step to its sinks
+    report_outcome(run.folder, quiet, "no tracks")
+    click.echo(run.folder)

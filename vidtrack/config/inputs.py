@@ -32,7 +32,7 @@ _OF_PICTURES = (
 )
 _UNREAD = {
     Input.VIDEO: ("detections", "radar", "live", "tracker.redundant"),
-    Input.CAMERA: ("detections", "radar", "tracker.redundant"),
+    Input.CAMERA: ("detections", "radar", "tracker.redundant", "detector.disturbance.preview_s"),
     Input.DETECTIONS: (
         *("detector", "blobs", "radar", "live"),
         *_OF_PICTURES,

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field
 
 from vidtrack.config.group import Group
 from vidtrack.config.names import Estimator, Life, Model, Resampling
+
+Latitude = Annotated[float, Field(ge=-90, le=90)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
 
 
 class RadarSettings(Group):
@@ -13,6 +18,14 @@ class RadarSettings(Group):
 
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """m; x, y, z of the radar, the origin of range and azimuth"""
+    geodetic: tuple[Latitude, Longitude, float] | None = None
+    """degrees, degrees, m; latitude, longitude and height in WGS84 of x = y = z = 0; None: not known"""
+    sac: int | None = Field(None, ge=0, le=255)
+    """system area code of the radar to track, where ASTERIX holds several; None: the only one"""
+    sic: int | None = Field(None, ge=0, le=255)
+    """system identification code, likewise"""
+    scan_s: float | None = Field(None, ge=0.1, le=3600)
+    """s; duration of a scan of ASTERIX or NMEA; None: from the antenna's marks, azimuths or times"""
     sigma_range_m: float = Field(50.0, gt=0)
     """m; standard deviation of a range where the file has no column sigma_range_m"""
     sigma_azimuth_deg: float = Field(0.3, gt=0, le=45)

@@ -55,6 +55,8 @@ class DisturbanceSettings(Group):
     """s; foreground that stands longer and is no tracked vehicle becomes scene; its departure is still detected"""
     steady_s: float = Field(4.0, gt=0)
     """s; the same for foreground that does not change while it stands"""
+    preview_s: float = Field(10.0, ge=0)
+    """s; the scene is learnt from so much of a file, run backwards, before tracking begins; 0: from the first frame"""
     relearn_share: float = Field(0.6, gt=0, le=1)
     """share of the picture; a larger foreground is a change of light or view, not traffic"""
     relearn_s: float = Field(1.0, ge=0)

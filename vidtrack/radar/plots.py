@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import logging
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
 from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.plane import Plane
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -34,6 +36,8 @@ class Plots:
     polar, dim, doppler   kind of z: polar or Cartesian, two or three dimensions, with or without range rate
     amplitude  (N,) or None if the file has none
     bad_rows   number of rows left out
+    losses     what else was left out, counted by name
+    plane      where x = y = 0 is on the earth; None: not known
     """
 
     scan: Ints
@@ -45,6 +49,8 @@ class Plots:
     doppler: bool
     amplitude: Floats | None
     bad_rows: int
+    losses: Mapping[str, int] = field(default_factory=dict)
+    plane: Plane | None = None
 
     def __len__(self) -> int:
         return len(self.scan)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config.radar import RadarSettings
@@ -22,7 +23,7 @@ from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable
 from vidtrack.output.threaded import Threaded
 from vidtrack.radar.filters import estimator, motion
-from vidtrack.radar.plots import read_plots
+from vidtrack.radar.reading import read
 from vidtrack.radar.scans import Measurements, measurements, surveyed
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
@@ -41,7 +42,7 @@ def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 
     Raises SourceError and PlotFormatError for a table that cannot be used.
     """
     settings = settings or Settings()
-    found = measurements(read_plots(path, settings.radar), settings.radar)
+    found = measurements(read(path, settings.radar), settings.radar)
     for step in scan_steps(found, build_radar_tracker(settings, found, seed=seed), settings.tracker.redundant):
         yield step.index, step.tracks
 
@@ -62,11 +63,13 @@ def run_plots(
 @contextmanager
 def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> Iterator[Pipeline]:
     """The pipeline of a plot table. Raises SourceError, PlotFormatError, ConfigError."""
-    plots = read_plots(path, settings.radar)
+    plots = read(path, settings.radar)
     found = measurements(plots, settings.radar)
     refuse_link(settings.output, "radar runs")
     tracker = build_radar_tracker(settings, found, explain=extras.explain, seed=seed)
-    account = {"plots": len(plots), "bad_rows": plots.bad_rows, "truncated": False}
+    account: dict[str, Any] = {"plots": len(plots), "bad_rows": plots.bad_rows, **plots.losses, "truncated": False}
+    if plots.plane is not None:
+        account["origin"] = [plots.plane.latitude, plots.plane.longitude, plots.plane.height]
 
     def summary(folder: Path) -> Summary:
         return Summary(folder / "summary.json", path, settings, lambda: account | tracker.rates.as_dict(), unit="scans")

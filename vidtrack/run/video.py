@@ -26,13 +26,14 @@ from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.traffic.metres import footprints_of
 from vidtrack.video import background
+from vidtrack.video.background.disturbance import Disturbance
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Background
 from vidtrack.video.frame import Frame
 from vidtrack.video.mask import read_mask
 from vidtrack.video.resources import frame_by_frame
-from vidtrack.video.source import open_source
+from vidtrack.video.source import Source, open_source
 
 if TYPE_CHECKING:
     from vidtrack.traffic.footprint import Footprints, Stand
@@ -74,6 +75,7 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
         if site is not None and road is None:
             raise ConfigError(f"{site} has no section [calibration], so nobody knows the metres; track without a site")
         detector = build_detector(settings)
+        look_ahead(source, detector, settings)
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
@@ -106,6 +108,8 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         detector = build_detector(settings)
         if isinstance(source, Recording):
             source.restore = Checkpoint(detector, tracker, source.like).restore
+        else:
+            look_ahead(source, detector, settings)
         subject = file_subject(extras.source or path, source, tracker.rates.as_dict, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S
@@ -124,6 +128,13 @@ def build_detector(settings: Settings) -> Background:
     path = settings.source.mask
     keep = None if path is None else read_mask(path)
     return background.create(settings.detector, settings.source.scale, keep)
+
+
+def look_ahead(source: Source, detector: Background, settings: Settings) -> None:
+    """Show the first seconds of a video to a detector that learns the scene from them."""
+    seconds = settings.detector.disturbance.preview_s
+    if isinstance(detector, Disturbance) and seconds:
+        detector.preview(source.opening(seconds))
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

@@ -82,7 +82,7 @@ class VideoFile:
         near = self._after_key_frame(begin_s)
         first = next(near, None)
         if first is None or first[0] > begin_s + 1 / self.fps:
-            again = VideoFile(self._path, self._settings, SourceStats())
+            again = VideoFile(self._path, self._settings, SourceStats(told=True))
             near = ((time_s, picture) for _, time_s, picture in again)
         else:
             near = chain([first], near)

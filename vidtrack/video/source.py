@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import glob
 from collections.abc import Iterator
+from contextlib import closing
 from itertools import chain
 from pathlib import Path
 from types import TracebackType
@@ -29,7 +30,7 @@ def open_source(path: str, settings: SourceSettings) -> Source:
     """
     stats = SourceStats()
     try:
-        return Source(_pictures(path, settings, stats), settings, stats)
+        return Source(path, settings, stats)
     except OSError as error:
         raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
@@ -65,7 +66,7 @@ class Excerpts:
 
     def __init__(self, path: str, settings: SourceSettings) -> None:
         try:
-            self._pictures = _pictures(path, settings, SourceStats())
+            self._pictures = _pictures(path, settings, SourceStats(told=True))
         except OSError as error:
             raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
@@ -91,8 +92,9 @@ class Source:
     Iterating raises SourceError if the span of time holds no frame.
     """
 
-    def __init__(self, pictures: VideoFile | ImageSequence, settings: SourceSettings, stats: SourceStats) -> None:
-        self._pictures = pictures
+    def __init__(self, path: str, settings: SourceSettings, stats: SourceStats) -> None:
+        self._path, self._settings = path, settings
+        self._pictures = pictures = _pictures(path, settings, stats)
         self._span = Span.of(settings)
         self.name = pictures.name
         self.place = pictures.place
@@ -103,6 +105,7 @@ class Source:
         if first is None:
             pictures.close()
             raise SourceError(f"no picture of {pictures.name} can be decoded")
+        self._first = first
         self.height, self.width = first.shape
         self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
         self._ahead = ReadAhead(self._alike(self._in_span(chain([first], frames)), first), _DEPTH)
@@ -122,6 +125,13 @@ class Source:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def opening(self, seconds: float) -> Iterator[Frame]:
+        """The frames of its first seconds, from a second reading; their numbers are 0."""
+        begin_s, end_s = self._span.start_s, min(self._span.end_s, self._span.start_s + seconds)
+        with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
+            for picture in again.between(begin_s, end_s):
+                yield matched(to_frame(0, *picture), self._first)
 
     def close(self) -> None:
         """Stop reading; may be called at any time and again."""

@@ -19,6 +19,7 @@ class SourceStats:
     header_fps      rate that the source states; None without one
     fps_assumed     whether the rate is assumed
     warnings        warnings in order
+    told            the user knows the warnings from another reading of the source
     """
 
     frames_read: int = 0
@@ -28,11 +29,13 @@ class SourceStats:
     header_fps: float | None = None
     fps_assumed: bool = False
     warnings: list[str] = field(default_factory=list)
+    told: bool = False
 
     def warn(self, message: str) -> None:
-        """Log a warning and keep it."""
+        """Keep a warning, and log it unless the user knows it."""
         self.warnings.append(message)
-        log.warning(message)
+        if not self.told:
+            log.warning(message)
 
     def count_error(self, what: str) -> None:
         """Count a damaged picture; only the first one gives a warning."""

@@ -16,7 +16,7 @@ def export(*arguments):
     return cli.main(["export", *map(str, arguments)], prog_name="vidtrack", standalone_mode=False)
 
 
-@pytest.mark.parametrize("name", [name for name, form in FORMATS.items() if not form.measures])
+@pytest.mark.parametrize("name", [name for name, form in FORMATS.items() if not (form.measures or form.radar)])
 def test_every_format_is_written_into_the_folder(tmp_path, capsys, name):
     run = write_run(tmp_path, *usual_ways())
     export(run, "--as", name, "-o", tmp_path / "out")

@@ -230,7 +230,7 @@ def test_ssam_has_fronts_and_rears_from_a_near_origin(run, tmp_path, expected):
     assert found == {key for key, row in expected.items() if np.isfinite(row["heading_deg"])}
 
 
-@pytest.mark.parametrize("name", [name for name, form in FORMATS.items() if not form.measures])
+@pytest.mark.parametrize("name", [name for name, form in FORMATS.items() if not (form.measures or form.radar)])
 @pytest.mark.parametrize("rows", [1, 7])
 def test_the_size_of_a_batch_changes_nothing(run, tmp_path, monkeypatch, name, rows):
     for folder, size in (("whole", road_run._BATCH), ("small", rows)):

@@ -14,7 +14,7 @@ from vidtrack.output.folder import writing
 from vidtrack.run.slices.cuts import Cut
 from vidtrack.run.slices.kept import About, KeptSteps
 from vidtrack.run.trackers import build_blob_tracker
-from vidtrack.run.video import build_detector, video_steps
+from vidtrack.run.video import build_detector, look_ahead, video_steps
 from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.video.foreground import Background
@@ -53,7 +53,9 @@ def track_slice(
         size = source.width, source.height
         tracker = build_blob_tracker(settings.tracker, size, smooth=settings.output.smooth)
         both = _Both(detector, tracker)
-        if before is not None:
+        if before is None:
+            look_ahead(source, detector, settings)
+        else:
             restore(both, read_state(before / STATE))
         kept, count = KeptSteps(folder), 0
         frames = (frame for frame in source if cut.holds(frame.time_s))

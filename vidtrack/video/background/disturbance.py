@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import cv2
@@ -19,7 +20,7 @@ from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import BEAM, Scene, absorb, adopt, learn, no_scene, spare, start
+from vidtrack.video.background.scene import BEAM, Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
 from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
@@ -32,6 +33,8 @@ _UNSURE_GHOST_S = 0.3  # cover that makes a ghost during that time
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
 _LIFT = 0.5  # grey levels a second by which the darkest luminance seen is forgotten
 _GAP_S = 2.0  # after a longer gap between frames the scene is as uncertain as after a start, and no cover is counted
+_PREVIEW_EVERY_S = 0.2  # between pictures of the preview
+_ROUNDING_S = 1e-6
 _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but not the 0 of pixels that were seen free
 
 
@@ -68,20 +71,38 @@ class Disturbance:
         self._frames = 0  # learnt since the start
         self._changed_s = 0.0  # how long the picture has been another one
 
+    def preview(self, frames: Iterable[Frame]) -> None:
+        """Learn the scene from a video's first seconds, before `apply` gets the first frame.
+
+        They are run backwards, so the scene is that of the first frame, but for what stands in it all the time.
+        """
+        pictures: list[tuple[float, Picture]] = []
+        for frame in frames:
+            if not pictures or frame.time_s > pictures[-1][0] + _PREVIEW_EVERY_S - _ROUNDING_S:
+                pictures.append((frame.time_s, smooth(self._view.reduce(frame))))
+        if len(pictures) < 2:
+            return
+        nothing = np.empty((0, 4))
+        for time_s, picture in reversed(pictures):
+            self._apply(picture, -time_s, nothing)
+        self._rewind(*pictures[0])
+
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""
-        picture = smooth(self._view.reduce(frame))
+        return self._apply(smooth(self._view.reduce(frame)), frame.time_s, known)
+
+    def _apply(self, picture: Picture, time_s: float, known: Floats) -> Foreground:
         if not self._scene.luma.size:
-            self._scene = self._start(picture, frame.time_s)
-        dt, self._time_s = frame.time_s - self._time_s, frame.time_s
+            self._scene = self._start(picture, time_s)
+        dt, self._time_s = time_s - self._time_s, time_s
         if dt > _GAP_S:
-            self._start_s = frame.time_s
+            self._start_s = time_s
         known = self._camera.on_canvas(known, self._view.step)
         if self._settings.registration:
-            self._scene = self._camera.follow(picture.luma, self._scene, known, frame.time_s)
+            self._scene = self._camera.follow(picture.luma, self._scene, known, time_s)
         if self._camera.lost_s > 0:
             self._changed_s = self._camera.lost_s
-            self._change.skip(frame.time_s)
+            self._change.skip(time_s)
             nothing = np.zeros_like(picture.luma)
             mask, weak, strength = nothing, nothing, np.zeros(picture.luma.shape, np.float32)
         elif self._camera.moves:
@@ -91,13 +112,27 @@ class Disturbance:
             mask, weak, strength = self._map(picture, known, dt)
         if not self._camera.trusted:
             mask = np.zeros_like(mask)
+        if self._changed_s == 0 and self._is_new_second(dt):
+            self._judge_light(picture)
         place, motion = self._camera.place, self._camera.motion
         anew = self._changed_s > self._settings.relearn_s
         elsewhere = anew and self._camera.lost_s > 0
         if anew:
-            self._scene = self._start(picture, frame.time_s)
+            self._scene = self._start(picture, time_s)
         foreground = self._view.foreground(mask, strength, place, motion)
         return replace(foreground, weak=weak, warnings=self._camera.warnings(), elsewhere=elsewhere)
+
+    def _rewind(self, time_s: float, picture: Picture) -> None:
+        """Begin with this picture, the last of the preview, and the scene learnt from it."""
+        lost = self._camera.lost_s > 0 or not self._camera.trusted or self._changed_s > 0
+        scene = self._start(picture, time_s) if lost else self._scene
+        if self._camera.moves:
+            scene = settled(scene, self._camera.motion, self._view.reduced)
+        self._scene = uncovered(scene)
+        self._camera = Camera(self._settings.still_s)
+        self._change = Change(self._settings.relearn_share)
+        self._time_s = self._start_s = time_s
+        self._frames, self._changed_s = 0, 0.0
 
     def _map(
         self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
@@ -123,10 +158,7 @@ class Disturbance:
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
         self._learn(picture, scene, mask, hit, dt, span)
-        if math.floor(self._time_s) != math.floor(self._time_s - dt):  # once a second is often enough
-            self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
-            haze = veil(picture.luma)
-            self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
+        if self._is_new_second(dt):
             self._absorb(picture, scene, hit)
         return mask, weak, strength
 
@@ -146,6 +178,18 @@ class Disturbance:
         self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
         self._veil = veil(picture.luma) or 0.0
         return scene
+
+    def _is_new_second(self, dt: float) -> bool:
+        """For what is often enough once a second."""
+        return math.floor(self._time_s) != math.floor(self._time_s - dt)
+
+    def _judge_light(self, picture: Picture) -> None:
+        """Contrast and haze of the scene in view; a canvas has black rims where nothing was seen."""
+        moves = self._camera.moves
+        in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
+        self._contrast, self._hazy = contrast(in_view.luma), haziness(in_view.luma)
+        haze = veil(picture.luma)
+        self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
 
     @property
     def _black(self) -> np.float32:

@@ -57,8 +57,14 @@ def start(picture: Picture) -> Scene:
     """The scene from the first frame; an average over seconds would contain smeared traffic."""
     luma, cb, cr = (plane.astype(np.float32) for plane in picture)
     shape = luma.shape
-    none = np.zeros(shape, np.float32)
-    return Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), none, np.full(shape, NEVER), none.copy(), none.copy())
+    return uncovered(Scene(luma, cb, cr, np.full(shape, FRESH_NOISE), *np.empty((4, *shape), np.float32)))
+
+
+def uncovered(scene: Scene) -> Scene:
+    """The scene without memory of what covered it."""
+    covered_s, cover, steady_s = np.zeros((3, *scene.luma.shape), np.float32)
+    never = np.full(scene.luma.shape, NEVER)
+    return scene._replace(covered_s=covered_s, former=never, cover=cover, steady_s=steady_s)
 
 
 @kernel

@@ -1,0 +1,239 @@
+"""ASTERIX recordings become plots; what is damaged is left out and counted."""
+
+import csv
+import logging
+import sys
+
+import numpy as np
+import pytest
+from asterix_records import RADAR, block, mark, plot, sweeps, track
+
+from vidtrack.config.radar import RadarSettings
+from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError, PlotFormatError
+from vidtrack.radar.feeds import layout
+from vidtrack.radar.feeds.asterix import Decoder
+from vidtrack.radar.feeds.messages import Kind, Losses
+from vidtrack.radar.feeds.recording import is_feed, read_messages
+from vidtrack.radar.reading import read
+from vidtrack.run.radar import track_plots
+from vidtrack.simulate.radar_scenarios import simulate_radar
+from vidtrack.simulate.radar_write import write_radar
+
+NAUTICAL_MILE = 1852.0
+OTHER = (("SAC", 25), ("SIC", 202))
+
+
+def recorded(tmp_path, *blocks, name="radar.ast"):
+    path = tmp_path / name
+    path.write_bytes(b"".join(blocks))
+    return path
+
+
+def seconds(path, **settings):
+    return read(path, RadarSettings(**settings))
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A simulated scene seen by a turning antenna from 23:59 on: its recording, and a table of the same plots."""
+    folder = tmp_path_factory.mktemp("scene")
+    seen = simulate_radar("radar-tws", 3)
+    write_radar(seen, folder)
+    with (folder / "plots.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if int(row["scan"]) < 30]
+    table = {name: np.array([float(row[name]) for row in rows]) for name in ("scan", "range_m", "azimuth_deg")}
+    begin_s = 86400 - 60
+    (folder / "radar.ast").write_bytes(b"".join(sweeps(table, begin_s=begin_s)))
+    azimuth_deg = table["azimuth_deg"] % 360
+    table["time_s"] = begin_s + 4 * (table["scan"] + azimuth_deg / 360)
+    order = np.lexsort((azimuth_deg, table["scan"]))
+    table = {name: column[order] for name, column in table.items()}
+    with (folder / "same.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([*table, "sigma_range_m", "sigma_azimuth_deg"])
+        writer.writerows([*row, 50, 0.3] for row in zip(*table.values(), strict=True))
+    return folder, table
+
+
+def test_a_simulated_scene_is_read_to_within_half_the_last_bit(scene):
+    folder, table = scene
+    plots = read(folder / "radar.ast", RadarSettings())
+    assert (plots.scan == table["scan"]).all()
+    np.testing.assert_allclose(plots.time_s, table["time_s"], atol=0.5 / 128 + 1e-9)
+    np.testing.assert_allclose(plots.z[:, 0], table["range_m"], atol=NAUTICAL_MILE / 512)
+    azimuth_deg = np.degrees(plots.z[:, 1]) - table["azimuth_deg"]
+    np.testing.assert_allclose(azimuth_deg - 360 * np.round(azimuth_deg / 360), 0, atol=360 / 131072 + 1e-9)
+    assert not any(plots.losses.values())
+
+
+def test_a_simulated_scene_gives_the_tracks_of_its_table(scene):
+    folder, _ = scene
+    settings = Settings()
+    for (scan, found), (number, expected) in zip(
+        track_plots(folder / "radar.ast", settings), track_plots(folder / "same.csv", settings), strict=True
+    ):
+        assert scan == number
+        assert (found.id == expected.id).all()
+        np.testing.assert_allclose(found.xy, expected.xy, atol=60)
+
+
+def test_two_feeds_give_each_plot_once(tmp_path):
+    one = [mark(0.0, turn_s=4.0), *(block(plot(t, 20000 + t, 10.0)) for t in (0.1, 4.1, 8.1))]
+    twice = [part for part in one for _ in range(2)]
+    plots = seconds(recorded(tmp_path, *twice))
+    assert len(plots) == 3
+    assert plots.losses["duplicates"] == 3
+    assert plots.scan.tolist() == [0, 1, 2]
+
+
+def test_time_goes_on_after_midnight(tmp_path):
+    blocks = [block(plot(86390 + 4 * k, 20000, 0.5)) for k in range(6)]
+    plots = seconds(recorded(tmp_path, mark(86390 - 0.01, turn_s=4.0), *blocks))
+    np.testing.assert_allclose(plots.time_s, 86390 + 4 * np.arange(6))
+    assert plots.scan.tolist() == list(range(6))
+
+
+def test_a_stray_time_is_left_out(tmp_path):
+    times = [100, 104, 108, 50000, 112, 116]
+    plots = seconds(recorded(tmp_path, mark(100, turn_s=4.0), *(block(plot(t, 20000 + t, 1.0)) for t in times)))
+    assert plots.time_s.tolist() == [100, 104, 108, 112, 116]
+    assert plots.losses["strayed"] == 1
+
+
+def test_a_clock_that_is_set_back_goes_on(tmp_path):
+    times = [1000 + 4 * k for k in range(10)] + [400 + 4 * k for k in range(10)]
+    plots = seconds(recorded(tmp_path, mark(1000, turn_s=4.0), *(block(plot(t, 20000 + t, 1.0)) for t in times)))
+    assert plots.losses["resets"] == 1
+    assert (np.diff(plots.time_s) >= 0).all()
+    assert plots.time_s[-1] < 1100
+
+
+def test_several_radars_are_refused_until_one_is_chosen(tmp_path):
+    blocks = [
+        block(plot(4 * k, 20000 + 1000 * n, 1.0, radar)) for k in range(4) for n, radar in enumerate([RADAR, OTHER])
+    ]
+    path = recorded(tmp_path, mark(0.0, turn_s=4.0), *blocks)
+    with pytest.raises(PlotFormatError, match=r"2 radars \(SAC/SIC\): 25/201 \(4 plots\), 25/202 \(4 plots\); choose"):
+        seconds(path)
+    assert set(seconds(path, sic=202).z[:, 0].round(-3)) == {21000}
+    with pytest.raises(PlotFormatError, match="no plots of the radar with this sac and sic"):
+        seconds(path, sic=7)
+
+
+def test_reports_without_a_detection_are_no_plots(tmp_path):
+    coasting = plot(1.0, 30000, 5.0).set_item("020", ((0, 0, 0, 0, 0, None),))
+    plots = seconds(recorded(tmp_path, mark(0.0, turn_s=4.0), block(plot(0.5, 20000, 1.0), coasting)))
+    assert plots.z[:, 0].round(-3).tolist() == [20000]
+
+
+def test_doppler_is_read_where_every_plot_has_one(tmp_path):
+    def moving(time_s, speed):
+        return block(plot(time_s, 20000 + time_s, 1.0, **{"120": {"CAL": (0, 0, ("CAL", (speed, "m/s")))}}))
+
+    blocks = [mark(0.0, turn_s=4.0), moving(0.5, 35), moving(4.5, -12)]
+    assert seconds(recorded(tmp_path, *blocks)).z[:, 2].tolist() == [35, -12]
+    assert seconds(recorded(tmp_path, *blocks, block(plot(8.5, 20000, 1.0)))).z.shape == (3, 2)
+
+
+def test_system_tracks_are_in_the_plane_of_the_radar(tmp_path):
+    blocks = [track(4.0 * k, 52.0 + 0.001 * k, 13.0, number=7) for k in range(4)]
+    plots = seconds(recorded(tmp_path, *blocks), geodetic=(52.0, 13.0, 0.0))
+    assert plots.scan.tolist() == [0, 1, 2, 3]
+    np.testing.assert_allclose(plots.z[:, 0], 0, atol=0.5)
+    np.testing.assert_allclose(plots.z[:, 1], 111.27 * np.arange(4), atol=0.7)
+
+
+def test_damage_is_counted_in_one_line_and_the_rest_is_read(tmp_path, caplog):
+    good = [block(plot(4.0 * k, 20000 + k, 1.0)) for k in range(8)]
+    torn = bytearray(b"".join(good))
+    torn[len(good[0]) + 3 : len(good[0]) + 6] = b"\xff\xff\xff"  # the field specification of the second one
+    path = recorded(tmp_path, mark(0.0, turn_s=4.0), bytes(torn), b"\x30\x00")
+    with caplog.at_level(logging.WARNING, "vidtrack"):
+        plots = seconds(path)
+    assert len(plots) == 7
+    assert [line for line in caplog.messages if "left out" in line] == [f"{path}: left out: 2 damaged"]
+
+
+def test_a_recording_goes_on_after_bytes_that_are_no_block(tmp_path):
+    blocks = [block(plot(4.0 * k, 20000 + k, 1.0)) for k in range(8)]
+    path = recorded(tmp_path, *blocks[:4], bytes(range(200, 230)), *blocks[4:])
+    assert len(seconds(path)) == 8
+
+
+def test_truncated_records_never_crash(scene):
+    folder, _ = scene
+    content = (folder / "radar.ast").read_bytes()[:120]
+    for end in range(len(content)):
+        for message in Decoder(Losses()).messages(content[:end]):
+            assert message.kind in Kind
+
+
+def test_hostile_records_never_crash(scene):
+    folder, _ = scene
+    rng = np.random.default_rng(0)
+    content = np.frombuffer((folder / "radar.ast").read_bytes(), np.uint8)
+    losses, found, records = Losses(), 0, 0
+    decoder = Decoder(losses)
+    while records < 10_000:
+        begin = rng.integers(0, len(content) - 400)
+        piece = content[begin : begin + 400].copy()
+        at = rng.integers(0, len(piece), 20)
+        piece[at] = rng.integers(0, 256, len(at))
+        found += len(list(decoder.messages(piece.tobytes())))
+        records += 20
+    assert losses.damaged > 1000
+    assert found > 1000
+
+
+@pytest.mark.parametrize("category", [1, 2, 21, 34, 48, 62])
+def test_records_end_where_the_library_says(category):
+    from asterix.base import Bits, ParsingMode
+    from asterix.generated import manifest
+
+    rng = np.random.default_rng(category)
+    uap = manifest["CATS"][category][-1].cv_uap
+    records = getattr(uap, "cv_uaps", None) or {"": uap.cv_record}
+    accepted = 0
+    for name, record in records.items():
+        for _ in range(150):
+            body = rng.integers(0, 256, 60, dtype=np.uint8).tobytes()
+            body = bytes([body[0] & 0xFE]) + body[1:] if rng.random() < 0.7 else body
+            parsed = record.parse(ParsingMode.StrictParsing, Bits.from_bytes(body))
+            try:
+                _, end = layout.layouts()[category][name].places(body, 0)
+            except layout.Damaged:
+                end = None
+            ends = None if isinstance(parsed, ValueError) or parsed[0].is_empty() else 60 - len(parsed[1]) // 8
+            if name in ("plot", "track") and ends is not None and parsed[0].items_rfs:
+                continue  # items in any order, which no radar of this age sends
+            assert end == ends
+            accepted += end is not None
+    assert accepted > 15
+
+
+def test_without_the_library_the_message_says_what_to_install(tmp_path, monkeypatch):
+    path = recorded(tmp_path, mark(0.0), mark(4.0))
+    monkeypatch.setitem(sys.modules, "asterix.generated", None)
+    layout.layouts.cache_clear()
+    with pytest.raises(ConfigError, match=r"pip install 'vidtrack\[asterix\]'"):
+        seconds(path)
+
+
+def test_a_recording_without_plots_is_refused(tmp_path):
+    with pytest.raises(PlotFormatError, match="holds no plots; it has none"):
+        seconds(recorded(tmp_path, mark(0.0), mark(4.0)))
+
+
+def test_tables_are_no_recordings(tmp_path, scene):
+    folder, _ = scene
+    assert is_feed(folder / "radar.ast")
+    assert not is_feed(folder / "same.csv")
+    assert not is_feed(tmp_path / "absent.ast")
+
+
+def test_a_hundred_messages_of_a_kind_are_kept_in_order(scene):
+    folder, _ = scene
+    messages = read_messages(folder / "radar.ast", Losses())
+    assert messages.marks.sum() == 30
+    assert set(messages.source.tolist()) == {25 * 256 + 201}

@@ -1,0 +1,107 @@
+"""Sentences of NMEA 0183 and AIS."""
+
+import sys
+from functools import reduce
+
+import numpy as np
+import pyais
+import pytest
+
+from vidtrack.config.radar import RadarSettings
+from vidtrack.errors import ConfigError
+from vidtrack.radar.feeds import nmea
+from vidtrack.radar.feeds.messages import Kind, Losses
+from vidtrack.radar.reading import read
+
+
+def sentence(body):
+    return f"${body}*{reduce(lambda total, octet: total ^ octet, body.encode(), 0):02X}\r\n"
+
+
+def messages(*lines):
+    losses = Losses()
+    return list(nmea.Decoder(losses).messages("".join(lines).encode())), losses
+
+
+def ais(second=0, **position):
+    return pyais.encode_dict({"type": 1, "mmsi": 211000001, "second": second, **position})[0] + "\r\n"
+
+
+def test_a_tracked_target_has_range_and_bearing():
+    ((message,), losses) = messages(sentence("RATTM,03,2.50,270.0,T,10.0,90.0,T,0.1,5.0,N,ABC,T,,123519.50,A"))
+    assert message[:4] == (Kind.POLAR, 0, 0, 12 * 3600 + 35 * 60 + 19.5)
+    assert message.u == pytest.approx(4630)
+    assert np.degrees(message.v) == pytest.approx(270)
+    assert message.target == 3
+    assert not losses.damaged
+
+
+def test_a_relative_bearing_needs_the_heading():
+    relative = sentence("RATTM,03,1.0,350.0,R,10.0,90.0,T,0.1,5.0,K,,T,,000010.00,A")
+    assert messages(relative)[1].damaged == 1
+    ((message,), _) = messages(sentence("HEHDT,30.0,T"), relative)
+    assert np.degrees(message.v) % 360 == pytest.approx(20)
+    assert message.u == pytest.approx(1000)
+
+
+def test_a_target_with_latitude_and_longitude():
+    ((message,), _) = messages(sentence("RATLL,07,4212.500,N,00830.000,W,,101530.00,T,"))
+    assert message.kind == Kind.GEODETIC
+    assert (message.u, message.v) == (pytest.approx(42 + 12.5 / 60), pytest.approx(-8.5))
+
+
+def test_a_lost_target_is_none():
+    found, losses = messages(sentence("RATTM,03,2.5,270.0,T,,,T,,,N,,L,,,A"), sentence("RATLL,07,,N,,W,,,L,"))
+    assert not found
+    assert not losses.damaged
+
+
+def test_a_ship_has_its_position_and_number():
+    ((message,), _) = messages("\\s:rx,c:1700000000*00\\" + ais(lat=53.5, lon=8.1))
+    assert (message.u, message.v) == (pytest.approx(53.5), pytest.approx(8.1))
+    assert message.target == 211000001
+    assert message.clock_s == 1700000000 % 86400
+
+
+def test_without_a_time_stamp_the_seconds_go_on():
+    found, _ = messages(sentence("GPGGA,235958.00,,,,,0,,,,,,,,"), ais(59, lat=1, lon=1), ais(2, lat=1, lon=1))
+    assert [message.clock_s for message in found] == [86399, 2]
+
+
+def test_a_wrong_checksum_is_damage():
+    found, losses = messages(
+        sentence("RATTM,03,2.50,270.0,T,10.0,90.0,T,0.1,5.0,N,ABC,T,,123519.50,A").replace("2.50", "2.51")
+    )
+    assert not found
+    assert losses.damaged == 1
+
+
+def test_hostile_text_never_crashes():
+    rng = np.random.default_rng(0)
+    good = (sentence("RATTM,03,2.5,270.0,T,10.0,90.0,T,0.1,5.0,N,A,T,,123519.5,A") + ais(5, lat=1, lon=1)).encode()
+    decoder = nmea.Decoder(losses := Losses())
+    for _ in range(1000):
+        line = bytearray(good)
+        for at in rng.integers(0, len(line), 3):
+            line[at] = rng.integers(1, 256)
+        for message in decoder.messages(bytes(line)):
+            assert np.isfinite([message.u, message.v]).all()
+    assert losses.damaged > 500
+
+
+def test_ships_are_tracked_once_a_round(tmp_path):
+    lines = [f"\\c:{1700000000 + 10 * k}*00\\" + ais(lat=53.5 + 0.0005 * k, lon=8.1) for k in range(12)]
+    path = tmp_path / "ships.nmea"
+    path.write_text("".join(lines))
+    plots = read(path, RadarSettings(geodetic=(53.5, 8.1, 0.0)))
+    assert plots.scan.tolist() == list(range(12))
+    np.testing.assert_allclose(plots.z[:, 1], 55.65 * np.arange(12), atol=0.5)
+
+
+def test_without_the_library_the_message_says_what_to_install(monkeypatch):
+    one = ais(lat=1, lon=1)
+    monkeypatch.setitem(sys.modules, "pyais", None)
+    nmea.ais_library.cache_clear()
+    with pytest.raises(ConfigError, match=r"pip install 'vidtrack\[ais\]'"):
+        messages(one)
+    nmea.ais_library.cache_clear()

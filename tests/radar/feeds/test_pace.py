@@ -1,0 +1,95 @@
+"""Scans from the turns of the antenna, or from time."""
+
+import numpy as np
+import pytest
+
+from vidtrack.radar.feeds.messages import Kind, Message, Messages
+from vidtrack.radar.feeds.pace import Rounds, Turns, pace_of
+
+TURN_S = 4.7
+
+
+def swept(rng, turns=20, per_turn=15, marks=(0.0,), jitter_s=0.0, stated=float("nan"), known=1.0):
+    """Messages of an antenna, in order of time, and the true turn of each."""
+    found = []
+    for turn in range(turns):
+        for mark in marks:
+            if rng.random() < known:
+                found.append(((turn + mark) * TURN_S, turn, Kind.MARK, stated, 2 * np.pi * mark))
+        for part in rng.random(per_turn):
+            found.append(((turn + part) * TURN_S + rng.normal(0, jitter_s), turn, Kind.POLAR, 1000, 2 * np.pi * part))
+    found.sort()
+    return Messages.of([Message(kind, 0, 48, time, u, v) for time, _, kind, u, v in found]), [
+        turn for _, turn, *_ in found
+    ]
+
+
+def scans(messages, scan_s=None):
+    pace = pace_of(messages, scan_s)
+    scan = np.floor(pace.progress(messages)).astype(int)
+    return pace, scan - scan[0]
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"stated": TURN_S},
+        {},
+        {"marks": (0.0, 0.25, 0.5, 0.75)},
+        {"marks": ()},
+        {"known": 0.7},
+        {"marks": (), "jitter_s": 0.05},
+        {"jitter_s": 0.05},
+    ],
+)
+def test_every_message_is_in_the_turn_that_saw_it(how):
+    messages, turn = swept(np.random.default_rng(1), **how)
+    pace, scan = scans(messages)
+    assert isinstance(pace, Turns)
+    assert pace.period_s == pytest.approx(TURN_S, rel=0.02)
+    assert (scan == np.array(turn) - turn[0]).all()
+
+
+def test_scattered_azimuths_do_not_turn_the_antenna():
+    rng = np.random.default_rng(2)
+    messages, turn = swept(rng, turns=60, marks=())
+    false = rng.random(len(messages)) < 0.1
+    messages.v[false] = rng.uniform(0, 2 * np.pi, int(false.sum()))
+    _, scan = scans(messages)
+    assert (scan[~false] - np.array(turn)[~false] == scan[~false][0] - turn[int(np.argmin(false))]).all()
+
+
+def test_plots_of_one_time_are_of_the_scan_of_their_mark():
+    rng = np.random.default_rng(3)
+    found = []
+    for turn in range(12):
+        found.append(Message(Kind.MARK, 0, 34, turn * 4.0, 4.0, 0.0))
+        found += [Message(Kind.POLAR, 0, 48, turn * 4.0 + 0.01, 1000, v) for v in rng.uniform(0, 2 * np.pi, 8)]
+    _, scan = scans(Messages.of(found))
+    assert (scan == np.repeat(np.arange(12), 9)).all()
+
+
+def test_without_an_antenna_plots_of_one_time_are_a_scan():
+    rng = np.random.default_rng(4)
+    found = [
+        Message(Kind.POLAR, 0, 48, turn * 2.5, 1000, v) for turn in range(12) if turn != 6 for v in rng.uniform(0, 6, 8)
+    ]
+    pace, scan = scans(Messages.of(found))
+    assert isinstance(pace, Rounds)
+    assert np.unique(scan).tolist() == [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
+
+
+def test_a_round_is_as_long_as_nine_of_ten_targets_need():
+    found = [
+        Message(Kind.GEODETIC, 0, 0, time, 50.0, 5.0 + target, target=target)
+        for target in range(20)
+        for time in np.arange(0, 100, 10 if target else 3) + 0.1 * target
+    ]
+    pace, _ = scans(Messages.of(sorted(found, key=lambda message: message.clock_s)))
+    assert pace.period_s == pytest.approx(10)
+
+
+def test_the_duration_can_be_given():
+    messages, _ = swept(np.random.default_rng(5), marks=())
+    messages.v[:] = 0.0
+    assert scans(messages, scan_s=2.0)[0].period_s == 2.0

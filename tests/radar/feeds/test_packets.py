@@ -1,0 +1,91 @@
+"""Payloads of captures and recordings."""
+
+import struct
+
+import pytest
+
+from vidtrack.radar.feeds.packets import payloads
+
+PAYLOADS = [b"first payload", b"2", b"the third one"]
+ETHERNET = bytes(12) + b"\x08\x00"
+
+
+def udp(payload):
+    return struct.pack(">HHHH", 1000, 8600, 8 + len(payload), 0) + payload
+
+
+def ipv4(payload, fragment=0, protocol=17):
+    content = udp(payload)
+    head = struct.pack(">BBHHHBBH4s4s", 0x45, 0, 20 + len(content), 1, fragment, 9, protocol, 0, bytes(4), bytes(4))
+    return head + content
+
+
+def ipv6(payload):
+    content = udp(payload)
+    return struct.pack(">IHBB", 6 << 28, len(content), 17, 9) + bytes(32) + content
+
+
+def pcap(frames, link=1, order="<", magic=0xA1B2C3D4):
+    head = struct.pack(f"{order}IHHIIII", magic, 2, 4, 0, 0, 65535, link)
+    return head + b"".join(struct.pack(f"{order}IIII", 0, 0, len(f), len(f)) + f for f in frames)
+
+
+def pcapng(frames, order="<"):
+    def block(kind, body):
+        body += bytes(-len(body) % 4)
+        size = struct.pack(f"{order}I", 12 + len(body))
+        return struct.pack(f"{order}I", kind) + size + body + size
+
+    section = block(0x0A0D0D0A, struct.pack(f"{order}IHHq", 0x1A2B3C4D, 1, 0, -1))
+    interface = block(1, struct.pack(f"{order}HHI", 1, 0, 0))
+    return (
+        section
+        + interface
+        + b"".join(block(6, struct.pack(f"{order}IIIII", 0, 0, 0, len(f), len(f)) + f) for f in frames)
+    )
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("magic", [0xA1B2C3D4, 0xA1B23C4D])
+def test_a_capture_is_read_whatever_machine_made_it(order, magic):
+    frames = [ETHERNET + ipv4(payload) + b"padding" for payload in PAYLOADS]
+    assert list(payloads(pcap(frames, order=order, magic=magic))) == PAYLOADS
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_the_newer_format_of_captures_is_read(order):
+    assert list(payloads(pcapng([ETHERNET + ipv4(payload) for payload in PAYLOADS], order))) == PAYLOADS
+
+
+@pytest.mark.parametrize(
+    ("link", "head"),
+    [(101, b""), (113, bytes(16)), (276, bytes(20)), (0, b"\2\0\0\0"), (1, bytes(12) + b"\x81\x00\0\5\x08\x00")],
+)
+def test_other_links_are_read(link, head):
+    assert list(payloads(pcap([head + ipv4(payload) for payload in PAYLOADS], link))) == PAYLOADS
+
+
+def test_the_newer_internet_protocol_is_read():
+    assert list(payloads(pcap([bytes(12) + b"\x86\xdd" + ipv6(payload) for payload in PAYLOADS]))) == PAYLOADS
+
+
+def test_what_is_no_whole_datagram_is_passed_over():
+    frames = [ipv4(b"fragment", fragment=0x2000), ipv4(b"of TCP", protocol=6), b"", b"E", ipv4(b"whole")]
+    assert list(payloads(pcap(frames, 101))) == [b"whole"]
+
+
+def test_every_truncation_of_a_capture_is_read_without_a_crash():
+    for whole in (pcap([ETHERNET + ipv4(p) for p in PAYLOADS]), pcapng([ETHERNET + ipv4(p) for p in PAYLOADS])):
+        for end in range(4, len(whole)):
+            assert len(list(payloads(whole[:end]))) <= len(PAYLOADS)
+
+
+def test_a_final_recording_is_read_past_a_damaged_block():
+    blocks = [struct.pack(">H6x", 12 + len(payload)) + payload + b"\xa5" * 4 for payload in PAYLOADS]
+    assert list(payloads(b"".join(blocks))) == PAYLOADS
+    damaged = b"\xff" + blocks[1][1:]
+    assert list(payloads(blocks[0] + damaged + blocks[2])) == [PAYLOADS[0], PAYLOADS[2]]
+
+
+def test_bare_bytes_are_one_payload():
+    assert list(payloads(b"\x30\x00\x04\x01")) == [b"\x30\x00\x04\x01"]

@@ -1,0 +1,134 @@
+"""Scans from payloads as they come, and from the network."""
+
+import json
+import socket
+import threading
+
+import numpy as np
+import pytest
+from asterix_records import RADAR, block, mark, plot, sweeps
+
+from vidtrack.config.radar import RadarSettings
+from vidtrack.config.settings import Settings
+from vidtrack.errors import ConfigError, PlotFormatError, SourceError
+from vidtrack.radar.feeds.stream import MOST_EMPTY, ScanStream
+from vidtrack.radar.feeds.udp import UdpFeed
+from vidtrack.radar.reading import read
+from vidtrack.radar.scans import measurements
+from vidtrack.run.radar_live import run_feed
+
+SETTINGS = RadarSettings()
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    """Fourteen turns with five targets that fly, as blocks."""
+    rng = np.random.default_rng(7)
+    scan = np.repeat(np.arange(14), 5)
+    azimuth_deg = np.tile(np.arange(5) * 70.0 + 3, 14) + 0.2 * scan
+    table = {"scan": scan, "range_m": 30000 + 700 * scan + rng.normal(0, 20, len(scan)), "azimuth_deg": azimuth_deg}
+    return sweeps(table, begin_s=500.0)
+
+
+def given_out(payloads, settings=SETTINGS):
+    stream, scans = ScanStream(settings, "feed"), []
+    for payload in payloads:
+        stream.hear(payload)
+        scans += stream.over()
+    return stream, scans
+
+
+def test_scans_are_those_of_the_recording(tmp_path, blocks):
+    path = tmp_path / "radar.ast"
+    path.write_bytes(b"".join(blocks))
+    stream, scans = given_out(blocks)
+    recorded = list(measurements(read(path, SETTINGS), SETTINGS))
+    assert [number for number, _ in scans] == list(range(13))  # the last one is not over
+    for (number, scan), (same, expected) in zip(scans, recorded, strict=False):
+        assert number == same
+        assert scan.t == pytest.approx(expected.t)
+        np.testing.assert_allclose(scan.z, expected.z)
+    assert stream.plots == 65
+
+
+def test_what_comes_late_is_counted(blocks):
+    late = block(plot(512.5, 31000, 45))
+    stream, _ = given_out([*blocks[:50], late, *blocks[50:]])
+    assert stream.losses.late == 1
+
+
+def test_a_silence_ends_the_scan_that_is_open(blocks):
+    stream, scans = given_out(blocks)
+    scans += stream.over(silent=True)
+    assert [number for number, _ in scans] == list(range(14))
+
+
+def test_marks_without_plots_are_empty_scans(blocks):
+    empty = [mark(500.0 + 4 * turn, turn_s=4.0) for turn in range(14, 20)]
+    _, scans = given_out([*blocks, *empty])
+    assert [len(scan.z) for _, scan in scans[13:]] == [5, 0, 0, 0, 0]
+    np.testing.assert_allclose(np.diff([scan.t for _, scan in scans[13:]]), 4, atol=0.1)
+
+
+def test_after_a_long_pause_the_empty_scans_are_few(blocks):
+    pause = [block(plot(500 + 4 * 900 + 4 * k, 30000 + k, 10)) for k in range(6)]
+    _, scans = given_out([*blocks, *pause])
+    assert MOST_EMPTY <= sum(not len(scan.z) for _, scan in scans) <= MOST_EMPTY + 2
+
+
+def test_several_radars_are_refused(blocks):
+    other = sweeps({"scan": np.arange(5), "range_m": np.full(5, 2e4), "azimuth_deg": np.full(5, 9.0)}, begin_s=500)
+    renamed = [one.replace(bytes([25, 201]), bytes([25, 9])) for one in other]
+    with pytest.raises(PlotFormatError, match="2 radars"):
+        given_out([part for pair in zip(blocks, renamed, strict=False) for part in pair])
+    assert RADAR[1] == ("SIC", 201)
+
+
+@pytest.mark.parametrize("address", ["udp://239.1.2.3", "udp://radar:8600", "udp://1.2.3.4:x", "udp://1.2.3.4:1?to=2"])
+def test_a_wrong_address_is_refused(address):
+    with pytest.raises(ConfigError, match="is not udp://ADDRESS:PORT"):
+        UdpFeed(address)
+
+
+def test_an_address_of_another_machine_is_refused():
+    with pytest.raises(SourceError, match="cannot listen at"):
+        UdpFeed("udp://192.0.2.1:8600")
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@pytest.mark.parametrize("group", ["127.0.0.1", "239.1.2.3"])
+def test_a_feed_is_tracked_until_it_is_stopped(tmp_path, blocks, group):
+    port, seen = free_port(), threading.Event()
+    address = f"udp://{group}:{port}" + ("?interface=127.0.0.1" if group.startswith("239") else "")
+
+    def send():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+            one.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+            for payload in [b"not a radar", *blocks]:
+                one.sendto(payload, (group, port))
+
+    with run_feed(address, Settings(), seen.is_set, tmp_path / "run") as run:
+        sender = threading.Thread(target=send)
+        sender.start()
+        for step in run:
+            if step.index == 12:
+                seen.set()
+        sender.join()
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["scans"], summary["plots"], summary["damaged"], summary["tracks"]) == (13, 65, 1, 5)
+    assert not summary["interrupted"]
+    assert run.name == f"{group}-{port}"
+
+
+def test_a_feed_without_a_datagram_leaves_nothing(tmp_path):
+    with (
+        pytest.raises(SourceError, match="no datagram was received"),
+        run_feed(f"udp://127.0.0.1:{free_port()}", Settings(), lambda: True, tmp_path / "run") as run,
+    ):
+        list(run)
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,132 @@
+"""The scene is learnt from a video's first seconds before its first frame is examined."""
+
+from __future__ import annotations
+
+import logging
+
+import cv2
+import numpy as np
+import pytest
+
+from vidtrack.arrays import affine
+from vidtrack.config.inputs import Input
+from vidtrack.config.load import load
+from vidtrack.config.settings import SourceSettings
+from vidtrack.config.video import DetectorSettings
+from vidtrack.errors import ConfigError
+from vidtrack.run.video import build_detector, look_ahead, track
+from vidtrack.video.background import create
+from vidtrack.video.frame import Frame
+from vidtrack.video.source import open_source
+
+SHAPE, MARGIN, FPS = (120, 160), 20, 10
+CAR = (slice(50, 74), slice(60, 100))  # where it stands in the first frame
+SPEED = 40  # px/s
+NONE_KNOWN = np.empty((0, 4))
+
+
+def frames(seconds, left, motion=lambda t: affine.IDENTITY, seed=1):
+    """A car at `left`(t) [px], or none where that is None, seen by a camera that moves."""
+    rng = np.random.default_rng(seed)
+    size = (SHAPE[0] + 2 * MARGIN, SHAPE[1] + 2 * MARGIN)
+    ground = cv2.resize(rng.uniform(80, 160, (size[0] // 8, size[1] // 8)), size[::-1])
+    ground += cv2.GaussianBlur(rng.normal(0, 40, size), (0, 0), 1.5)
+    grey = np.full((SHAPE[0] // 2, SHAPE[1] // 2), 128, np.uint8)
+    for k in range(round(seconds * FPS)):
+        world, x = ground.copy(), left(k / FPS)
+        if x is not None:
+            world[MARGIN + 50 : MARGIN + 74, MARGIN + x : MARGIN + x + 40] = 230
+        to_picture = affine.after(motion(k / FPS), affine.shift(-MARGIN, -MARGIN))
+        y = cv2.warpAffine(world, to_picture, SHAPE[::-1], flags=cv2.INTER_CUBIC) + rng.normal(0, 2, SHAPE)
+        yield Frame(k, k / FPS, np.clip(y, 0, 255).astype(np.uint8), grey, grey, full_range=True)
+
+
+def drives_off(t):
+    x = round(60 + SPEED * t)
+    return x if x < SHAPE[1] + 10 else None
+
+
+def stands(t):
+    return 60
+
+
+def first_foreground(shown, seconds=5.0):
+    """What is foreground in the first frame."""
+    shown = list(shown)
+    detector = create(DetectorSettings())
+    detector.preview(frame for frame in shown if frame.time_s < seconds)
+    return detector, detector.apply(shown[0], NONE_KNOWN)
+
+
+def test_a_car_that_drives_off_is_foreground_in_the_first_frame_and_not_in_the_scene():
+    shown = list(frames(6, drives_off))
+    detector, found = first_foreground(shown)
+    inside = found.mask[CAR] > 0
+    assert inside.mean() > 0.95
+    assert (found.mask > 0).sum() < 1.15 * inside.size
+    assert abs(detector.scene()[..., 0].astype(int)[CAR].mean() - shown[-1].y[CAR].mean()) < 6
+    for frame in shown[1:]:
+        found = detector.apply(frame, NONE_KNOWN)
+    assert not found.mask.any()
+
+
+def test_a_car_that_stands_all_the_time_is_scene_as_without_a_preview():
+    _, found = first_foreground(frames(6, stands))
+    assert not found.mask.any()
+
+
+def test_after_a_sway_in_the_preview_the_first_frame_is_the_place_of_the_tracks():
+    def sway(t):
+        return affine.shift(6 * np.sin(2 * t) + 3, 2 * np.sin(3 * t))
+
+    _, found = first_foreground(frames(6, drives_off, sway))
+    assert found.motion is None
+    row, column = np.nonzero(found.mask)
+    assert abs(column.min() - 63) <= 3  # the camera begins 3 px to the side
+    assert abs(column.max() - 102) <= 3
+    assert abs(row.min() - 50) <= 3
+
+
+def test_a_preview_of_another_view_is_forgotten():
+    here, there = frames(2, drives_off), frames(4, lambda t: None, seed=7)
+    shown = [*here, *(Frame(20 + f.index, 2 + f.time_s, f.y, f.u, f.v, full_range=True) for f in there)]
+    detector, _ = first_foreground(shown, 6.0)
+    for frame in shown[1:18]:
+        found = detector.apply(frame, NONE_KNOWN)
+    assert not found.mask[:, :40].any()
+
+
+def test_one_frame_is_no_preview():
+    shown = next(frames(1, stands))
+    detector = create(DetectorSettings())
+    detector.preview([shown])
+    assert not detector.apply(shown, NONE_KNOWN).mask.any()
+
+
+def test_the_opening_is_the_frames_of_the_span_and_tells_no_warning_twice(tmp_path, caplog):
+    for k in range(12):
+        picture = np.full((48 if k < 9 else 96, 64 if k < 9 else 128), 10 * k, np.uint8)
+        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), picture)
+    caplog.set_level(logging.WARNING)
+    with open_source(str(tmp_path), SourceSettings(start_s=0.12, end_s=0.44)) as source:
+        ahead = list(source.opening(0.3))
+        whole = list(source)
+    assert [frame.time_s for frame in ahead] == pytest.approx([frame.time_s for frame in whole if frame.time_s < 0.43])
+    assert all(np.array_equal(a.y, b.y) for a, b in zip(ahead, whole, strict=False))
+    assert sum("carries no time" in record.message for record in caplog.records) == 1
+
+
+def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):
+    with pytest.raises(ConfigError, match="preview_s has no effect on a camera"):
+        load(assignments=["detector.disturbance.preview_s=3"], kind=Input.CAMERA)
+    for k, frame in enumerate(frames(2, drives_off)):
+        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), frame.y)
+    ghost = {}
+    for seconds in (0, 2):
+        settings = load(assignments=[f"detector.disturbance.preview_s={seconds}"])
+        with open_source(str(tmp_path), settings.source) as source:
+            detector = build_detector(settings)
+            look_ahead(source, detector, settings)
+            ghost[seconds] = detector.apply(next(source), NONE_KNOWN).mask.any()
+    assert ghost == {0: False, 2: True}
+    assert len(list(track(tmp_path, load(assignments=["source.fps=10"])))) == 20

@@ -1,0 +1,183 @@
+"""Which scan each message belongs to: by the turns of the antenna, or by time."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats
+from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Messages
+
+FASTEST_S, SLOWEST_S = 0.4, 20.0
+"""s; durations of a turn that are looked for."""
+ROTATES = 0.8
+"""Mean resultant length from which the azimuths follow a turning antenna."""
+UNLIKELY = 6.0
+"""Negative logarithm of the probability that azimuths at random seem to follow an antenna."""
+LOOKED_AT = 1000
+"""Plots from which the duration of a turn is found."""
+PULL, FARTHEST = 0.2, 0.05
+"""Share of the deviation of an azimuth by which the antenna's angle is corrected, and the largest deviation used, in
+turns: a false time must not turn the antenna."""
+LONGEST_ROUND_S = 30.0
+"""s; targets that report more rarely are missing in some scans."""
+
+ONE_SCAN_S = 1.0
+"""s; duration of a scan where all plots are of one time."""
+
+
+class Pace(Protocol):
+    """Numbers the scans of messages, batch after batch.
+
+    period_s  duration of a scan
+    """
+
+    period_s: float
+
+    def progress(self, messages: Messages) -> Floats:
+        """(N,) scans that had passed at each message; its integer part is the number of the message's scan."""
+
+
+class Turns:
+    """Scans of a turning antenna: one a turn, from north to north.
+
+    A message at azimuth a in the n-th turn sees the antenna at n + a / 2 pi turns. The antenna's angle follows the
+    times and is pulled to the azimuths of marks and plots, so a plot just west of north stays in its scan however its
+    time is rounded, and lost marks do no harm.
+
+    period_s  duration of a turn
+    beamed    the times of plots are those at which the antenna passed them; else the antenna follows the marks alone,
+              and a scan holds the plots from one north mark to the next
+    """
+
+    def __init__(self, period_s: float, *, beamed: bool = True) -> None:
+        self.period_s = period_s
+        self._beamed = beamed
+        self._turn: float | None = None
+        self._time = 0.0
+
+    def progress(self, messages: Messages) -> Floats:
+        """(N,) turns at each message."""
+        azimuth = messages.v / (2 * math.pi) % 1
+        turns = np.empty(len(messages))
+        for k, (time, part, mark) in enumerate(
+            zip(messages.time_s.tolist(), azimuth.tolist(), messages.marks.tolist(), strict=True)
+        ):
+            turns[k] = self._advance(time, part, mark)
+        return turns
+
+    def _advance(self, time: float, part: float, mark: bool) -> float:
+        """The turns at a message at `part` of a turn; moves the antenna to its time."""
+        follows = mark or self._beamed
+        if self._turn is None:
+            if not follows:
+                return 0.0  # before the first mark
+            self._turn, self._time = part + 1, time
+        turn = self._turn + (time - self._time) / self.period_s
+        self._time = time
+        nearest = part + round(turn - part)
+        if mark:
+            self._turn = nearest
+        elif follows:
+            self._turn = turn + PULL * min(max(nearest - turn, -FARTHEST), FARTHEST)
+        else:
+            self._turn = turn
+        return nearest if follows else turn + FARTHEST
+
+
+class Rounds:
+    """Scans of equal durations.
+
+    start_s  begin of scan 0
+    """
+
+    def __init__(self, period_s: float, start_s: float) -> None:
+        self.period_s = period_s
+        self._start_s = start_s
+
+    def progress(self, messages: Messages) -> Floats:
+        """(N,) durations since the start at each message."""
+        return np.asarray((messages.time_s - self._start_s) / self.period_s)
+
+
+def pace_of(messages: Messages, scan_s: float | None) -> Pace:
+    """The pace of a feed, from its first messages.
+
+    scan_s  duration of a scan; None: from the marks of the antenna, else from the azimuths and times of the plots, else
+            from how often targets report
+    """
+    plots = messages.only(~messages.marks)
+    period_s = scan_s or _stated(messages) or _found(plots)
+    if period_s is not None and np.all(plots.kind == Kind.POLAR):
+        beamed = _follows(plots, period_s) > ROTATES
+        if beamed or messages.marks.any():
+            return Turns(period_s, beamed=beamed)
+    period_s = period_s or _usual(plots)
+    return Rounds(period_s, float(plots.time_s.min()) - period_s / 2)
+
+
+def _stated(messages: Messages) -> float | None:
+    """The duration of a turn that service messages state, or that takes from mark to mark."""
+    marks = messages.only(messages.marks)
+    said = marks.u[np.isfinite(marks.u)]
+    if len(said):
+        return float(np.median(said))
+    order = np.argsort(marks.time_s, kind="stable")
+    time_s, turned = np.diff(marks.time_s[order]), np.diff(marks.v[order]) / (2 * np.pi) % 1
+    turned = np.where(turned == 0, 1.0, turned)  # from north to north
+    periods = time_s / turned
+    periods = periods[(time_s > 0) & (periods > FASTEST_S)]
+    return float(np.median(periods)) if len(periods) else None
+
+
+def _found(plots: Messages) -> float | None:
+    """The duration of a turn that the azimuths of plots follow best: the highest peak of their periodogram.
+
+    None for targets with numbers, whose reports no beam times, and for a peak that chance could make.
+    """
+    if len(plots) < 2 or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
+        return None
+    begin = plots.only(plots.time_s <= plots.time_s.min() + 3 * SLOWEST_S)
+    begin = begin.only(np.arange(min(len(begin), LOOKED_AT)))
+    span = max(float(np.ptp(begin.time_s)), FASTEST_S)
+    rate = np.arange(1 / SLOWEST_S, 1 / FASTEST_S, min(1 / SLOWEST_S, 0.2 / span))
+    score = np.array([_resultant(begin, one) for one in rate])
+    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / len(begin))
+    return 1 / float(rate[score.argmax()]) if score.max() > max(ROTATES, chance) else None
+
+
+def _resultant(plots: Messages, rate: float) -> float:
+    return float(abs(np.exp(1j * (plots.v - 2 * np.pi * rate * (plots.time_s - plots.time_s[0]))).mean()))
+
+
+def _follows(plots: Messages, period_s: float) -> float:
+    """How well times follow azimuths, 0 to 1: the mean over turns of the resultant length of their differences."""
+    if not len(plots):
+        return 0.0
+    _, member = np.unique(np.floor((plots.time_s - plots.time_s[0]) / period_s), return_inverse=True)
+    angle = np.exp(1j * (plots.v - 2 * np.pi * plots.time_s / period_s))
+    count = np.bincount(member)
+    length = np.hypot(np.bincount(member, angle.real), np.bincount(member, angle.imag))
+    several = count > 1
+    if not several.any():
+        return 1.0
+    return float(length[several].sum() / count[several].sum())
+
+
+def _usual(plots: Messages) -> float:
+    """The usual time between reports of a target, met by nine of ten targets; else between different times."""
+    if (plots.target != NO_TARGET).any():
+        steps = [np.median(step) for step in _steps_by_target(plots) if len(step)]
+        return float(min(np.quantile(steps, 0.9), LONGEST_ROUND_S)) if steps else ONE_SCAN_S
+    times = np.diff(np.unique(plots.time_s))
+    return float(np.median(times)) if len(times) else ONE_SCAN_S
+
+
+def _steps_by_target(plots: Messages) -> list[Floats]:
+    order = np.lexsort((plots.time_s, plots.target))
+    target, time_s = plots.target[order], plots.time_s[order]
+    pieces = np.split(time_s, np.flatnonzero(np.diff(target)) + 1)
+    steps = [np.diff(piece) for piece in pieces]
+    return [step[step > 0] for step in steps]

@@ -1,0 +1,147 @@
+"""Messages become plots: one sender, one category, one plane, each plot once."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.config.radar import RadarSettings
+from vidtrack.errors import PlotFormatError
+from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses, Messages
+from vidtrack.radar.plane import Plane
+from vidtrack.radar.plots import Plots
+
+_log = logging.getLogger(__name__)
+_CATEGORIES = (48, 1, 62, 21, 0)
+"""What is tracked, if a feed has several: plots, others' tracks, what ships and aircraft say themselves."""
+_KINDS = (Kind.POLAR, Kind.GEODETIC, Kind.CARTESIAN)
+_NAMES = {48: "CAT 048", 1: "CAT 001", 62: "CAT 062", 21: "CAT 021", 0: "NMEA"}
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What of a feed is tracked: the messages of one sender (SAC * 256 + SIC), category and kind, and its marks."""
+
+    source: int
+    category: int
+    kind: Kind
+
+    def holds(self, messages: Messages) -> Mask:
+        """(N,) the chosen messages and the antenna's marks."""
+        wanted = (messages.category == self.category) & (messages.kind == self.kind)
+        return np.asarray((messages.source == self.source) & (wanted | messages.marks))
+
+    def of(self, messages: Messages) -> Messages:
+        """The messages that it holds."""
+        return messages.only(self.holds(messages))
+
+
+def wanted(messages: Messages, settings: RadarSettings) -> Messages:
+    """The positions from the sender that the settings name, or from all."""
+    positions = messages.only(~messages.marks)
+    if settings.sac is not None:
+        positions = positions.only(positions.source >> 8 == settings.sac)
+    if settings.sic is not None:
+        positions = positions.only(positions.source & 255 == settings.sic)
+    return positions
+
+
+def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
+    """What is tracked of a feed.
+
+    Raises PlotFormatError for a feed without positions, or with several radars of which none is chosen.
+    """
+    positions = wanted(messages, settings)
+    if not len(positions):
+        whose = "" if settings.sac is None and settings.sic is None else " of the radar with this sac and sic"
+        raise PlotFormatError(f"{name} holds no plots{whose}; it has {_contents(messages)}")
+    category = next(one for one in _CATEGORIES if (positions.category == one).any())
+    chosen = positions.only(positions.category == category)
+    sources = Counter(chosen.source.tolist())
+    if len(sources) > 1:
+        listed = ", ".join(f"{_sender(one)} ({count} plots)" for one, count in sources.most_common(8))
+        raise PlotFormatError(
+            f"{name} holds the plots of {len(sources)} radars (SAC/SIC): {listed}; choose one with --set radar.sac=... "
+            "--set radar.sic=..."
+        )
+    kind = next(one for one in _KINDS if (chosen.kind == one).any())
+    return Choice(chosen.source[0].item(), category, kind)
+
+
+def warn_of_others(choice: Choice, messages: Messages, name: str) -> None:
+    """A warning says what of a feed is not tracked."""
+    others = messages.only(~choice.holds(messages))
+    if not others.marks.all():
+        _log.warning("%s: tracked are %s; not %s", name, _contents(choice.of(messages)), _contents(others))
+
+
+def _contents(messages: Messages) -> str:
+    positions = messages.only(~messages.marks)
+    found = Counter(zip(positions.category.tolist(), positions.source.tolist(), strict=True)).most_common(8)
+    return ", ".join(f"{n} of {_NAMES[category]} from {_sender(source)}" for (category, source), n in found) or "none"
+
+
+def _sender(source: int) -> str:
+    """SAC/SIC."""
+    return f"{source >> 8}/{source & 255}"
+
+
+def plots_of(messages: Messages, scan: Ints, settings: RadarSettings, plane: Plane | None, losses: Losses) -> Plots:
+    """The plots of chosen positions (N,) in scans (N,), in order of scan and time.
+
+    plane  of the coordinates; None: range and azimuth, or x and y, are as they come
+    A target that names itself is in a scan once, with its last report.
+    """
+    order = np.lexsort((messages.time_s, scan))
+    messages, scan = messages.only(order), scan[order]
+    kept = _single(messages, scan)
+    losses.duplicates += int((~_named(messages) & ~kept).sum())
+    messages, scan = messages.only(kept), scan[kept]
+    polar = bool(len(messages)) and messages.kind[0] == Kind.POLAR
+    doppler = polar and bool(np.isfinite(messages.doppler_m_s).all())
+    z = _positions(messages, plane)
+    sigmas = [settings.sigma_position_m] * 2
+    if polar:
+        sigmas = [settings.sigma_range_m, np.radians(settings.sigma_azimuth_deg)]
+    if doppler:
+        z, sigmas = np.column_stack([z, messages.doppler_m_s]), [*sigmas, settings.sigma_doppler_m_s]
+    sigma = np.broadcast_to(np.array(sigmas, dtype=float), z.shape)
+    return Plots(scan, messages.time_s, z, sigma, polar, 2, doppler, None, bad_rows=losses.damaged)
+
+
+def _named(messages: Messages) -> Mask:
+    return np.asarray(messages.target != NO_TARGET)
+
+
+def _single(messages: Messages, scan: Ints) -> Mask:
+    """(N,) plots that are not the same as another of their scan, and the last report of each target in a scan."""
+    named = _named(messages)
+    same = np.where(named, 0.0, messages.time_s), np.where(named, 0.0, messages.u), np.where(named, 0.0, messages.v)
+    keys = np.column_stack([scan, messages.target, *same])
+    kept = np.zeros(len(keys), bool)
+    last = len(keys) - 1 - np.unique(keys[::-1], axis=0, return_index=True)[1]
+    kept[last] = True
+    return kept
+
+
+def _positions(messages: Messages, plane: Plane | None) -> Floats:
+    """(N, 2) measurements of a scan: range [m] and azimuth [rad], or x and y [m]."""
+    if len(messages) and messages.kind[0] == Kind.GEODETIC:
+        assert plane is not None
+        return plane.metres(messages.u, messages.v)
+    v = wrap(messages.v) if len(messages) and messages.kind[0] == Kind.POLAR else messages.v
+    return np.column_stack([messages.u, v])
+
+
+def warn_of_assumed_errors(choice: Choice, settings: RadarSettings, name: str) -> None:
+    """The formats do not say how large the errors are: a warning names the settings that are assumed."""
+    polar = choice.kind == Kind.POLAR
+    wanted = ("sigma_range_m", "sigma_azimuth_deg") if polar else ("sigma_position_m",)
+    assumed = [f"radar.{one} = {getattr(settings, one):g}" for one in wanted if one not in settings.model_fields_set]
+    if assumed:
+        _log.warning("%s does not say how large its errors are: %s assumed", name, ", ".join(assumed))

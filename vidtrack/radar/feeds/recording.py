@@ -1,0 +1,120 @@
+"""Feeds in files: what is in one is told from its content, and read at once."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter, deque
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from vidtrack.config.radar import RadarSettings
+from vidtrack.errors import PlotFormatError, SourceError
+from vidtrack.radar.feeds import asterix, nmea
+from vidtrack.radar.feeds.clock import Clock
+from vidtrack.radar.feeds.messages import Kind, Losses, Messages
+from vidtrack.radar.feeds.pace import pace_of
+from vidtrack.radar.feeds.packets import payloads
+from vidtrack.radar.feeds.plots import Choice, choose, plots_of, warn_of_assumed_errors, warn_of_others
+from vidtrack.radar.plane import Plane
+from vidtrack.radar.plots import Plots
+
+_log = logging.getLogger(__name__)
+_LOOKED_AT = 1 << 20
+"""Octets of a file from which its format is told."""
+_LOOKED_AT_AGAIN = 1 << 16
+"""Octets of a payload from which a decoder learns the time of day."""
+_PAYLOADS = 50
+"""Payloads of a capture from which the format is told: other things may be in it."""
+
+Decoder = asterix.Decoder | nmea.Decoder
+
+
+def is_feed(path: str | Path) -> bool:
+    """Whether the file is a recording of ASTERIX, NMEA or AIS, by its content. False if it cannot be opened."""
+    try:
+        with Path(path).open("rb") as file:
+            return _kind(file.read(_LOOKED_AT)) is not None
+    except OSError:
+        return False
+
+
+def decoder_of(payload: bytes) -> type[Decoder] | None:
+    """The decoder of a payload; None for one of another format."""
+    if b"\0" in payload and asterix.looks_like(payload):
+        return asterix.Decoder
+    return nmea.Decoder if nmea.looks_like(payload) else None
+
+
+def _kind(content: bytes) -> type[Decoder] | None:
+    """The decoder for most of the first payloads."""
+    found = Counter(decoder_of(payload) for payload in islice(payloads(content), _PAYLOADS))
+    found.pop(None, None)
+    return found.most_common(1)[0][0] if found else None
+
+
+def read_messages(path: str | Path, losses: Losses) -> Messages:
+    """All messages of a recording, in order of arrival; what is damaged is left out and counted.
+
+    Raises SourceError if it cannot be opened, PlotFormatError if it is of no known format or empty, ConfigError if the
+    library that decodes it is not installed.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise SourceError(f"cannot open {path}: {error.strerror}") from None
+    kind = _kind(content[:_LOOKED_AT])
+    if kind is None:
+        raise PlotFormatError(f"{path} is neither ASTERIX (raw, pcap, FINAL) nor NMEA")
+    decoder = _informed(kind, content)
+    decoder.losses = losses
+    found = [message for payload in payloads(content) for message in decoder.messages(payload)]
+    if not found:
+        raise PlotFormatError(f"{path} holds no message of a radar; {losses.damaged} damaged ones")
+    return Messages.of(found)
+
+
+def _informed(kind: type[Decoder], content: bytes) -> Decoder:
+    """A decoder that has read the beginning: some messages need a time of day that others say later."""
+    decoder = kind(Losses())
+    for payload in islice(payloads(content), _PAYLOADS):
+        deque(decoder.messages(payload[:_LOOKED_AT_AGAIN]), maxlen=0)
+    return decoder
+
+
+def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
+    """The plots of a recording.
+
+    Scans are the turns of the antenna, or periods (see `pace_of`); `time_s` is seconds since midnight of the first day.
+    A line in the log says what was left out. Raises the errors of `read_messages`, and PlotFormatError if no plots are
+    in it, or those of several radars.
+    """
+    losses, name = Losses(), str(path)
+    messages = read_messages(path, losses)
+    choice = choose(messages, settings, name)
+    warn_of_others(choice, messages, name)
+    warn_of_assumed_errors(choice, settings, name)
+    messages = Clock(losses).on_one_clock(choice.of(messages))
+    plane = plane_of(choice, messages, settings, name)
+    if messages.marks.all():
+        raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
+    scan = np.floor(pace_of(messages, settings.scan_s).progress(messages)).astype(np.int64)
+    plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
+    if str(losses):
+        _log.warning("%s: left out: %s", name, losses)
+    return replace(plots, scan=plots.scan - plots.scan[0], losses=losses.as_dict(), plane=plane)
+
+
+def plane_of(choice: Choice, messages: Messages, settings: RadarSettings, name: str) -> Plane | None:
+    """The plane of positions in degrees: that of the radar's position, else of the first message."""
+    if settings.geodetic is not None:
+        return Plane(*settings.geodetic)
+    if choice.kind != Kind.GEODETIC:
+        return None
+    first = messages.only(~messages.marks)
+    plane = Plane(round(float(first.u[0]), 6), round(float(first.v[0]), 6))
+    _log.warning("%s: x = y = 0 is the first position, %.6f,%.6f; --radar-position sets another",
+                 name, plane.latitude, plane.longitude)  # fmt: skip
+    return plane
