@@ -42,7 +42,7 @@ def open_part(path: str, settings: SourceSettings) -> Source:
     """
     stats = SourceStats()
     try:
-        return Source(VideoFile(Path(path), settings, stats, from_s=settings.start_s), settings, stats)
+        return Source(path, settings, stats, from_s=settings.start_s)
     except OSError as error:
         raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
@@ -92,9 +92,9 @@ class Source:
     Iterating raises SourceError if the span of time holds no frame.
     """
 
-    def __init__(self, path: str, settings: SourceSettings, stats: SourceStats) -> None:
+    def __init__(self, path: str, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0) -> None:
         self._path, self._settings = path, settings
-        self._pictures = pictures = _pictures(path, settings, stats)
+        self._pictures = pictures = _pictures(path, settings, stats, from_s)
         self._span = Span.of(settings)
         self.name = pictures.name
         self.place = pictures.place
@@ -162,14 +162,16 @@ class Source:
             yield matched(frame, first)
 
 
-def _pictures(path: str, settings: SourceSettings, stats: SourceStats) -> VideoFile | ImageSequence:
+def _pictures(
+    path: str, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0
+) -> VideoFile | ImageSequence:
     place = Path(path)
     if "://" in path:  # the address stays out of the message: it may hold a password
         raise SourceError("a stream is not a file; read it with vidtrack live")
     if place.is_dir():
         return ImageSequence(images_in(place), settings, stats)
     if place.exists():
-        return VideoFile(place, settings, stats)
+        return VideoFile(place, settings, stats, from_s)
     if glob.has_magic(path):
         return ImageSequence(images_like(path), settings, stats)
     raise SourceError(_missing(place))
