@@ -15,6 +15,7 @@ from vidtrack.errors import Error
 COMMANDS = {
     "track": "Tracks from a video, an image folder or stored detections.",
     "live": "Tracks from a camera or a stream, until stopped.",
+    "batch": "Tracks of many files, on all cores or a cluster; goes on where it stopped.",
     "service": "A live run as a service of the machine.",
     "site": "Draw a site's gates, zones and points over the tracks of a run.",
     "calibrate": "Check what a site's calibration is worth.",

@@ -28,6 +28,7 @@ Examples:
   vidtrack measure runs/traffic
   vidtrack measure runs/traffic --site moved-gates.toml
   vidtrack measure hour-07 hour-08 hour-09 --site site.toml -o monday
+  vidtrack measure tracked
   vidtrack measure cam1@2026-06-01T07:00:00+02:00 --site site.toml --json -""",
 )
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True)
@@ -45,16 +46,25 @@ def command(options: MeasureOptions) -> None:
 
     All RUNs are of one site and one day: files of hours, or a live run with its parts. RUN@TIME gives the time of a
     run's first picture; without it a live run knows its own, and a file goes on where the one before it ended.
+    A single RUN may be the folder or address of a batch: then each site and day is measured by itself.
     """
+    from vidtrack.cli.archive import measure_archive
     from vidtrack.cli.json_file import write_json
+    from vidtrack.errors import ConfigError
     from vidtrack.output.figures import write_figures
     from vidtrack.output.folder import open_folder, replacing
     from vidtrack.recording.retention import parts_of
+    from vidtrack.run.batch.archive import is_archive
     from vidtrack.traffic.measures.measure import measured
     from vidtrack.traffic.measures.runs import parts_with_tracks, site_of
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)
+    if len(options.runs) == 1 and is_archive(options.runs[0]):
+        if options.json_to is not None:
+            raise ConfigError("--json is for one day; those of a batch are in days/SITE/DAY/measures.json")
+        click.echo(measure_archive(options.runs[0], options.site, options.output, options.force, options.quiet))
+        return
     runs = []
     for run in options.runs:
         parts = parts_with_tracks(Path(run), parts_of(Path(run)))

@@ -85,6 +85,17 @@ class Sink(Protocol):
         """Write the rest and close; results stay valid if it is never called."""
 
 
+def in_other_scene(step: Step, plane: Floats) -> Step:
+    """The step with a scene of other coordinates; plane (2, 3) maps the step's scene to the other one [px]."""
+    shown = affine.IDENTITY if step.motion is None else step.motion
+    return replace(
+        step,
+        scan=replace(_seen(step.scan, plane), surveyed=step.scan.surveyed),
+        tracks=_moved(step.tracks, plane),
+        motion=affine.after(shown, affine.inverse(plane)),
+    )
+
+
 def _moved(tracks: Tracks, to_picture: Floats | None) -> Tracks:
     """The tracks in pixels of the picture; to_picture (2, 3), None: identity."""
     if to_picture is None:

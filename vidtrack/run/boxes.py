@@ -29,7 +29,7 @@ def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipe
         explain=extras.explain,
         smooth=settings.output.smooth,
     )
-    subject = file_subject(path, boxes, tracker, settings, scene=None)
+    subject = file_subject(extras.source or path, boxes, tracker.rates.as_dict, settings, scene=None)
     link_s = None if settings.output.link is False else settings.output.link_s * boxes.pace
     yield Pipeline(
         name=boxes.name,

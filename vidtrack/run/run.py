@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 
@@ -26,12 +26,14 @@ class Extras:
     video      file of the annotated video
     masks      folder of masks
     decisions  whether to write decisions.csv, the reason of each assignment
+    source     name of the source in summary.json; None: its path
     """
 
     rerun: str | None = None
     video: Path | None = None
     masks: Path | None = None
     decisions: bool = False
+    source: str | None = field(default=None, kw_only=True)
 
     @property
     def explain(self) -> bool:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from vidtrack.config.settings import Settings
-from vidtrack.detections.stored import Detections
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.counts import CountsFile
@@ -24,13 +23,11 @@ from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.thinned import Thinned
 from vidtrack.output.threaded import Threaded
-from vidtrack.recording.source import Recording
 from vidtrack.run.run import Extras
-from vidtrack.tracking.tracker import Tracker
 from vidtrack.traffic.lines import Line, LineCounter, parse_lines
 from vidtrack.traffic.metres import UsedSite, used_site
 from vidtrack.video.frame import Image
-from vidtrack.video.source import Source
+from vidtrack.video.stats import SourceStats
 
 if TYPE_CHECKING:
     from vidtrack.traffic.footprint import Footprints
@@ -78,6 +75,15 @@ class Subject:
         return Summary(path, self.source, self.settings, self.reading, counts, usual_s=1 / self.fps)
 
 
+class FileSource(Protocol):
+    """What a subject reads of the source of a file."""
+
+    width: int
+    height: int
+    fps: float
+    stats: SourceStats
+
+
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
     """A counter for the lines in the settings, in a picture of this size [px]; None without lines."""
     lines = parse_lines(settings.output.lines, width, height)
@@ -86,12 +92,15 @@ def line_counter(settings: Settings, width: int, height: int) -> LineCounter | N
 
 def file_subject(
     path: str,
-    source: Source | Recording | Detections,
-    tracker: Tracker,
+    source: FileSource,
+    rates: Callable[[], Mapping[str, float]],
     settings: Settings,
     scene: Callable[[], Image] | None,
 ) -> Subject:
-    """The subject of a file, `path` as the user wrote it. Raises ConfigError for a bad line or site."""
+    """The subject of a file, `path` as the user wrote it. Raises ConfigError for a bad line or site.
+
+    rates  returns the tracker's estimates
+    """
     stats = source.stats
 
     def reading() -> dict[str, object]:
@@ -105,7 +114,7 @@ def file_subject(
             "reconnects": 0,
             "stalls": 0,
             "truncated": stats.truncated,
-            **tracker.rates.as_dict(),
+            **rates(),
         }
 
     counter = line_counter(settings, source.width, source.height)

@@ -110,7 +110,7 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
             source.restore = Checkpoint(detector, tracker, source.like).restore
         else:
             look_ahead(source, detector, settings)
-        subject = file_subject(path, source, tracker, settings, detector.scene)
+        subject = file_subject(extras.source or path, source, tracker.rates.as_dict, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S
         yield Pipeline(

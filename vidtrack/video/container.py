@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property
 from itertools import chain
-from os import cpu_count
 from pathlib import Path
 
 import av
@@ -16,9 +16,9 @@ from vidtrack.errors import SourceError
 from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, nominal_rate, stamp_rate
 from vidtrack.video.decoder import accelerator
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
+from vidtrack.video.resources import decoders
 from vidtrack.video.stats import SourceStats
 
-_DECODERS = 4  # at least: pictures take unlike times, and with three of them on two cores one is idle more often
 _TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
 _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K video reaches the second bound first
 
@@ -26,18 +26,21 @@ _RATE_PACKETS, _RATE_BYTES = 64, 32_000_000  # looked at for the rate; raw 4K vi
 class VideoFile:
     """The pictures of a video file in order of presentation; iterate once.
 
+    from_s  s; begin with the key picture before this time, and number the pictures from there
+
     name, place, fps, frames as for Source. Damage is counted in `stats`, and reading continues with the next picture
     that can be decoded. Raises SourceError for a file that is not a readable video.
     """
 
-    def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats) -> None:
+    def __init__(self, path: Path, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0) -> None:
         self._path = self.place = path
         self._settings = settings
         self._stats = stats
+        self._from_s = from_s
         self._container = _open(path, accelerator(settings.decoder))
         self._stream = _video_stream(self._container, path)
         self._stream.thread_type = "AUTO"
-        self._stream.codec_context.thread_count = max(_DECODERS, cpu_count() or 1)
+        self._stream.codec_context.thread_count = decoders()
         # AVI stores no presentation times, only the order of decoding: FFmpeg's guess at them jumps to and fro.
         self._is_avi = self._container.format.name == "avi"
         self._packets = self._demuxed()
@@ -49,10 +52,28 @@ class VideoFile:
             stats.mark_truncated(f"{path} is cut short: {missing} bytes are missing at its end")
 
     def __iter__(self) -> Iterator[tuple[int, float, av.VideoFrame]]:
-        stamped = ((self._stamp(picture), picture) for picture in self._decoded())
+        begin, pictures = self._from_key() if self._from_s > 0 else (0, self._decoded())
+        stamped = ((self._stamp(picture), picture) for picture in pictures)
         times = increasing_times(stamped, self._ticks_per_s / self.fps)
         for index, (ticks, picture) in enumerate(times):
-            yield index, ticks / self._ticks_per_s, picture
+            yield index, (begin + ticks) / self._ticks_per_s, picture
+
+    def _from_key(self) -> tuple[int, Iterator[av.VideoFrame]]:
+        """The ticks of the key picture before `from_s`, and the pictures from it on.
+
+        The whole file where no such place is found: then pictures have no stamps, or there is no index.
+        """
+        wanted = self._origin + int(self._from_s * self._ticks_per_s)
+        for place in (wanted, self._origin):
+            with suppress(av.FFmpegError):  # no index: reading goes on where it was
+                self._container.seek(place, stream=self._stream)
+            self._opening, self._packets = [], self._demuxed()
+            pictures = self._decoded()
+            first = next(pictures, None)
+            stamp = None if first is None else self._stamp(first)
+            if first is not None and stamp is not None and stamp <= wanted:
+                return stamp - self._origin, chain([first], pictures)
+        raise SourceError(f"no key picture of {self._path} before {self._from_s:g} s is found; it cannot be cut")
 
     def between(self, begin_s: float, end_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
         """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
@@ -132,6 +153,11 @@ class VideoFile:
         if damaged or partial:
             self._stats.mark_truncated(f"the end of {self._path} cannot be decoded")
 
+    @property
+    def duration_s(self) -> float | None:
+        """Length that the file states [s]."""
+        return self._container.duration / av.time_base if self._container.duration else None
+
     def _first_packets(self) -> list[av.Packet | None]:
         """Enough packets to measure the rate; they are decoded later."""
         packets: list[av.Packet | None] = []
@@ -177,8 +203,7 @@ class VideoFile:
         return coded.dts if self._is_avi else coded.pts
 
     def _frames_by_duration(self) -> int | None:
-        duration = self._container.duration
-        return round(duration / av.time_base * self.fps) if duration else None
+        return round(self.duration_s * self.fps) if self.duration_s else None
 
 
 def _open(path: Path, hardware: HWAccel | None) -> av.container.InputContainer:

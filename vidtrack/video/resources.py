@@ -1,7 +1,8 @@
-"""Process-wide settings for frame-by-frame work: memory reuse and OpenCV's threads."""
+"""Process-wide settings for frame-by-frame work: memory reuse, and the threads of the decoder and of OpenCV."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 
@@ -11,7 +12,17 @@ import numpy as np
 OPENCV = ("mog2", "knn")
 """Kinds of detectors that are OpenCV's own."""
 
+CORES = "VIDTRACK_CORES"
+"""Variable of the environment: number of cores that this process may use; without it, all."""
+
+_DECODERS = 4  # at least: pictures take unlike times, and with three of them on two cores one is idle more often
 _LARGEST = 31 << 20  # bytes; glibc learns nothing from a block of 32 MB or more
+
+
+def decoders() -> int:
+    """Number of the decoder's threads: the cores that this process was given, or enough for all of the machine."""
+    given = os.environ.get(CORES)
+    return int(given) if given else max(_DECODERS, os.cpu_count() or 1)
 
 
 def keep_freed_memory() -> None:

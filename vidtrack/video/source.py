@@ -35,6 +35,29 @@ def open_source(path: str, settings: SourceSettings) -> Source:
         raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
 
+def open_part(path: str, settings: SourceSettings) -> Source:
+    """Open the part of a video file from `start_s` to `end_s`, decoded from the key picture before it.
+
+    The frames have the times of the whole file; they are numbered from that key picture. Raises as `open_source`.
+    """
+    stats = SourceStats()
+    try:
+        return Source(path, settings, stats, from_s=settings.start_s)
+    except OSError as error:
+        raise SourceError(f"cannot read {path}: {error.strerror}") from None
+
+
+def duration_s(path: str) -> float | None:
+    """Length of a video file [s]; None where it does not state one, and for images. Raises as `open_source`."""
+    if not Path(path).is_file():
+        return None
+    video = VideoFile(Path(path), SourceSettings(), SourceStats())
+    try:
+        return video.duration_s
+    finally:
+        video.close()
+
+
 class Excerpts:
     """Frames of spans of time out of an input, with the times that `open_source` gives them; for one thread.
 
@@ -69,9 +92,9 @@ class Source:
     Iterating raises SourceError if the span of time holds no frame.
     """
 
-    def __init__(self, path: str, settings: SourceSettings, stats: SourceStats) -> None:
+    def __init__(self, path: str, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0) -> None:
         self._path, self._settings = path, settings
-        self._pictures = pictures = _pictures(path, settings, stats)
+        self._pictures = pictures = _pictures(path, settings, stats, from_s)
         self._span = Span.of(settings)
         self.name = pictures.name
         self.place = pictures.place
@@ -139,14 +162,16 @@ class Source:
             yield matched(frame, first)
 
 
-def _pictures(path: str, settings: SourceSettings, stats: SourceStats) -> VideoFile | ImageSequence:
+def _pictures(
+    path: str, settings: SourceSettings, stats: SourceStats, from_s: float = 0.0
+) -> VideoFile | ImageSequence:
     place = Path(path)
     if "://" in path:  # the address stays out of the message: it may hold a password
         raise SourceError("a stream is not a file; read it with vidtrack live")
     if place.is_dir():
         return ImageSequence(images_in(place), settings, stats)
     if place.exists():
-        return VideoFile(place, settings, stats)
+        return VideoFile(place, settings, stats, from_s)
     if glob.has_magic(path):
         return ImageSequence(images_like(path), settings, stats)
     raise SourceError(_missing(place))

@@ -168,8 +168,9 @@ def _passed(crossings: pa.Table, unix: Floats, way: np.ndarray) -> Passed:
         _reals(crossings, name) / 3.6 for name in ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
     )
     return Passed(
-        unix, way // 2, np.arange(n), way % 2, unknown, unknown, unknown, unknown, surely, ~surely, speed, own, shared
-    )
+        unix, way // 2, np.arange(n), way % 2, unknown, unknown, unknown, unknown, surely, ~surely, speed, own, shared,
+        unknown,
+    )  # fmt: skip
 
 
 def _reals(rows: pa.Table, name: str) -> Floats:

@@ -1,0 +1,140 @@
+"""Files by fsspec address, such as s3://BUCKET/KEY."""
+
+from __future__ import annotations
+
+import glob
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO
+
+from vidtrack.errors import ConfigError, SourceError
+from vidtrack.video.live.address import redact
+
+_FILE = "file://"
+_CHUNK = 1 << 22  # bytes copied between two beats
+_STAMPS = ("ETag", "etag", "LastModified", "mtime", "updated", "last_modified", "created")
+
+
+def is_remote(text: str) -> bool:
+    """Whether this is an address, not a path on this machine."""
+    return "://" in text and not text.startswith(_FILE)
+
+
+def local_path(text: str) -> str:
+    """A path on this machine, also where it is written as file://PATH."""
+    return text.removeprefix(_FILE)
+
+
+def without_secrets(address: str) -> str:
+    """The address without user name, password or keys."""
+    return redact(address) if is_remote(address) else address
+
+
+def store(address: str) -> tuple[Any, str]:
+    """The file system of an address, and the path in it. Raises ConfigError without the library for it."""
+    try:
+        import fsspec
+    except ImportError:
+        raise ConfigError(
+            f"{without_secrets(address)} needs fsspec: pip install 'vidtrack[s3]', or the package of that store"
+        ) from None
+    try:
+        return fsspec.core.url_to_fs(address)
+    except (ImportError, ValueError) as error:
+        raise ConfigError(f"cannot use {without_secrets(address)}: {error}") from None
+
+
+@contextmanager
+def reading(address: str) -> Iterator[None]:
+    """Turn what a store raises into SourceError, without secrets."""
+    try:
+        yield
+    except (SourceError, ConfigError):
+        raise
+    except FileNotFoundError:
+        raise SourceError(f"cannot open {without_secrets(address)}: no such file") from None
+    except Exception as error:  # each store has errors of its own
+        what = f"{type(error).__name__}: {error}".replace(address, without_secrets(address)).splitlines()[0]
+        raise OSError(f"cannot read {without_secrets(address)}: {what}") from None
+
+
+@contextmanager
+def opened(text: str) -> Iterator[BinaryIO]:
+    """A file to read, by path or address."""
+    if not is_remote(text):
+        with open(local_path(text), "rb") as file:
+            yield file
+        return
+    files, path = store(text)
+    with reading(text), files.open(path, "rb") as file:
+        yield file
+
+
+def remote_files(text: str, endings: frozenset[str]) -> Iterator[tuple[str, int, str]]:
+    """(address, bytes, stamp) of a file, of all files that match, or of those below a folder with these endings.
+
+    Raises SourceError if there is none.
+    """
+    files, path = store(text)
+    with reading(text):
+        if glob.has_magic(path):
+            found = files.glob(path, detail=True)
+        elif files.isdir(path):
+            found = {
+                k: v for k, v in files.find(path, detail=True).items() if PurePosixPath(k).suffix.lower() in endings
+            }
+        else:
+            found = {path: files.info(path)}
+    found = {name: info for name, info in found.items() if info.get("type") != "directory"}
+    if not found:
+        raise SourceError(f"there is no video at {without_secrets(text)}")
+    root = text.partition("://")[0]
+    for name, info in sorted(found.items()):
+        address = text if name == path else files.unstrip_protocol(name)
+        assert address.startswith(root)
+        stamp = next((str(info[key]) for key in _STAMPS if info.get(key)), "")
+        yield address, int(info.get("size") or 0), stamp
+
+
+@contextmanager
+def local_copy(address: str, beat: Callable[[], None]) -> Iterator[str]:
+    """The path of a source on this machine; a copy, for as long as the block lasts, if it is remote.
+
+    beat  called after each piece of the copy
+    """
+    if not is_remote(address):
+        yield address
+        return
+    with TemporaryDirectory(prefix="vidtrack-") as folder:
+        path = Path(folder, PurePosixPath(address).name)
+        with opened(address) as source, path.open("wb") as copy:
+            while piece := source.read(_CHUNK):
+                copy.write(piece)
+                beat()
+        yield str(path)
+
+
+def upload(folder: Path, address: str, last: str) -> None:
+    """Copy a folder to a store; its file `last` comes last, so that whoever sees it sees the whole."""
+    files, path = store(address)
+    names = [str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()]
+    with reading(address):
+        with suppress(FileNotFoundError):
+            files.rm(path, recursive=True)
+        for name in sorted(names, key=last.__eq__):
+            with (folder / name).open("rb") as source, files.open(f"{path}/{name}", "wb") as copy:
+                shutil.copyfileobj(source, copy, _CHUNK)
+
+
+def download(address: str, folder: Path) -> None:
+    """Copy all files below an address to a folder."""
+    files, path = store(address)
+    with reading(address):
+        for name in files.find(path):
+            target = folder / PurePosixPath(name).relative_to(PurePosixPath(path))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with files.open(name, "rb") as source, target.open("wb") as copy:
+                shutil.copyfileobj(source, copy, _CHUNK)
