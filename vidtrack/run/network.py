@@ -45,6 +45,7 @@ def network_pipeline(
     paths: Sequence[str], radars: Radars, settings: Settings, extras: Extras, seed: int
 ) -> Iterator[Pipeline]:
     """The pipeline of several plot tables. Raises SourceError, PlotFormatError, ConfigError."""
+    origin = _origin(radars, settings.radar)
     network = Network(read_feeds(paths, radars, settings.radar))
     refuse_link(settings.output, "radar runs")
     tracker = build_network_tracker(settings, network, explain=extras.explain, seed=seed)
@@ -52,7 +53,7 @@ def network_pipeline(
         "plots": sum(len(feed.plots) for feed in network.feeds),
         "bad_rows": sum(feed.plots.bad_rows for feed in network.feeds),
         "truncated": False,
-        "origin": radars.origin,
+        "origin": origin,
     }
 
     def reading() -> dict[str, object]:
@@ -77,6 +78,15 @@ def network_pipeline(
         summary=summary,
         sinks=sinks,
     )
+
+
+def _origin(radars: Radars, settings: RadarSettings) -> tuple[float, float, float] | None:
+    """Latitude, longitude [degrees] and height [m] of x = y = 0. Raises ConfigError if both say it."""
+    if radars.origin is not None and settings.geodetic is not None:
+        raise ConfigError(
+            f"{radars.path} has latitudes, so --radar-position (radar.geodetic) has no effect; leave one of them out"
+        )
+    return radars.origin or settings.geodetic
 
 
 def network_steps(network: Network, tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:

@@ -13,14 +13,16 @@ from vidtrack.config.load import load
 from vidtrack.formats import read
 from vidtrack.radar.network.network import Network, read_feeds
 from vidtrack.radar.network.radars import read_radars
-from vidtrack.run.fuse import run_fusion
+from vidtrack.run.fuse import common_plane, run_fusion
 from vidtrack.run.network import run_network
 from vidtrack.simulate.radar_network import simulate_network, write_network
 
 
-def finished(folder, names, out, toml="radars.toml"):
+def finished(folder, names, out, toml="radars.toml", origin=None):
     paths = [str(folder / f"{name}.csv") for name in names]
-    with run_network(paths, folder / toml, load(), folder / out) as run:
+    settings = load()
+    settings = settings.model_copy(update={"radar": settings.radar.model_copy(update={"geodetic": origin})})
+    with run_network(paths, folder / toml, settings, folder / out) as run:
         for _ in run:
             pass
     return folder / out
@@ -72,11 +74,13 @@ def test_a_known_bias_of_none_is_not_estimated(biased):
 
 def test_runs_of_two_radars_are_fused(tmp_path):
     write_network(simulate_network(500, bias=(0.0, 0.0, 0.0)), tmp_path)
-    runs = [finished(tmp_path, [name], f"run-{name}") for name in ("north", "south")]
+    origin = (50.0, 8.0, 100.0)
+    runs = [finished(tmp_path, [name], f"run-{name}", origin=origin) for name in ("north", "south")]
     with run_fusion(runs, tmp_path / "both") as run:
         for _ in run:
             pass
     result = read(tmp_path / "both")
+    assert json.loads((tmp_path / "both" / "summary.json").read_text())["origin"] == [50.0, 8.0, 100.0]
     assert len(np.unique(result.id)) == 2
     alone = [np.sqrt(np.median(distances_at(tmp_path, run) ** 2)) for run in runs]
     assert np.sqrt(np.median(distances_at(tmp_path, tmp_path / "both") ** 2)) < max(alone)
@@ -94,18 +98,37 @@ def distances_at(folder, run):
 
 
 @pytest.mark.parametrize(
+    ("origins", "message"),
+    [
+        (([50.0, 8.0, 0.0], [50.1, 8.0, 0.0]), "north has its origin at 50.000000,8.000000, .*south at 50.100000,8.00"),
+        (([50.0, 8.0, 0.0], None), "south at an unknown place"),
+    ],
+)
+def test_runs_with_different_origins_are_not_fused(tmp_path, origins, message):
+    folders = [tmp_path / "north", tmp_path / "south"]
+    for folder, origin in zip(folders, origins, strict=True):
+        folder.mkdir()
+        (folder / "summary.json").write_text(json.dumps({} if origin is None else {"origin": origin}))
+    with pytest.raises(vt.ConfigError, match=message):
+        common_plane(folders)
+    assert common_plane(folders[:1] * 2).latitude == 50.0
+
+
+@pytest.mark.parametrize(
     ("arguments", "message", "code"),
     [
         (["radar", "north.csv", "south.csv"], "2 tables of plots need --radars", 2),
         (["radar", "nowhere.csv", "--radars", "radars.toml"], "no radar 'nowhere'", 2),
         (["radar", "north.csv", "north.csv", "--radars", "radars.toml"], "two files have plots of radar 'north'", 2),
         (["radar", "north.csv", "south.csv", "--radars", "radars.toml", "--estimator", "alpha-beta"], "one gain", 2),
+        (["radar", "north.csv", "--radars", "earth.toml", "--radar-position", "50,8"], "leave one of them out", 2),
         (["fuse", "run"], "two runs or more", 2),
         (["fuse", "run", "nowhere"], "nowhere holds no tracks.parquet", 3),
     ],
 )
 def test_what_cannot_be_right_is_refused(biased, monkeypatch, arguments, message, code):
     monkeypatch.chdir(biased)
+    (biased / "earth.toml").write_text("[radars.north]\nlatitude = 50\nlongitude = 8\n")
     result = CliRunner().invoke(cli, [*arguments, "-o", "refused"])
     said = f"{result.output}{result.exception}"
     assert message in said
