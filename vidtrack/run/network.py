@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -52,6 +53,7 @@ def network_pipeline(
     account = {
         "plots": sum(len(feed.plots) for feed in network.feeds),
         "bad_rows": sum(feed.plots.bad_rows for feed in network.feeds),
+        **sum((Counter(feed.plots.losses) for feed in network.feeds), Counter()),
         "truncated": False,
         "origin": origin,
     }

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from asterix_records import block, mark, plot, track
 from click.testing import CliRunner
 
 import vidtrack as vt
@@ -135,3 +136,54 @@ def test_what_cannot_be_right_is_refused(biased, monkeypatch, arguments, message
     error = result.exception
     assert (error.exit_code if isinstance(error, vt.Error) else error.code) == code
     assert not (biased / "refused").exists()
+
+
+@pytest.fixture(scope="module")
+def sites(tmp_path_factory):
+    """A recording of two radars that take turns, the same in a file for each, and radars.toml."""
+    folder = tmp_path_factory.mktemp("sites")
+    blocks: dict[str, list[bytes]] = {"a": [], "b": []}
+    for k in range(8):
+        for name, sic in (("a", 201), ("b", 202)):
+            radar, begin_s = (("SAC", 25), ("SIC", sic)), 100.0 + 4 * k + (sic - 201)
+            blocks[name].append(mark(begin_s, turn_s=4.0, radar=radar))
+            blocks[name].append(block(plot(begin_s + 0.5, 20000 + sic + 400 * k, 45.0, radar)))
+    (folder / "both.ast").write_bytes(b"".join(one + two for one, two in zip(blocks["a"], blocks["b"], strict=True)))
+    for name, own in blocks.items():
+        (folder / f"{name}.ast").write_bytes(b"".join(own))
+    (folder / "radars.toml").write_text(
+        "[radars.b]\nx_m = 900\ny_m = 0\nboresight_deg = 10\nsac = 25\nsic = 202\n"
+        "[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n"
+    )
+    return folder
+
+
+def test_a_recording_of_two_radars_is_split_by_their_codes(sites, caplog):
+    radars = read_radars(sites / "radars.toml")
+    split = read_feeds([str(sites / "both.ast")], radars, load().radar)
+    alone = read_feeds([str(sites / "a.ast"), str(sites / "b.ast")], radars, load().radar)
+    assert [feed.placed.name for feed in split] == ["a", "b"]
+    for one, other in zip(split, alone, strict=True):
+        np.testing.assert_array_equal(one.plots.z, other.plots.z)
+        np.testing.assert_array_equal(one.plots.time_s, other.plots.time_s)
+        assert one.plots.scan.tolist() == list(range(8))
+    np.testing.assert_allclose(np.degrees([split[0].plots.z[0, 1], split[1].plots.z[0, 1]]), [45, 55], atol=0.01)
+    assert split[1].found.z[0] == pytest.approx(
+        [900 + 20202 * np.sin(np.radians(55)), 20202 * np.cos(np.radians(55))], abs=5
+    )
+    assert "not" not in "".join(one for one in caplog.messages if "tracked are" in one)
+
+
+def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):
+    (sites / "one.toml").write_text("[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n")
+    with pytest.raises(vt.ConfigError, match="no radar with sac = 25 and sic = 202"):
+        read_feeds([str(sites / "both.ast")], read_radars(sites / "one.toml"), load().radar)
+    (feed,) = read_feeds([str(sites / "a.ast")], read_radars(sites / "one.toml"), load().radar)
+    assert len(feed.plots) == 8
+
+
+def test_positions_are_no_plots_of_a_radar(sites):
+    (sites / "c.ast").write_bytes(b"".join(track(100.0 + 4 * k, 50.0, 8.0, 1) for k in range(6)))
+    (sites / "c.toml").write_text("[radars.c]\nlatitude = 50\nlongitude = 8\n")
+    with pytest.raises(vt.ConfigError, match="needs ranges and azimuths"):
+        read_feeds([str(sites / "c.ast")], read_radars(sites / "c.toml"), load().radar)

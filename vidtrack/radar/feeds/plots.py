@@ -73,9 +73,11 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
     return Choice(chosen.source[0].item(), category, kind)
 
 
-def warn_of_others(choice: Choice, messages: Messages, name: str) -> None:
-    """A warning says what of a feed is not tracked."""
+def warn_of_others(choice: Choice, messages: Messages, settings: RadarSettings, name: str) -> None:
+    """A warning says what of a feed is not tracked; of its sender only, if the settings name that."""
     others = messages.only(~choice.holds(messages))
+    if settings.sac is not None and settings.sic is not None:
+        others = others.only(others.source == choice.source)
     if not others.marks.all():
         _log.warning("%s: tracked are %s; not %s", name, _contents(choice.of(messages)), _contents(others))
 

@@ -116,7 +116,7 @@ class ScanStream:
         progress = pace.progress(believed)
         if np.ptp(progress) < LEARNT_SCANS + LATE and not silent:
             return
-        warn_of_others(choice, heard, self._name)
+        warn_of_others(choice, heard, self._settings, self._name)
         warn_of_assumed_errors(choice, self._settings, self._name)
         self._choice, self._pace, self._heard = choice, pace, []
         self._clock.on_one_clock(choice.of(heard))

@@ -57,7 +57,7 @@ class Radar(Group):
     bias_time_s: float = Field(0.0, ge=0)
     """s; the same of the clock; the first radar's clock counts as right"""
     sac: int | None = Field(None, ge=0, le=255)
-    """system area code of its ASTERIX records"""
+    """system area code of its ASTERIX records, by which they are told from those of others"""
     sic: int | None = Field(None, ge=0, le=255)
     """system identification code of its ASTERIX records"""
 
@@ -95,8 +95,8 @@ class Radars:
     """The radars of a file in its order.
 
     placed  each radar on the common plane
-    origin  latitude, longitude [degrees] and height [m], 0, of the plane's origin, the mean of the radars' places; None:
-            the file gives places in metres
+    origin  latitude, longitude [degrees] and height [m], 0, of the plane's origin, the mean of the radars' places;
+            None: the file gives places in metres
     """
 
     path: Path
