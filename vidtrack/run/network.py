@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -53,7 +52,7 @@ def network_pipeline(
     account = {
         "plots": sum(len(feed.plots) for feed in network.feeds),
         "bad_rows": sum(feed.plots.bad_rows for feed in network.feeds),
-        **sum((Counter(feed.plots.losses) for feed in network.feeds), Counter()),
+        **_losses(network),
         "truncated": False,
         "origin": origin,
     }
@@ -80,6 +79,12 @@ def network_pipeline(
         summary=summary,
         sinks=sinks,
     )
+
+
+def _losses(network: Network) -> dict[str, int]:
+    """What of the recordings was left out, over all radars."""
+    found = [feed.plots.losses for feed in network.feeds if feed.plots.losses]
+    return {what: sum(losses[what] for losses in found) for what in found[0]} if found else {}
 
 
 def _origin(radars: Radars, settings: RadarSettings) -> tuple[float, float, float] | None:
