@@ -13,6 +13,7 @@ from uuid import uuid4
 from vidtrack.errors import OutputError
 from vidtrack.output.folder import replacing, usable, writing
 from vidtrack.output.lock import exclusive
+from vidtrack.run.batch.index import INDEX
 from vidtrack.run.batch.remote import download, is_remote, local_path, reading, store, upload, without_secrets
 
 PARTIAL, SLICES = "partial", "slices"
@@ -63,15 +64,21 @@ class FolderPlace:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Lock the folder, made if necessary, and delete what a killed batch left. Raises OutputError."""
+        """Lock the folder, made if necessary, and delete what a killed batch left. Raises OutputError.
+
+        Without an index, folders of these names are not those of a batch, and stay.
+        """
         with exclusive(usable(self.root)):
-            shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
+            own = (self.root / INDEX).is_file() or not any((self.root / name).exists() for name in (PARTIAL, SLICES))
             try:
+                if own:
+                    self.remove(PARTIAL)
                 yield
             finally:
-                shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
-                with suppress(OSError):  # there is none, or slices in it
-                    (self.root / SLICES).rmdir()
+                if own:
+                    self.remove(PARTIAL)
+                    with suppress(OSError):  # there is none, or slices in it
+                        (self.root / SLICES).rmdir()
 
     def names(self, under: str) -> set[str]:
         """What is in a folder; nothing if there is none."""
@@ -129,9 +136,10 @@ class RemotePlace:
     @contextmanager
     def held(self) -> Iterator[None]:
         """Check that the address can be written. Raises OutputError."""
+        name = f"writable-{uuid4().hex}"
         try:
-            self.write(f"{PARTIAL}/writable", b"")
-            self.remove(PARTIAL)
+            self.write(name, b"")
+            self.remove(name)
         except OSError as error:
             raise OutputError(f"cannot write to {self.shown}: {error}") from None
         yield
