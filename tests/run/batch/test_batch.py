@@ -139,6 +139,22 @@ def test_a_long_file_is_cut_and_goes_on_with_the_missing_slices(videos, tmp_path
     assert not (tmp_path / "slices" / batch.rows[str(source)].folder).exists()
 
 
+def test_a_slice_that_was_copied_in_part_is_done_again(videos, tmp_path):
+    source = videos / "cam1" / "08-00.avi"
+
+    def stop(told):
+        if told["kind"] == "stitch":
+            raise KeyboardInterrupt
+        return work(told, lambda: None)
+
+    with pytest.raises(KeyboardInterrupt):
+        do(batch_of([source], tmp_path, slice_s=1.0), AtOnce(stop))
+    next(tmp_path.glob("slices/*/*/00001/slice.json")).unlink()
+    batch = batch_of([source], tmp_path, slice_s=1.0)
+    assert [(kind, number) for kind, _, number in do(batch)] == [("file", 0), ("slice", 1), ("stitch", 0)]
+    assert batch.rows[str(source)].state == DONE
+
+
 def test_another_batch_is_not_touched(videos, done, tmp_path):
     out, _ = done
     extra = tmp_path / "other.mp4"

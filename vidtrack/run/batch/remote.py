@@ -122,8 +122,9 @@ def upload(folder: Path, address: str, last: str) -> None:
     files, path = store(address)
     names = [str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()]
     with reading(address):
-        with suppress(FileNotFoundError):
-            files.rm(path, recursive=True)
+        for old in (f"{path}/{last}", path):  # while an older copy is deleted, it is not taken for a whole one
+            with suppress(FileNotFoundError):
+                files.rm(old, recursive=True)
         for name in sorted(names, key=last.__eq__):
             with (folder / name).open("rb") as source, files.open(f"{path}/{name}", "wb") as copy:
                 shutil.copyfileobj(source, copy, _CHUNK)

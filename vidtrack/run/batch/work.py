@@ -17,6 +17,7 @@ from vidtrack.run.batch.task import Outcome, Task
 from vidtrack.run.files import run_file
 from vidtrack.run.run import Extras, Run
 from vidtrack.run.slices.cuts import cuts
+from vidtrack.run.slices.kept import ABOUT as ABOUT_SLICE
 from vidtrack.run.slices.stitch import stitched_pipeline
 from vidtrack.run.slices.track import track_slice
 from vidtrack.video.resources import OPENCV
@@ -24,7 +25,6 @@ from vidtrack.video.source import duration_s
 
 ABOUT = "source.json"
 """Beside the results of a source: which source, and its row of the index. Its presence tells that they are complete."""
-_ABOUT_SLICE = "slice.json"
 _LEAST = 1.5
 """A file shorter than this many slices is not cut."""
 
@@ -77,7 +77,7 @@ def _slice(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
         before = stack.enter_context(place.local(task.slice_folder(cut.number - 1))) if cut.goes_on else None
         folder = stack.enter_context(place.workspace())
         track_slice(task.address, parse(task.settings), cut, folder, before, beat)
-        place.put(folder, task.slice_folder(cut.number), last=_ABOUT_SLICE)
+        place.put(folder, task.slice_folder(cut.number), last=ABOUT_SLICE)
     return {"sliced": task.number}
 
 
