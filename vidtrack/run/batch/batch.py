@@ -91,13 +91,15 @@ class Batch:
     def run(self, engine: Engine, tell: Callable[[Progress], None]) -> None:
         """Do what is to be done; `tell` is called after each change, and at least once a second.
 
-        Raises StoppedEarly if the engine is gone. However it ends, the index says what is done.
+        Raises StoppedEarly if the engine is gone. However it ends, the index says what is done, and no process works
+        for this place any more.
         """
         try:
             while self._waiting or self._running:
                 self._hand_over(engine)
                 self._take(engine)
                 tell(self.progress)
+            engine.end(self._out)
         except BaseException:
             for future in self._running:
                 future.cancel()
