@@ -105,7 +105,9 @@ def test_two_sites_do_not_share_a_folder(tmp_path):
         portions(str(tmp_path), None)
 
 
-@pytest.mark.parametrize(("name", "folder"), [("..", "site"), ("../x", "_x"), (".hidden", "hidden"), ("Süd 1", "Süd_1")])
+@pytest.mark.parametrize(
+    ("name", "folder"), [("..", "site"), ("../x", "_x"), (".hidden", "hidden"), ("Süd 1", "Süd_1")]
+)
 def test_a_site_gets_a_folder_below_the_measures(name, folder):
     assert folder_name(name) == folder
 
