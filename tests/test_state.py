@@ -9,6 +9,7 @@ from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
+from vidtrack.scan import Scan
 from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.video.source import open_source
 
@@ -147,3 +148,18 @@ def test_a_failed_write_leaves_the_old_state(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="No space"):
         write_state(path, {"a": 2})
     assert read_state(path) == {"a": 1}
+
+
+def test_errors_that_last_are_told_from_new_ones_after_a_pause_too():
+    def scan(k):
+        box = np.array([[20.0 + 3 * k, 40.0, 24.0, 16.0]])
+        z = box[:, :2] + box[:, 2:] / 2
+        cov = np.eye(2)[None]
+        return Scan(k / 25, z, 4 * cov, lasting=3 * cov, box=np.column_stack([box[:, :2] - z, box[:, 2:]]))
+
+    one = build_blob_tracker(Settings().tracker, (320, 240))
+    for k in range(20):
+        one.step(scan(k))
+    other = build_blob_tracker(Settings().tracker, (320, 240))
+    restore(other, gather(one))
+    assert np.array_equal(one.step(scan(20)).P, other.step(scan(20)).P)

@@ -62,7 +62,7 @@ Examples:
     "--radars",
     type=click.Path(path_type=Path),
     metavar="RADARS.toml",
-    help="Places and errors of the radars; NAME.csv has the plots of radar NAME.",
+    help="Places and errors of the radars; NAME.csv or NAME.ast has the plots of radar NAME.",
 )
 @click.option("--camera", metavar="VIDEO", help="A video of the same road and time, to be tracked with the plots.")
 @click.option(

@@ -194,7 +194,7 @@ def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[
         "length_m": stand.length,
         "length_sigma_m": stand.length_sigma,
         "width_m": stand.width,
-        "class": np.array([kind or None for kind in stand.kind.tolist()], object),
+        "class": stand.kind,
     }
 
 

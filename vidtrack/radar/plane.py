@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from pyproj import Transformer
@@ -39,3 +41,9 @@ class Plane:
         """Latitudes and longitudes (N,) of points (N, 2) [m]."""
         longitude, latitude = self._projection.transform(xy[:, 0], xy[:, 1], direction="INVERSE")
         return np.asarray(latitude), np.asarray(longitude)
+
+
+def plane_of_run(summary: Mapping[str, Any]) -> Plane | None:
+    """The plane of a run by its summary.json: its `origin`, else the setting radar.geodetic. None: it is not known."""
+    origin = summary.get("origin") or summary.get("settings", {}).get("radar", {}).get("geodetic")
+    return Plane(*origin) if origin else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,12 +15,13 @@ import pyarrow.parquet
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.tracks_of_runs import Histories, same_targets
 from vidtrack.config.settings import Settings
-from vidtrack.errors import FormatError, SourceError
+from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.estimate.intersection import intersection
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, TrackTable
+from vidtrack.radar.plane import Plane, plane_of_run
 from vidtrack.run.run import Pipeline, Run
 from vidtrack.scan import Scan
 from vidtrack.tracks import CONFIRMED, Tracks
@@ -28,6 +30,8 @@ STATE = ("x_m", "vx_m_s", "y_m", "vy_m_s")
 SIGMA = ("sigma_x_m", "sigma_vx_m_s", "sigma_y_m", "sigma_vy_m_s")
 CORRELATION = {"corr_x_vx": (0, 1), "corr_xy": (0, 2), "corr_x_vy": (0, 3),
                "corr_y_vx": (1, 2), "corr_vxy": (1, 3), "corr_y_vy": (2, 3)}  # fmt: skip
+SAME_DEG = 1e-6
+"""degrees; origins are the same within this, 0.1 m on the earth."""
 COLUMNS = ("time_s", "track_id", *STATE, *SIGMA, *CORRELATION)
 
 
@@ -52,6 +56,8 @@ def run_fusion(folders: Sequence[Path], output: Path | None = None, *, force: bo
 @contextmanager
 def _pipeline(folders: Sequence[Path]) -> Iterator[Pipeline]:
     runs = [read_tracks(folder) for folder in folders]
+    plane = common_plane(folders)
+    origin = {} if plane is None else {"origin": [plane.latitude, plane.longitude, plane.height]}
     times = np.unique(np.concatenate([run.time_s for run in runs]))
 
     def sinks(folder: Path) -> Iterator[Sink]:
@@ -61,7 +67,7 @@ def _pipeline(folders: Sequence[Path]) -> Iterator[Pipeline]:
     def summary(folder: Path) -> Summary:
         source = ", ".join(map(str, folders))
         fused = {"runs": [str(folder) for folder in folders], "tracks_of_runs": [len(np.unique(r.track)) for r in runs]}
-        return Summary(folder / "summary.json", source, Settings(), lambda: fused, unit="scans")
+        return Summary(folder / "summary.json", source, Settings(), lambda: fused | origin, unit="scans")
 
     yield Pipeline(
         name="-".join(folder.resolve().name for folder in folders),
@@ -71,6 +77,39 @@ def _pipeline(folders: Sequence[Path]) -> Iterator[Pipeline]:
         summary=summary,
         sinks=sinks,
     )
+
+
+def common_plane(folders: Sequence[Path]) -> Plane | None:
+    """The plane of the runs; None if none of them knows where its x = y = 0 is.
+
+    Raises FormatError for a folder without a readable summary.json, ConfigError if the origins differ.
+    """
+    planes = [_plane(folder) for folder in folders]
+    first = planes[0]
+    for folder, plane in zip(folders[1:], planes[1:], strict=True):
+        if not _same(first, plane):
+            raise ConfigError(
+                f"{folders[0]} has its origin at {_place(first)}, {folder} at {_place(plane)}; "
+                "track both again with the same --radar-position or one file for --radars"
+            )
+    return first
+
+
+def _plane(folder: Path) -> Plane | None:
+    try:
+        return plane_of_run(json.loads((folder / "summary.json").read_text()))
+    except (OSError, ValueError) as error:
+        raise FormatError(f"{folder} is not a finished run: {error}") from None
+
+
+def _same(a: Plane | None, b: Plane | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return max(abs(a.latitude - b.latitude), abs(a.longitude - b.longitude)) < SAME_DEG
+
+
+def _place(plane: Plane | None) -> str:
+    return "an unknown place" if plane is None else f"{plane.latitude:.6f},{plane.longitude:.6f}"
 
 
 def read_tracks(folder: Path) -> RunTracks:

@@ -45,14 +45,16 @@ def network_pipeline(
     paths: Sequence[str], radars: Radars, settings: Settings, extras: Extras, seed: int
 ) -> Iterator[Pipeline]:
     """The pipeline of several plot tables. Raises SourceError, PlotFormatError, ConfigError."""
+    origin = _origin(radars, settings.radar)
     network = Network(read_feeds(paths, radars, settings.radar))
     refuse_link(settings.output, "radar runs")
     tracker = build_network_tracker(settings, network, explain=extras.explain, seed=seed)
     account = {
         "plots": sum(len(feed.plots) for feed in network.feeds),
         "bad_rows": sum(feed.plots.bad_rows for feed in network.feeds),
+        **_losses(network),
         "truncated": False,
-        "origin": radars.origin,
+        "origin": origin,
     }
 
     def reading() -> dict[str, object]:
@@ -77,6 +79,21 @@ def network_pipeline(
         summary=summary,
         sinks=sinks,
     )
+
+
+def _losses(network: Network) -> dict[str, int]:
+    """What of the recordings was left out, over all radars."""
+    found = [feed.plots.losses for feed in network.feeds if feed.plots.losses]
+    return {what: sum(losses[what] for losses in found) for what in found[0]} if found else {}
+
+
+def _origin(radars: Radars, settings: RadarSettings) -> tuple[float, float, float] | None:
+    """Latitude, longitude [degrees] and height [m] of x = y = 0. Raises ConfigError if both say it."""
+    if radars.origin is not None and settings.geodetic is not None:
+        raise ConfigError(
+            f"{radars.path} has latitudes, so --radar-position (radar.geodetic) has no effect; leave one of them out"
+        )
+    return radars.origin or settings.geodetic
 
 
 def network_steps(network: Network, tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:

@@ -78,7 +78,7 @@ def feed_pipeline(
             count=None,
             steps=steps(feed),
             summary=lambda folder: Summary(folder / "summary.json", address, settings, account, unit="scans"),
-            sinks=partial(radar_sinks, settings, extras, 2),
+            sinks=partial(radar_sinks, settings, extras, 2, [settings.radar.position[:2]]),
         )
 
 
@@ -105,4 +105,6 @@ def _again(first: tuple[int, Scan], scans: Iterator[tuple[int, Scan]]) -> Iterat
 
 
 def _heard(stream: ScanStream) -> str:
-    return f"left out: {stream.losses}" if str(stream.losses) else "no datagram was received"
+    said = [f"there were {stream.lacks}"] if stream.lacks else []
+    said += [f"left out: {stream.losses}"] if str(stream.losses) else []
+    return ", ".join(said) or "no datagram was received"

@@ -23,7 +23,7 @@ from vidtrack.radar.scans import surveyed
 from vidtrack.run.radar import radar_sinks
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.trackers import build_blob_tracker
-from vidtrack.run.video import build_detector, video_steps
+from vidtrack.run.video import build_detector, look_ahead, video_steps
 from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.rates import Rates
@@ -117,7 +117,9 @@ def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
         if drawn.calibration is None:
             raise ConfigError(f"{site} has no section [calibration], so nobody knows the metres")
         ground = calibrated(drawn)
-        steps = video_steps(source, build_detector(settings), build_blob_tracker(settings.tracker, size), settings)
+        detector = build_detector(settings)
+        look_ahead(source, detector, settings)
+        steps = video_steps(source, detector, build_blob_tracker(settings.tracker, size), settings)
         yield Camera(steps, RoadScans(ground, size), InPicture(ground, size))
 
 

@@ -131,10 +131,10 @@ def build_detector(settings: Settings) -> Background:
 
 
 def look_ahead(source: Source, detector: Background, settings: Settings) -> None:
-    """Show the first seconds of a video to a detector that learns the scene from them."""
+    """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene."""
     seconds = settings.detector.disturbance.preview_s
     if isinstance(detector, Disturbance) and seconds:
-        detector.preview(source.opening(seconds))
+        detector.preview(source.opening(seconds, settings.source.end_s))
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

@@ -76,11 +76,16 @@ class Station:
 
 
 class Stations:
-    """The stations of a tracker by number, and when each made its last scan."""
+    """The stations of a tracker by number, and when each made its last scan.
+
+    last_s  (S,) s; NaN before the first
+    """
+
+    STATE = ("last_s",)
 
     def __init__(self, each: Sequence[Station]) -> None:
         self.each = tuple(each)
-        self._last: dict[int, float] = {}
+        self.last_s = np.full(len(self.each), np.nan)
 
     def __len__(self) -> int:
         return len(self.each)
@@ -99,9 +104,9 @@ class Stations:
         """Seconds since the last scan of the same station; 0 for the first. Raises ScanError for an unknown station."""
         if not 0 <= scan.station < len(self.each):
             raise ScanError(f"the scan is of station {scan.station}, but the tracker has {len(self.each)}, from 0")
-        since = scan.t - self._last.get(scan.station, scan.t)
-        self._last[scan.station] = scan.t
-        return since
+        before = float(self.last_s[scan.station])
+        self.last_s[scan.station] = scan.t
+        return 0.0 if np.isnan(before) else scan.t - before
 
     def expected(self, scan: Scan, register: Register, share: Floats, since: float) -> tuple[Floats, float | Floats]:
         """P_D (T,) of the rows of which the station covers a share (T,), and its clutter density.

@@ -89,7 +89,7 @@ class Tracker:
     with the sharing.
     """
 
-    STATE = ("t", "bank", "register", "timing", "sharing", "rates", "picture")
+    STATE = ("t", "bank", "register", "timing", "sharing", "stations", "rates", "picture")
 
     def __init__(
         self,

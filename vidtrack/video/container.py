@@ -17,6 +17,7 @@ from vidtrack.video.clock import FALLBACK_FPS, increasing_times, is_plausible, n
 from vidtrack.video.decoder import accelerator
 from vidtrack.video.header import avi_period_s, avi_states_rate, missing_bytes
 from vidtrack.video.resources import decoders
+from vidtrack.video.span import ROUNDING_S
 from vidtrack.video.stats import SourceStats
 
 _TEXT_CODECS = frozenset({"ansi", "bintext", "xbin", "idf"})  # FFmpeg draws any .txt file as a terminal would
@@ -89,9 +90,9 @@ class VideoFile:
         else:
             near = chain([first], near)
         for time_s, picture in near:
-            if time_s > end_s:
+            if time_s > end_s + ROUNDING_S:
                 break
-            if time_s >= begin_s:
+            if time_s >= begin_s - ROUNDING_S:
                 yield time_s, picture
 
     def _after_key_frame(self, begin_s: float) -> Iterator[tuple[float, av.VideoFrame]]:

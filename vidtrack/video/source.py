@@ -126,9 +126,10 @@ class Source:
     ) -> None:
         self.close()
 
-    def opening(self, seconds: float) -> Iterator[Frame]:
-        """The frames of its first seconds, from a second reading; their numbers are 0."""
-        begin_s, end_s = self._span.start_s, min(self._span.end_s, self._span.start_s + seconds)
+    def opening(self, seconds: float, end_s: float | None) -> Iterator[Frame]:
+        """The frames of its first seconds, at most to end_s, from a second reading; their numbers are 0."""
+        begin_s = self._span.start_s
+        end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
         with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
             for picture in again.between(begin_s, end_s):
                 yield matched(to_frame(0, *picture), self._first)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from vidtrack.config.settings import SourceSettings
 
-_ROUNDING_S = 1e-6  # 3 * 0.1 s still belongs to a span that ends at 0.3 s
+ROUNDING_S = 1e-6  # 3 * 0.1 s still belongs to a span that ends at 0.3 s
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +24,16 @@ class Span:
 
     def begun(self, time_s: float) -> bool:
         """Whether `time_s` is not before the span."""
-        return time_s >= self.start_s - _ROUNDING_S
+        return time_s >= self.start_s - ROUNDING_S
 
     def over(self, time_s: float) -> bool:
         """Whether `time_s` is after the span."""
-        return time_s > self.end_s + _ROUNDING_S
+        return time_s > self.end_s + ROUNDING_S
 
     def frames(self, fps: float, count: int) -> range:
         """Which of `count` evenly spaced frames lie in the span."""
-        first = math.ceil((self.start_s - _ROUNDING_S) * fps)
-        last = math.floor(min((self.end_s + _ROUNDING_S) * fps, count - 1))
+        first = math.ceil((self.start_s - ROUNDING_S) * fps)
+        last = math.floor(min((self.end_s + ROUNDING_S) * fps, count - 1))
         return range(max(first, 0), last + 1)
 
     def __str__(self) -> str:

@@ -223,7 +223,7 @@ def test_without_the_library_the_message_says_what_to_install(tmp_path, monkeypa
 
 
 def test_a_recording_without_plots_is_refused(tmp_path):
-    with pytest.raises(PlotFormatError, match="holds no plots; it has none"):
+    with pytest.raises(PlotFormatError, match="holds no plots; it has marks of the antenna only"):
         seconds(recorded(tmp_path, mark(0.0), mark(4.0)))
 
 

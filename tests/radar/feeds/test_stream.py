@@ -11,7 +11,8 @@ from asterix_records import RADAR, block, mark, plot, sweeps
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, PlotFormatError, SourceError
-from vidtrack.radar.feeds.stream import MOST_EMPTY, ScanStream
+from vidtrack.radar.feeds import stream as stream_module
+from vidtrack.radar.feeds.stream import KEPT_S, MOST_EMPTY, ScanStream
 from vidtrack.radar.feeds.udp import UdpFeed
 from vidtrack.radar.reading import read
 from vidtrack.radar.scans import measurements
@@ -84,6 +85,37 @@ def test_several_radars_are_refused(blocks):
     assert RADAR[1] == ("SIC", 201)
 
 
+def test_what_is_not_wanted_is_forgotten_after_a_minute(blocks, monkeypatch, caplog):
+    now = 0.0
+    monkeypatch.setattr(stream_module, "monotonic", lambda: now)
+    stream = ScanStream(RadarSettings(sac=25, sic=9), "feed")
+    other = block(plot(500.0, 30000, 10))
+    for _ in range(300):
+        now += 1.0
+        stream.hear(other)
+        assert not list(stream.over())
+        assert len(stream._heard) <= KEPT_S + 1
+    assert [one for one in caplog.messages if "for 60 s" in one] == [
+        "feed: for 60 s there were no plots of the radar with this sac and sic; it has 62 of CAT 048 from 25/201"
+    ]
+    scans = []
+    for payload in blocks:
+        stream.hear(payload.replace(bytes([25, 201]), bytes([25, 9])))
+        scans += stream.over()
+    assert [number for number, _ in scans] == list(range(13))
+
+
+def test_marks_alone_are_named(monkeypatch, caplog):
+    now = 0.0
+    monkeypatch.setattr(stream_module, "monotonic", lambda: now)
+    stream = ScanStream(SETTINGS, "feed")
+    for turn in range(30):
+        now += 4.0
+        stream.hear(mark(500.0 + 4 * turn, turn_s=4.0))
+        assert not list(stream.over())
+    assert "feed: for 60 s there were no plots; it has marks of the antenna only" in caplog.messages
+
+
 @pytest.mark.parametrize("address", ["udp://239.1.2.3", "udp://radar:8600", "udp://1.2.3.4:x", "udp://1.2.3.4:1?to=2"])
 def test_a_wrong_address_is_refused(address):
     with pytest.raises(ConfigError, match="is not udp://ADDRESS:PORT"):
@@ -123,6 +155,19 @@ def test_a_feed_is_tracked_until_it_is_stopped(tmp_path, blocks, group):
     assert (summary["scans"], summary["plots"], summary["damaged"], summary["tracks"]) == (13, 65, 1, 5)
     assert not summary["interrupted"]
     assert run.name == f"{group}-{port}"
+
+
+def test_a_feed_of_another_radar_is_said_to_be_one(tmp_path, blocks, monkeypatch):
+    monkeypatch.setattr(UdpFeed, "poll", lambda self, wait_s: blocks)
+    settings = Settings().model_copy(update={"radar": RadarSettings(sac=1, sic=1)})
+    asked = iter([False, True])
+    with (
+        pytest.raises(
+            SourceError, match="there were no plots of the radar with this sac and sic; it has 70 of CAT 048"
+        ),
+        run_feed(f"udp://127.0.0.1:{free_port()}", settings, lambda: next(asked), tmp_path / "run") as run,
+    ):
+        list(run)
 
 
 def test_a_feed_without_a_datagram_leaves_nothing(tmp_path):

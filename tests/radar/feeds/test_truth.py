@@ -1,5 +1,8 @@
 """Truth from what targets say themselves."""
 
+import json
+import shutil
+
 import numpy as np
 import pytest
 from asterix.generated import Cat_021_2_7
@@ -58,6 +61,16 @@ def test_aircraft_are_where_they_say(scene):
 def test_a_run_without_a_position_is_refused(scene):
     with pytest.raises(FormatError, match="track again with --radar-position"):
         read_truth(scene / "adsb.ast", scene / "lost")
+
+
+def test_a_table_of_plots_has_the_place_that_its_settings_say(scene):
+    shutil.copytree(scene / "run", scene / "table")
+    summary = json.loads((scene / "run" / "summary.json").read_text())
+    del summary["origin"]  # a table says none
+    (scene / "table" / "summary.json").write_text(json.dumps(summary))
+    np.testing.assert_array_equal(
+        read_truth(scene / "adsb.ast", scene / "table").xy, read_truth(scene / "adsb.ast", scene / "run").xy
+    )
 
 
 def test_another_time_is_refused(scene, tmp_path):

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from asterix_records import block, mark, plot, track
 from click.testing import CliRunner
 
 import vidtrack as vt
@@ -13,14 +14,16 @@ from vidtrack.config.load import load
 from vidtrack.formats import read
 from vidtrack.radar.network.network import Network, read_feeds
 from vidtrack.radar.network.radars import read_radars
-from vidtrack.run.fuse import run_fusion
+from vidtrack.run.fuse import common_plane, run_fusion
 from vidtrack.run.network import run_network
 from vidtrack.simulate.radar_network import simulate_network, write_network
 
 
-def finished(folder, names, out, toml="radars.toml"):
+def finished(folder, names, out, toml="radars.toml", origin=None):
     paths = [str(folder / f"{name}.csv") for name in names]
-    with run_network(paths, folder / toml, load(), folder / out) as run:
+    settings = load()
+    settings = settings.model_copy(update={"radar": settings.radar.model_copy(update={"geodetic": origin})})
+    with run_network(paths, folder / toml, settings, folder / out) as run:
         for _ in run:
             pass
     return folder / out
@@ -72,11 +75,13 @@ def test_a_known_bias_of_none_is_not_estimated(biased):
 
 def test_runs_of_two_radars_are_fused(tmp_path):
     write_network(simulate_network(500, bias=(0.0, 0.0, 0.0)), tmp_path)
-    runs = [finished(tmp_path, [name], f"run-{name}") for name in ("north", "south")]
+    origin = (50.0, 8.0, 100.0)
+    runs = [finished(tmp_path, [name], f"run-{name}", origin=origin) for name in ("north", "south")]
     with run_fusion(runs, tmp_path / "both") as run:
         for _ in run:
             pass
     result = read(tmp_path / "both")
+    assert json.loads((tmp_path / "both" / "summary.json").read_text())["origin"] == [50.0, 8.0, 100.0]
     assert len(np.unique(result.id)) == 2
     alone = [np.sqrt(np.median(distances_at(tmp_path, run) ** 2)) for run in runs]
     assert np.sqrt(np.median(distances_at(tmp_path, tmp_path / "both") ** 2)) < max(alone)
@@ -94,21 +99,91 @@ def distances_at(folder, run):
 
 
 @pytest.mark.parametrize(
+    ("origins", "message"),
+    [
+        (([50.0, 8.0, 0.0], [50.1, 8.0, 0.0]), "north has its origin at 50.000000,8.000000, .*south at 50.100000,8.00"),
+        (([50.0, 8.0, 0.0], None), "south at an unknown place"),
+    ],
+)
+def test_runs_with_different_origins_are_not_fused(tmp_path, origins, message):
+    folders = [tmp_path / "north", tmp_path / "south"]
+    for folder, origin in zip(folders, origins, strict=True):
+        folder.mkdir()
+        (folder / "summary.json").write_text(json.dumps({} if origin is None else {"origin": origin}))
+    with pytest.raises(vt.ConfigError, match=message):
+        common_plane(folders)
+    assert common_plane(folders[:1] * 2).latitude == 50.0
+
+
+@pytest.mark.parametrize(
     ("arguments", "message", "code"),
     [
         (["radar", "north.csv", "south.csv"], "2 tables of plots need --radars", 2),
         (["radar", "nowhere.csv", "--radars", "radars.toml"], "no radar 'nowhere'", 2),
         (["radar", "north.csv", "north.csv", "--radars", "radars.toml"], "two files have plots of radar 'north'", 2),
         (["radar", "north.csv", "south.csv", "--radars", "radars.toml", "--estimator", "alpha-beta"], "one gain", 2),
+        (["radar", "north.csv", "--radars", "earth.toml", "--radar-position", "50,8"], "leave one of them out", 2),
         (["fuse", "run"], "two runs or more", 2),
         (["fuse", "run", "nowhere"], "nowhere holds no tracks.parquet", 3),
     ],
 )
 def test_what_cannot_be_right_is_refused(biased, monkeypatch, arguments, message, code):
     monkeypatch.chdir(biased)
+    (biased / "earth.toml").write_text("[radars.north]\nlatitude = 50\nlongitude = 8\n")
     result = CliRunner().invoke(cli, [*arguments, "-o", "refused"])
     said = f"{result.output}{result.exception}"
     assert message in said
     error = result.exception
     assert (error.exit_code if isinstance(error, vt.Error) else error.code) == code
     assert not (biased / "refused").exists()
+
+
+@pytest.fixture(scope="module")
+def sites(tmp_path_factory):
+    """A recording of two radars that take turns, the same in a file for each, and radars.toml."""
+    folder = tmp_path_factory.mktemp("sites")
+    blocks: dict[str, list[bytes]] = {"a": [], "b": []}
+    for k in range(8):
+        for name, sic in (("a", 201), ("b", 202)):
+            radar, begin_s = (("SAC", 25), ("SIC", sic)), 100.0 + 4 * k + (sic - 201)
+            blocks[name].append(mark(begin_s, turn_s=4.0, radar=radar))
+            blocks[name].append(block(plot(begin_s + 0.5, 20000 + sic + 400 * k, 45.0, radar)))
+    (folder / "both.ast").write_bytes(b"".join(one + two for one, two in zip(blocks["a"], blocks["b"], strict=True)))
+    for name, own in blocks.items():
+        (folder / f"{name}.ast").write_bytes(b"".join(own))
+    (folder / "radars.toml").write_text(
+        "[radars.b]\nx_m = 900\ny_m = 0\nboresight_deg = 10\nsac = 25\nsic = 202\n"
+        "[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n"
+    )
+    return folder
+
+
+def test_a_recording_of_two_radars_is_split_by_their_codes(sites, caplog):
+    radars = read_radars(sites / "radars.toml")
+    split = read_feeds([str(sites / "both.ast")], radars, load().radar)
+    alone = read_feeds([str(sites / "a.ast"), str(sites / "b.ast")], radars, load().radar)
+    assert [feed.placed.name for feed in split] == ["a", "b"]
+    for one, other in zip(split, alone, strict=True):
+        np.testing.assert_array_equal(one.plots.z, other.plots.z)
+        np.testing.assert_array_equal(one.plots.time_s, other.plots.time_s)
+        assert one.plots.scan.tolist() == list(range(8))
+    np.testing.assert_allclose(np.degrees([split[0].plots.z[0, 1], split[1].plots.z[0, 1]]), [45, 55], atol=0.01)
+    assert split[1].found.z[0] == pytest.approx(
+        [900 + 20202 * np.sin(np.radians(55)), 20202 * np.cos(np.radians(55))], abs=5
+    )
+    assert "not" not in "".join(one for one in caplog.messages if "tracked are" in one)
+
+
+def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):
+    (sites / "one.toml").write_text("[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n")
+    with pytest.raises(vt.ConfigError, match="no radar with sac = 25 and sic = 202"):
+        read_feeds([str(sites / "both.ast")], read_radars(sites / "one.toml"), load().radar)
+    (feed,) = read_feeds([str(sites / "a.ast")], read_radars(sites / "one.toml"), load().radar)
+    assert len(feed.plots) == 8
+
+
+def test_positions_are_no_plots_of_a_radar(sites):
+    (sites / "c.ast").write_bytes(b"".join(track(100.0 + 4 * k, 50.0, 8.0, 1) for k in range(6)))
+    (sites / "c.toml").write_text("[radars.c]\nlatitude = 50\nlongitude = 8\n")
+    with pytest.raises(vt.ConfigError, match="needs ranges and azimuths"):
+        read_feeds([str(sites / "c.ast")], read_radars(sites / "c.toml"), load().radar)

@@ -27,7 +27,7 @@ def test_a_target_has_one_place_by_its_ranges_and_azimuths_from_both_radars(tmp_
     assert np.linalg.norm(seen[0] - seen[1]) < 5.0
     turned = np.degrees([one.turned for one in found.placed])
     assert turned[0] - turned[1] == pytest.approx(np.sin(np.radians(50.15)), abs=0.01)  # meridians converge
-    assert found.origin == pytest.approx((50.15, 8.5))
+    assert found.origin == pytest.approx((50.15, 8.5, 0.0))
 
 
 def test_places_in_metres_are_taken_as_they_are(tmp_path):

@@ -103,7 +103,7 @@ def test_a_thinned_run_over_a_file(tmp_path):
                 pass
         frames[every_s] = set(read_parquet(run.folder / "tracks.parquet")["frame"].to_pylist())
     assert frames[0.5] < frames[0]
-    assert 0 < len(frames[0.5]) < len(frames[0]) / 8
+    assert 0 < len(frames[0.5]) <= len(frames[0]) / 8 + 1
 
 
 def test_thinning_needs_tracks():

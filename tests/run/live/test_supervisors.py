@@ -172,7 +172,7 @@ def test_a_crash_goes_on_in_the_same_parts(tmp_path):
         Path("masks-3"),
         state=Path("s"),
         record=Path("tape"),
-        counts=before.folder / "intervals",
+        lasting=before.folder,
     )
     assert not again.force
 

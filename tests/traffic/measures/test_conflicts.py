@@ -180,10 +180,13 @@ def test_post_encroachment_times_are_those_of_brute_force(seed, block):
             i, j = i[met], j[met]
             hit = touching(base[i], base[j])
             sampled = np.abs(rows.t[i] - rows.t[j])[hit].min(initial=np.inf)
-            if 0 < sampled < 5:  # in one place at one time: an error, and no encroachment
-                assert sampled - 2 / fps - 1e-9 <= ours[a, b] <= sampled + 1e-9
-            else:
-                assert np.isnan(ours.get((a, b), np.nan))
+            pet = ours.get((a, b), np.nan)
+            if 0.5 < sampled < 5:
+                assert sampled - 2 / fps - 1e-9 <= pet <= sampled + 1e-9
+            elif 0 < sampled < 5:  # a short time may not differ from 0 by what it is off
+                assert np.isnan(pet) or sampled - 2 / fps - 1e-9 <= pet <= sampled + 1e-9
+            else:  # in one place at one time: an error, and no encroachment
+                assert np.isnan(pet)
 
 
 def bend(track, start_s, turn_rad, speed=6.0, radius=7.0):

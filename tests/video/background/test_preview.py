@@ -109,7 +109,7 @@ def test_the_opening_is_the_frames_of_the_span_and_tells_no_warning_twice(tmp_pa
         cv2.imwrite(str(tmp_path / f"{k:03d}.png"), picture)
     caplog.set_level(logging.WARNING)
     with open_source(str(tmp_path), SourceSettings(start_s=0.12, end_s=0.44)) as source:
-        ahead = list(source.opening(0.3))
+        ahead = list(source.opening(0.3, 0.44))
         whole = list(source)
     assert [frame.time_s for frame in ahead] == pytest.approx([frame.time_s for frame in whole if frame.time_s < 0.43])
     assert all(np.array_equal(a.y, b.y) for a, b in zip(ahead, whole, strict=False))

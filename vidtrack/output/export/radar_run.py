@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from vidtrack.errors import ConfigError, FormatError
-from vidtrack.radar.plane import Plane
+from vidtrack.radar.plane import Plane, plane_of_run
 
 _BATCH = 1 << 16
 _NEEDED = ("scan", "time_s", "track_id", "status", "x_m", "y_m", "vx_m_s", "vy_m_s", "sigma_x_m", "sigma_y_m")
@@ -55,5 +55,5 @@ def open_radar_run(folder: Path, position: tuple[float, float, float] | None = N
         raise FormatError(f"{folder} is not a finished run: {error}; vidtrack repair {folder} may help") from None
     if not set(_NEEDED) <= names:
         raise ConfigError(f"{folder} is not a run of vidtrack radar; CAT 062 is for radar's tracks")
-    origin = position or summary.get("origin") or radar.get("geodetic")
-    return RadarRun(folder, Plane(*origin) if origin else None, radar.get("sac") or 0, radar.get("sic") or 0, rows)
+    plane = Plane(*position) if position else plane_of_run(summary)
+    return RadarRun(folder, plane, radar.get("sac") or 0, radar.get("sic") or 0, rows)

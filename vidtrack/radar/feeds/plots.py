@@ -58,8 +58,7 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
     """
     positions = wanted(messages, settings)
     if not len(positions):
-        whose = "" if settings.sac is None and settings.sic is None else " of the radar with this sac and sic"
-        raise PlotFormatError(f"{name} holds no plots{whose}; it has {_contents(messages)}")
+        raise PlotFormatError(f"{name} holds {nothing_wanted(messages, settings)}")
     category = next(one for one in _CATEGORIES if (positions.category == one).any())
     chosen = positions.only(positions.category == category)
     sources = Counter(chosen.source.tolist())
@@ -73,9 +72,18 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
     return Choice(chosen.source[0].item(), category, kind)
 
 
-def warn_of_others(choice: Choice, messages: Messages, name: str) -> None:
-    """A warning says what of a feed is not tracked."""
+def nothing_wanted(messages: Messages, settings: RadarSettings) -> str:
+    """What messages are without wanted plots, and what they hold instead, in words."""
+    whose = "" if settings.sac is None and settings.sic is None else " of the radar with this sac and sic"
+    marks = "marks of the antenna only" if len(messages) and messages.marks.all() else ""
+    return f"no plots{whose}; it has {marks or _contents(messages)}"
+
+
+def warn_of_others(choice: Choice, messages: Messages, settings: RadarSettings, name: str) -> None:
+    """A warning says what of a feed is not tracked; of its sender only, if the settings name that."""
     others = messages.only(~choice.holds(messages))
+    if settings.sac is not None and settings.sic is not None:
+        others = others.only(others.source == choice.source)
     if not others.marks.all():
         _log.warning("%s: tracked are %s; not %s", name, _contents(choice.of(messages)), _contents(others))
 

@@ -76,6 +76,13 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
     return Messages.of(found)
 
 
+def senders(path: str | Path) -> list[tuple[int, int]]:
+    """SAC and SIC of each radar whose plots are in a recording of ASTERIX. Raises the errors of `read_messages`."""
+    messages = read_messages(path, Losses())
+    plots = messages.only((messages.kind == Kind.POLAR) & (messages.category > 0))
+    return [(source >> 8, source & 255) for source in np.unique(plots.source).tolist()]
+
+
 def _informed(kind: type[Decoder], content: bytes) -> Decoder:
     """A decoder that has read the beginning: some messages need a time of day that others say later."""
     decoder = kind(Losses())
@@ -94,7 +101,7 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     losses, name = Losses(), str(path)
     messages = read_messages(path, losses)
     choice = choose(messages, settings, name)
-    warn_of_others(choice, messages, name)
+    warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
     messages = Clock(losses).on_one_clock(choice.of(messages))
     plane = plane_of(choice, messages, settings, name)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
+from time import monotonic
 
 import numpy as np
 
@@ -11,12 +13,22 @@ from vidtrack.config.radar import RadarSettings
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import Losses, Message, Messages
 from vidtrack.radar.feeds.pace import Pace, pace_of
-from vidtrack.radar.feeds.plots import Choice, choose, plots_of, wanted, warn_of_assumed_errors, warn_of_others
+from vidtrack.radar.feeds.plots import (
+    Choice,
+    choose,
+    nothing_wanted,
+    plots_of,
+    wanted,
+    warn_of_assumed_errors,
+    warn_of_others,
+)
 from vidtrack.radar.feeds.recording import Decoder, decoder_of, plane_of
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.scans import Measurements, measurements
 from vidtrack.scan import Scan
+
+_log = logging.getLogger(__name__)
 
 LEARNT_SCANS = 3
 """Scans from which pace and surveyed space are learnt; they are tracked too, afterwards."""
@@ -27,6 +39,9 @@ MOST_EMPTY = 50
 SILENT_SCANS = 3
 """After a silence of so many scans what is there is given out."""
 
+KEPT_S = 60.0
+"""s; what was heard before is forgotten as long as no plot can be tracked."""
+
 
 class ScanStream:
     """Decodes payloads and gives out scans, in the coordinates of the settings' estimator.
@@ -34,6 +49,7 @@ class ScanStream:
     found   measurements of the first scans, from which a tracker is built; None until they are there
     plane   where x = y = 0 is on the earth; None: not known
     plots   number of plots given out
+    lacks   why nothing can be tracked of what was heard; None: something can, or nothing was heard
     """
 
     def __init__(self, settings: RadarSettings, name: str) -> None:
@@ -43,7 +59,9 @@ class ScanStream:
         self.plane: Plane | None = None
         self.plots = 0
         self._decoder: Decoder | None = None
-        self._heard: list[Message] = []
+        self._heard: list[tuple[float, Message]] = []
+        self.lacks: str | None = None
+        self._warned = False
         self._choice: Choice | None = None
         self._pace: Pace | None = None
         self._clock = Clock(self.losses)
@@ -66,7 +84,8 @@ class ScanStream:
                 self.losses.damaged += 1
                 return
             self._decoder = kind(self.losses)
-        self._heard += self._decoder.messages(payload)
+        now = monotonic()
+        self._heard += [(now, message) for message in self._decoder.messages(payload)]
 
     def over(self, *, silent: bool = False) -> Iterator[tuple[int, Scan]]:
         """The scans that are over, and empty ones between them, with numbers from 0; all there are after a silence.
@@ -96,7 +115,7 @@ class ScanStream:
 
     def _take(self, silent: bool) -> None:
         """Number what was heard; while the pace is not known, try to learn it."""
-        heard = Messages.of(self._heard)
+        heard = Messages.of([message for _, message in self._heard])
         if self._pace is None or self._choice is None:
             self._learn(heard, silent)
             return
@@ -107,16 +126,19 @@ class ScanStream:
     def _learn(self, heard: Messages, silent: bool) -> None:
         """Choose what is tracked, find its pace, and make the measurements of the first scans."""
         if not len(wanted(heard, self._settings)):
+            self._wait(nothing_wanted(heard, self._settings))
             return
         choice = choose(heard, self._settings, self._name)
         believed = Clock(Losses()).on_one_clock(choice.of(heard))
         if believed.marks.all():
+            self._wait("no plots with a time")
             return
+        self.lacks = None
         pace = pace_of(believed, self._settings.scan_s)
         progress = pace.progress(believed)
         if np.ptp(progress) < LEARNT_SCANS + LATE and not silent:
             return
-        warn_of_others(choice, heard, self._name)
+        warn_of_others(choice, heard, self._settings, self._name)
         warn_of_assumed_errors(choice, self._settings, self._name)
         self._choice, self._pace, self._heard = choice, pace, []
         self._clock.on_one_clock(choice.of(heard))
@@ -125,6 +147,19 @@ class ScanStream:
         self._keep(believed, progress)
         plots = self._plots(self._waiting, np.floor(self._progress).astype(np.int64), Losses())
         self.found = measurements(plots, self._settings)
+
+    def _wait(self, why: str) -> None:
+        """Nothing can be tracked yet: keep the last KEPT_S of what was heard, and say once why."""
+        if not self._heard:
+            return
+        self.lacks = why
+        oldest = monotonic() - KEPT_S
+        if self._heard[0][0] >= oldest:
+            return
+        if not self._warned:
+            _log.warning("%s: for %.0f s there were %s", self._name, KEPT_S, why)
+        self._warned = True
+        self._heard = [one for one in self._heard if one[0] >= oldest]
 
     def _keep(self, messages: Messages, progress: Floats) -> None:
         """Keep plots until their scan is over; those of scans given out are late."""

@@ -14,7 +14,7 @@ from vidtrack.formats import Table
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses
 from vidtrack.radar.feeds.recording import read_messages
-from vidtrack.radar.plane import Plane
+from vidtrack.radar.plane import Plane, plane_of_run
 
 LONGEST_GAP_S = 30.0
 """s; between reports that are farther apart a target's place is not known."""
@@ -50,17 +50,17 @@ def read_truth(path: Path, run: Path) -> Table:
 def _scans(run: Path) -> tuple[Ints, Floats, Plane]:
     """Numbers and times of a run's scans, and its plane."""
     try:
-        origin = json.loads((run / "summary.json").read_text()).get("origin")
+        plane = plane_of_run(json.loads((run / "summary.json").read_text()))
         table = pq.read_table(run / "tracks.parquet", columns=["scan", "time_s"])
     except (OSError, ValueError) as error:
         raise FormatError(f"{run} is not a run of vidtrack radar: {error}") from None
-    if origin is None:
+    if plane is None:
         raise FormatError(f"{run} does not know where its radar is; track again with --radar-position LAT,LON")
     number, first = np.unique(table["scan"].to_numpy(), return_index=True)
     if not len(number):
         raise FormatError(f"{run} has no tracks")
     scan = np.arange(number[0], number[-1] + 1)
-    return scan, np.interp(scan, number, table["time_s"].to_numpy()[first]), Plane(*origin)
+    return scan, np.interp(scan, number, table["time_s"].to_numpy()[first]), plane
 
 
 def _known(reported_s: Floats, time_s: Floats) -> np.ndarray:

@@ -14,15 +14,19 @@ from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.feeds.recording import is_feed, senders
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
-from vidtrack.radar.plots import Plots, read_plots
+from vidtrack.radar.plots import Plots
+from vidtrack.radar.reading import read
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
 from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
 
 _log = logging.getLogger(__name__)
+_OWN = ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s", "scan_s", "sac", "sic")
+"""Settings that a radar's table may have; else those of the run hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,11 +132,12 @@ class Network:
 
 
 def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) -> list[Feed]:
-    """The feeds of tables of plots: the file NAME.csv has those of the radar NAME.
+    """The feeds of tables and recordings: the file NAME.csv, NAME.ast, ... has the plots of the radar NAME.
 
+    A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
     Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one.
     """
-    feeds = [_read(Path(path), radars, settings) for path in paths]
+    feeds = [feed for path in paths for feed in _feeds(Path(path), radars, settings)]
     names = [feed.placed.name for feed in feeds]
     for name in names:
         if names.count(name) > 1:
@@ -143,13 +148,28 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     return feeds
 
 
-def _read(path: Path, radars: Radars, settings: RadarSettings) -> Feed:
-    placed = radars.named(path.stem)
+def _feeds(path: Path, radars: Radars, settings: RadarSettings) -> list[Feed]:
+    """The feeds of one file; its damaged records are counted with the first."""
+    codes = senders(path) if path.stem not in radars.names and is_feed(path) else []
+    placed = [radars.coded(*code) for code in codes] or [radars.named(path.stem)]
+    first, *others = (_read(path, one, settings) for one in placed)
+    return [first, *(replace(feed, plots=_without_damaged(feed.plots)) for feed in others)]
+
+
+def _without_damaged(plots: Plots) -> Plots:
+    return replace(plots, bad_rows=0, losses={**plots.losses, "damaged": 0})
+
+
+def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
     radar = placed.radar
-    known = {name: getattr(radar, name) for name in ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s")}
+    known = {name: getattr(radar, name) for name in _OWN}
     own = {name: value for name, value in known.items() if value is not None}
     settings = settings.model_copy(update={"position": placed.xyz, **own})
-    plots = _level(read_plots(path, settings), path)
+    plots = _level(read(path, settings), path)
+    if plots.plane is not None and not plots.polar:
+        raise ConfigError(
+            f"{path} has positions; a radar of --radars needs ranges and azimuths (CAT 048, CAT 001, TTM)"
+        )
     if plots.polar:
         plots.z[:, 1] = wrap(plots.z[:, 1] + placed.turned)
     found = measurements(plots, settings)

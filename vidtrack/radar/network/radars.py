@@ -57,7 +57,7 @@ class Radar(Group):
     bias_time_s: float = Field(0.0, ge=0)
     """s; the same of the clock; the first radar's clock counts as right"""
     sac: int | None = Field(None, ge=0, le=255)
-    """system area code of its ASTERIX records"""
+    """system area code of its ASTERIX records, by which they are told from those of others"""
     sic: int | None = Field(None, ge=0, le=255)
     """system identification code of its ASTERIX records"""
 
@@ -95,13 +95,13 @@ class Radars:
     """The radars of a file in its order.
 
     placed  each radar on the common plane
-    origin  latitude and longitude [degrees] of the plane's origin, the mean of the radars' places; None: the file gives
-            places in metres
+    origin  latitude, longitude [degrees] and height [m], 0, of the plane's origin, the mean of the radars' places;
+            None: the file gives places in metres
     """
 
     path: Path
     placed: tuple[Placed, ...]
-    origin: tuple[float, float] | None
+    origin: tuple[float, float, float] | None
 
     @property
     def names(self) -> list[str]:
@@ -170,7 +170,8 @@ def _on_earth(path: Path, radars: dict[str, Radar]) -> Radars:
     latitude = np.array([radar.latitude for radar in radars.values()], float)
     longitude = np.array([radar.longitude for radar in radars.values()], float)
     around = np.radians(longitude)
-    origin = float(latitude.mean()), float(np.degrees(np.arctan2(np.sin(around).mean(), np.cos(around).mean())))
+    mean = np.degrees(np.arctan2(np.sin(around).mean(), np.cos(around).mean()))
+    origin = float(latitude.mean()), float(mean), 0.0
     plane = pyproj.Proj(proj="aeqd", lat_0=origin[0], lon_0=origin[1], ellps="WGS84")
     geod = pyproj.Geod(ellps="WGS84")
     placed = []

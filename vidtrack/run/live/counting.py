@@ -183,7 +183,7 @@ def counting_of(
     subject: Subject,
     folder: Path,
     began_s: Callable[[], float],
-    tell: Callable[[Sequence[Passage]], None] | None,
+    tell: Callable[[Sequence[Passage]], None] | None = None,
 ) -> Counting:
     """The counting of a run with counting lines, which goes on from the counts in `folder`.
 

@@ -58,6 +58,8 @@ class Receivers:
         """
         if self.token is not None and self.webhook is None:
             raise ConfigError("--webhook-token has no effect without --webhook")
+        if self.token is not None and not (self.token.isascii() and self.token.isprintable()):
+            raise ConfigError("the token of --webhook has a line break or a character that no HTTP header may have")
         if not self:
             if settings.events != type(settings.events)():
                 raise ConfigError("the settings of events have no effect without --mqtt or --webhook")
