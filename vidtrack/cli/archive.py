@@ -18,8 +18,8 @@ MEASURES, DAYS, TABLES = "measures", "days", "tables"
 def measure_archive(archive: str, site: Path | None, output: Path | None, force: bool, quiet: bool) -> Path:
     """Write `days/SITE/DAY` as `vidtrack measure` writes it, and `tables/TABLE/site=SITE/day=DAY`; returns the folder.
 
-    What is in memory is one day of one site. Raises SourceError for a batch without runs to measure, StoppedEarly if
-    days could not be measured.
+    The measures of an earlier call are replaced. What is in memory is one day of one site. Raises SourceError for a
+    batch without runs to measure, StoppedEarly if days could not be measured.
     """
     from vidtrack.errors import ConfigError, Error, StoppedEarly
     from vidtrack.output.folder import open_folder
@@ -30,6 +30,7 @@ def measure_archive(archive: str, site: Path | None, output: Path | None, force:
         raise ConfigError("the measures of a batch at an address need a folder of this machine: give one with -o")
     found = portions(archive, site)
     folder = open_folder(Path(archive, MEASURES) if output is None else output, MEASURES, force or output is None)
+    _remove_older(folder)
     failed = 0
     for number, portion in enumerate(found, start=1):
         try:
@@ -46,6 +47,30 @@ def measure_archive(archive: str, site: Path | None, output: Path | None, force:
     if failed:
         raise StoppedEarly(f"{failed} of {len(found)} days could not be measured; the others are in {folder}")
     return folder
+
+
+def _remove_older(folder: Path) -> None:
+    """Delete the measures of an earlier call: they may be of days that are no more. What was corrected by hand stays.
+
+    Raises StoppedEarly for what cannot be deleted.
+    """
+    import shutil
+    from contextlib import suppress
+
+    from vidtrack.output.corrections import NAME
+    from vidtrack.output.folder import writing
+
+    for part in folder.glob(f"{TABLES}/*/site=*"):
+        with writing(part):
+            shutil.rmtree(part)
+    for day in [path.parent for path in folder.glob(f"{DAYS}/*/*/measures.json")]:
+        with writing(day):
+            for file in day.iterdir():
+                if file.is_file() and file.name != NAME:
+                    file.unlink()
+        with suppress(OSError):  # corrections are in it, or other days
+            day.rmdir()
+            day.parent.rmdir()
 
 
 def _measure(portion: Portion, site: Path | None, folder: Path) -> Mapping[str, Any]:

@@ -10,7 +10,9 @@ from click.testing import CliRunner
 from places import batch_of, do, small_videos
 
 from vidtrack.cli import cli
-from vidtrack.errors import StoppedEarly
+from vidtrack.errors import ConfigError, StoppedEarly
+from vidtrack.run.batch.archive import folder_name, portions
+from vidtrack.run.batch.index import DONE, Row, index_bytes
 
 SITE = """
 [site]
@@ -79,8 +81,35 @@ def test_a_page_leads_to_the_report_of_each_day(archive, measures):
 
 def test_a_site_can_be_given_later(archive, tmp_path):
     (tmp_path / "moved.toml").write_text(SITE.replace('"crossing"', '"moved"'))
-    folder = tmp_path / run("measure", archive, "--site", tmp_path / "moved.toml", "-o", tmp_path / "m", "-q")
+    site = tmp_path / "moved.toml"
+    folder = tmp_path / run("measure", archive, "--site", site, "-o", tmp_path / "m", "-q")
     assert [path.name for path in (folder / "days").iterdir()] == ["moved"]
+    corrected = folder / "days" / "moved" / "2026-06-01" / "corrections.csv"
+    corrected.write_text("verdict,time_s,gate,direction,run,track_id\n")
+    site.write_text(SITE.replace('"crossing"', '"again"'))
+    run("measure", archive, "--site", site, "-o", folder, "--force", "-q")
+    assert [path.parent.parent.name for path in folder.glob("days/*/*/measures.json")] == ["again"] * 3
+    assert [path.name for path in folder.glob("days/moved/*/*")] == ["corrections.csv"]
+    table = ds.dataset(folder / "tables" / "intervals", partitioning="hive").to_table()
+    assert set(table["site"].to_pylist()) == {"again"}
+
+
+def test_two_sites_do_not_share_a_folder(tmp_path):
+    rows = []
+    for folder, name in (("one", "A_N"), ("two", "A N")):
+        (tmp_path / "results" / folder).mkdir(parents=True)
+        (tmp_path / "results" / folder / "site.toml").write_text(SITE.replace('"crossing"', f'"{name}"'))
+        rows.append(Row(f"/{folder}.avi", folder, site=f"/{folder}.toml", state=DONE))
+    (tmp_path / "index.parquet").write_bytes(index_bytes(rows))
+    with pytest.raises(ConfigError, match="A N and A_N would have one folder, A_N"):
+        portions(str(tmp_path), None)
+
+
+@pytest.mark.parametrize(
+    ("name", "folder"), [("..", "site"), ("../x", "_x"), (".hidden", "hidden"), ("Süd 1", "Süd_1")]
+)
+def test_a_site_gets_a_folder_below_the_measures(name, folder):
+    assert folder_name(name) == folder
 
 
 def test_a_day_that_cannot_be_measured_does_not_end_the_others(archive, tmp_path):

@@ -2,10 +2,11 @@
 
 import json
 import os
+from dataclasses import replace
 
 import pyarrow.parquet as pq
 import pytest
-from places import FRAMES, AtOnce, batch_of, do, small_videos
+from places import FRAMES, AtOnce, batch_of, do, engine_of, small_videos
 
 from vidtrack.config.load import load
 from vidtrack.errors import ConfigError, OutputError, StoppedEarly
@@ -139,6 +140,30 @@ def test_a_long_file_is_cut_and_goes_on_with_the_missing_slices(videos, tmp_path
     assert not (tmp_path / "slices" / batch.rows[str(source)].folder).exists()
 
 
+def test_no_process_stays_behind_a_batch_that_is_done(videos, done):
+    out, _ = done
+    ended = []
+    engine = replace(engine_of(AtOnce(lambda told: AGAIN | {"again": False})), end=ended.append)
+    batch_of([videos], out).run(engine, lambda progress: None)
+    assert ended == [str(out)]
+
+
+def test_a_slice_that_was_copied_in_part_is_done_again(videos, tmp_path):
+    source = videos / "cam1" / "08-00.avi"
+
+    def stop(told):
+        if told["kind"] == "stitch":
+            raise KeyboardInterrupt
+        return work(told, lambda: None)
+
+    with pytest.raises(KeyboardInterrupt):
+        do(batch_of([source], tmp_path, slice_s=1.0), AtOnce(stop))
+    next(tmp_path.glob("slices/*/*/00001/slice.json")).unlink()
+    batch = batch_of([source], tmp_path, slice_s=1.0)
+    assert [(kind, number) for kind, _, number in do(batch)] == [("file", 0), ("slice", 1), ("stitch", 0)]
+    assert batch.rows[str(source)].state == DONE
+
+
 def test_another_batch_is_not_touched(videos, done, tmp_path):
     out, _ = done
     extra = tmp_path / "other.mp4"
@@ -161,8 +186,6 @@ def test_settings_are_refused_before_anything_is_begun(videos, tmp_path):
 
 
 def test_an_engine_that_is_gone_ends_the_batch_and_keeps_what_is_done(videos, tmp_path):
-    from places import engine_of
-
     executor = AtOnce()
     batch = batch_of([videos / "cam1", videos / "cam2"], tmp_path)
 

@@ -9,6 +9,7 @@ from places import batch_of, small_videos
 
 from vidtrack.run.batch import child
 from vidtrack.run.batch.child import Child, attempt, end_children
+from vidtrack.run.batch.task import VERSION
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +40,24 @@ def test_a_task_is_done_on_one_core_and_the_process_stays(task):
     assert child._of_thread.child in child._alive
     end_children(task["out"])
     assert child._of_thread.child not in child._alive
+
+
+def test_a_process_works_for_the_place_of_its_last_task(monkeypatch):
+    class Idle:
+        """Stands for a process that is alive and answers at once."""
+
+        def __init__(self, out):
+            self.out, self.process = out, self
+
+        def poll(self):
+            return None
+
+        def do(self, told, _patience_s):
+            return {"out": self.out}
+
+    monkeypatch.setattr(child._of_thread, "child", Idle("first"), raising=False)
+    told = {"version": VERSION, "patience_s": 1.0}
+    assert [attempt(told | {"out": out}) for out in ("first", "second")] == [{"out": "first"}, {"out": "second"}]
 
 
 def test_a_killed_process_is_named_by_its_signal(one, task):

@@ -81,3 +81,14 @@ def test_a_place_at_an_address_is_an_archive(done):
     assert is_archive(out)
     with pytest.raises(SourceError, match="with a site"):
         portions(out, None)
+
+
+def test_slices_go_on_from_each_other_over_a_store(bucket, tmp_path):
+    video = small_videos(tmp_path) / "cam1" / "08-00.avi"
+    batch = batch_of([video], f"{bucket}/sliced", slice_s=1.0)
+    assert [(kind, number) for kind, _, number in do(batch)] == [("file", 0), ("slice", 0), ("slice", 1), ("stitch", 0)]
+    assert [(row.state, row.frames) for row in batch.rows.values()] == [(DONE, FRAMES)]
+    assert place_of(f"{bucket}/sliced").names("slices") == set()
+    again = batch_of([video], f"{bucket}/sliced", again=True)
+    do(again)
+    assert [row.state for row in again.rows.values()] == [DONE]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from vidtrack.errors import SourceError
+from vidtrack.errors import ConfigError, SourceError
 from vidtrack.run.batch.index import DONE, INDEX, Row, rows_of
 from vidtrack.run.batch.place import Place, place_of
 from vidtrack.run.batch.task import RESULTS
@@ -52,7 +52,7 @@ def portions(text: str, site: Path | None) -> list[Portion]:
 
     site  of all runs; None: the one that each was tracked with
 
-    Raises SourceError where nothing is done, or nothing has a site.
+    Raises SourceError where nothing is done, or nothing has a site; ConfigError for two sites with one folder.
     """
     place = place_of(text)
     rows = [row for row in rows_of(place.read(INDEX), place.shown).values() if row.state == DONE]
@@ -69,6 +69,7 @@ def portions(text: str, site: Path | None) -> list[Portion]:
         groups.setdefault((named[key], _day(row)), []).append(row)
     if not groups:
         raise SourceError(f"no run in {place.shown} was tracked with a site; give --site SITE.toml")
+    _refuse_same_folder({name for name, _ in groups})
     return [
         Portion(place, name, day, tuple(sorted(group, key=_order))) for (name, day), group in sorted(groups.items())
     ]
@@ -90,4 +91,14 @@ def _order(row: Row) -> tuple[float, str]:
 
 def folder_name(text: str) -> str:
     """A name of a site or a day as that of a folder."""
-    return re.sub(r"[^\w.-]+", "_", text)
+    return re.sub(r"[^\w.-]+", "_", text).lstrip(".") or "site"
+
+
+def _refuse_same_folder(sites: Iterable[str]) -> None:
+    """Raise ConfigError for two sites whose measures would have the same folder."""
+    owner: dict[str, str] = {}
+    for site in sorted(sites):
+        folder = folder_name(site)
+        if folder in owner:
+            raise ConfigError(f"the sites {owner[folder]} and {site} would have one folder, {folder}; rename one")
+        owner[folder] = site

@@ -19,6 +19,7 @@ from vidtrack.run.batch.place import Place
 from vidtrack.run.batch.task import RESULTS, VERSION, Outcome, Task
 from vidtrack.run.batch.work import ABOUT
 from vidtrack.run.slices.cuts import Cut
+from vidtrack.run.slices.kept import ABOUT as ABOUT_SLICE
 
 ATTEMPTS = 3
 """A task is begun so often where another attempt may help: a process that died or hung, a full disk, a network."""
@@ -90,13 +91,15 @@ class Batch:
     def run(self, engine: Engine, tell: Callable[[Progress], None]) -> None:
         """Do what is to be done; `tell` is called after each change, and at least once a second.
 
-        Raises StoppedEarly if the engine is gone. However it ends, the index says what is done.
+        Raises StoppedEarly if the engine is gone. However it ends, the index says what is done, and no process works
+        for this place any more.
         """
         try:
             while self._waiting or self._running:
                 self._hand_over(engine)
                 self._take(engine)
                 tell(self.progress)
+            engine.end(self._out)
         except BaseException:
             for future in self._running:
                 future.cancel()
@@ -156,13 +159,16 @@ class Batch:
 
     def _cut(self, task: Task) -> None:
         """Do the slices of a long file that are not there yet, before all else."""
-        there = self.place.names(task.slices)
-        left = {cut.number for cut in task.cuts if f"{cut.number:05d}" not in there}
+        left = {cut.number for cut in task.cuts if not self._is_kept(task.slice_folder(cut.number))}
         self._cutting[task.name] = _Cutting(task, left)
         if left and task.warm_s is not None:
             self._waiting.extendleft(task.slice(number) for number in sorted(left, reverse=True))
         else:
             self._next(self._cutting[task.name])
+
+    def _is_kept(self, slice_folder: str) -> bool:
+        """Whether a slice is there as a whole; a copy to a store that was killed leaves a part of it."""
+        return self.place.read(f"{slice_folder}/{ABOUT_SLICE}") is not None
 
     def _sliced(self, name: str, number: int) -> None:
         cutting = self._cutting.get(name)

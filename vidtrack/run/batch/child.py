@@ -34,6 +34,7 @@ def attempt(told: dict[str, Any]) -> Outcome:
     child = getattr(_of_thread, "child", None)
     if child is None or child.process.poll() is not None:
         child = _of_thread.child = Child(told["out"])
+    child.out = told["out"]  # a worker's process may have done tasks of another batch
     return child.do(told, float(told["patience_s"]))
 
 

@@ -33,7 +33,7 @@ class Engine:
     executor   takes the function and a task
     shown      what it is, in words
     width      returns the number of tasks to hand over at a time
-    end        ends what is running for a place
+    end        ends the processes that work for a place
     check      raises StoppedEarly if the engine is gone
     """
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,10 +13,15 @@ from uuid import uuid4
 from vidtrack.errors import OutputError
 from vidtrack.output.folder import replacing, usable, writing
 from vidtrack.output.lock import exclusive
+from vidtrack.run.batch.index import INDEX
 from vidtrack.run.batch.remote import download, is_remote, local_path, reading, store, upload, without_secrets
 
 PARTIAL, SLICES = "partial", "slices"
 """Folders of what is not complete, and of slices that wait to be stitched."""
+
+
+def _nothing() -> None:
+    """Nobody waits for a beat."""
 
 
 class Place(Protocol):
@@ -39,11 +44,16 @@ class Place(Protocol):
     def workspace(self) -> AbstractContextManager[Path]:
         """An empty folder on this machine, deleted at the end of the block."""
 
-    def put(self, folder: Path, name: str, last: str) -> None:
-        """Move a complete folder of a workspace into place; its file `last` tells that it is complete."""
+    def put(self, folder: Path, name: str, last: str, beat: Callable[[], None]) -> None:
+        """Move a complete folder of a workspace into place; its file `last` tells that it is complete.
 
-    def local(self, name: str) -> AbstractContextManager[Path]:
-        """A folder of the place as one on this machine, to read."""
+        beat  called after each piece of a copy
+        """
+
+    def local(
+        self, name: str, beat: Callable[[], None] = _nothing, only: str | None = None
+    ) -> AbstractContextManager[Path]:
+        """A folder of the place as one on this machine, to read; at least the file `only` of it."""
 
     def remove(self, name: str) -> None:
         """Delete a folder."""
@@ -63,15 +73,21 @@ class FolderPlace:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Lock the folder, made if necessary, and delete what a killed batch left. Raises OutputError."""
+        """Lock the folder, made if necessary, and delete what a killed batch left. Raises OutputError.
+
+        Without an index, folders of these names are not those of a batch, and stay.
+        """
         with exclusive(usable(self.root)):
-            shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
+            own = (self.root / INDEX).is_file() or not any((self.root / name).exists() for name in (PARTIAL, SLICES))
             try:
+                if own:
+                    self.remove(PARTIAL)
                 yield
             finally:
-                shutil.rmtree(self.root / PARTIAL, ignore_errors=True)
-                with suppress(OSError):  # there is none, or slices in it
-                    (self.root / SLICES).rmdir()
+                if own:
+                    self.remove(PARTIAL)
+                    with suppress(OSError):  # there is none, or slices in it
+                        (self.root / SLICES).rmdir()
 
     def names(self, under: str) -> set[str]:
         """What is in a folder; nothing if there is none."""
@@ -101,7 +117,7 @@ class FolderPlace:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def put(self, folder: Path, name: str, last: str) -> None:
+    def put(self, folder: Path, name: str, last: str, beat: Callable[[], None]) -> None:
         """Move a complete folder into place; an older one of this name goes."""
         target = self.root / name
         with writing(target):
@@ -110,7 +126,9 @@ class FolderPlace:
                 target.rename(folder.parent / f"{folder.name}-old")
             folder.rename(target)
 
-    def local(self, name: str) -> AbstractContextManager[Path]:
+    def local(
+        self, name: str, beat: Callable[[], None] = _nothing, only: str | None = None
+    ) -> AbstractContextManager[Path]:
         """The folder itself."""
         return nullcontext(self.root / name)
 
@@ -129,9 +147,10 @@ class RemotePlace:
     @contextmanager
     def held(self) -> Iterator[None]:
         """Check that the address can be written. Raises OutputError."""
+        name = f"writable-{uuid4().hex}"
         try:
-            self.write(f"{PARTIAL}/writable", b"")
-            self.remove(PARTIAL)
+            self.write(name, b"")
+            self.remove(name)
         except OSError as error:
             raise OutputError(f"cannot write to {self.shown}: {error}") from None
         yield
@@ -169,15 +188,15 @@ class RemotePlace:
         with TemporaryDirectory(prefix="vidtrack-") as folder:
             yield Path(folder)
 
-    def put(self, folder: Path, name: str, last: str) -> None:
+    def put(self, folder: Path, name: str, last: str, beat: Callable[[], None]) -> None:
         """Copy a complete folder; its file `last` comes last."""
-        upload(folder, f"{self.address}/{name}", last)
+        upload(folder, f"{self.address}/{name}", last, beat)
 
     @contextmanager
-    def local(self, name: str) -> Iterator[Path]:
-        """A copy for as long as the block lasts."""
+    def local(self, name: str, beat: Callable[[], None] = _nothing, only: str | None = None) -> Iterator[Path]:
+        """A copy, or one of its file `only`, for as long as the block lasts."""
         with TemporaryDirectory(prefix="vidtrack-") as folder:
-            download(f"{self.address}/{name}", Path(folder))
+            download(f"{self.address}/{name}", Path(folder), only, beat)
             yield Path(folder)
 
     def remove(self, name: str) -> None:

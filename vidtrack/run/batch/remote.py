@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import glob
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO
+from typing import Any
 
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.video.live.address import redact
@@ -61,16 +61,19 @@ def reading(address: str) -> Iterator[None]:
         raise OSError(f"cannot read {without_secrets(address)}: {what}") from None
 
 
-@contextmanager
-def opened(text: str) -> Iterator[BinaryIO]:
-    """A file to read, by path or address."""
-    if not is_remote(text):
+def pieces(text: str) -> Iterator[bytes]:
+    """The content of a file, by path or address, piece by piece. Raises SourceError or OSError."""
+    if is_remote(text):
+        yield from _pieces(*store(text), text)
+    else:
         with open(local_path(text), "rb") as file:
-            yield file
-        return
-    files, path = store(text)
-    with reading(text), files.open(path, "rb") as file:
-        yield file
+            yield from iter(partial(file.read, _CHUNK), b"")
+
+
+def _pieces(files: Any, path: str, address: str) -> Iterator[bytes]:
+    """The content of a file in a store; what the caller does with a piece raises its own errors."""
+    with reading(address), files.open(path, "rb") as file:
+        yield from iter(partial(file.read, _CHUNK), b"")
 
 
 def remote_files(text: str, endings: frozenset[str]) -> Iterator[tuple[str, int, str]]:
@@ -110,31 +113,48 @@ def local_copy(address: str, beat: Callable[[], None]) -> Iterator[str]:
         return
     with TemporaryDirectory(prefix="vidtrack-") as folder:
         path = Path(folder, PurePosixPath(address).name)
-        with opened(address) as source, path.open("wb") as copy:
-            while piece := source.read(_CHUNK):
-                copy.write(piece)
-                beat()
+        _save(pieces(address), path, beat)
         yield str(path)
 
 
-def upload(folder: Path, address: str, last: str) -> None:
-    """Copy a folder to a store; its file `last` comes last, so that whoever sees it sees the whole."""
+def _save(content: Iterable[bytes], path: Path, beat: Callable[[], None]) -> None:
+    with path.open("wb") as copy:
+        for piece in content:
+            copy.write(piece)
+            beat()
+
+
+def upload(folder: Path, address: str, last: str, beat: Callable[[], None]) -> None:
+    """Copy a folder to a store; its file `last` comes last, so that whoever sees it sees the whole.
+
+    beat  called after each piece
+    """
     files, path = store(address)
     names = [str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()]
     with reading(address):
-        with suppress(FileNotFoundError):
-            files.rm(path, recursive=True)
+        for old in (f"{path}/{last}", path):  # while an older copy is deleted, it is not taken for a whole one
+            with suppress(FileNotFoundError):
+                files.rm(old, recursive=True)
         for name in sorted(names, key=last.__eq__):
-            with (folder / name).open("rb") as source, files.open(f"{path}/{name}", "wb") as copy:
-                shutil.copyfileobj(source, copy, _CHUNK)
+            with files.open(f"{path}/{name}", "wb") as copy:
+                for piece in pieces(str(folder / name)):
+                    copy.write(piece)
+                    beat()
+            beat()  # a store takes the last piece, and an empty file, when it is closed
 
 
-def download(address: str, folder: Path) -> None:
-    """Copy all files below an address to a folder."""
+def download(address: str, folder: Path, only: str | None, beat: Callable[[], None]) -> None:
+    """Copy all files below an address, or `only` one of them, to a folder.
+
+    beat  called after each piece
+    """
     files, path = store(address)
-    with reading(address):
-        for name in files.find(path):
-            target = folder / PurePosixPath(name).relative_to(PurePosixPath(path))
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with files.open(name, "rb") as source, target.open("wb") as copy:
-                shutil.copyfileobj(source, copy, _CHUNK)
+    if only is None:
+        with reading(address):
+            names = files.find(path)
+    else:
+        names = [f"{path}/{only}"]
+    for name in names:
+        target = folder / PurePosixPath(name).relative_to(PurePosixPath(path))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _save(_pieces(files, name, address), target, beat)

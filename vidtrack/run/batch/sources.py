@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from difflib import get_close_matches
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.recording.source import is_recording
-from vidtrack.run.batch.remote import is_remote, local_path, opened, remote_files, without_secrets
+from vidtrack.run.batch.remote import is_remote, local_path, pieces, remote_files, without_secrets
 from vidtrack.video.pictures import images_in
 
 VIDEOS = frozenset(
@@ -163,15 +164,16 @@ def _time(value: object, where: str) -> datetime:
 def _table(text: str) -> pa.Table:
     shown = without_secrets(text)
     try:
-        with opened(text) as file:
-            if text.lower().endswith(".parquet"):
-                return pq.read_table(file)
-            words = pyarrow.csv.ConvertOptions(column_types=dict.fromkeys(COLUMNS, pa.string()))
-            return pyarrow.csv.read_csv(file, convert_options=words)
-    except pa.ArrowInvalid as error:
-        raise FormatError(f"cannot read the table {shown}: {error}") from None
+        file = BytesIO(b"".join(pieces(text)))
     except OSError as error:
         raise SourceError(f"cannot open {shown}: {error.strerror or error}") from None
+    try:
+        if text.lower().endswith(".parquet"):
+            return pq.read_table(file)
+        words = pyarrow.csv.ConvertOptions(column_types=dict.fromkeys(COLUMNS, pa.string()))
+        return pyarrow.csv.read_csv(file, convert_options=words)
+    except (pa.ArrowInvalid, OSError) as error:  # Arrow gives damaged pages as OSError
+        raise FormatError(f"cannot read the table {shown}: {error}") from None
 
 
 def _looked_at(source: Source) -> Source:

@@ -17,14 +17,14 @@ from vidtrack.run.batch.task import Outcome, Task
 from vidtrack.run.files import run_file
 from vidtrack.run.run import Extras, Run
 from vidtrack.run.slices.cuts import cuts
+from vidtrack.run.slices.kept import ABOUT as ABOUT_SLICE
 from vidtrack.run.slices.stitch import stitched_pipeline
-from vidtrack.run.slices.track import track_slice
+from vidtrack.run.slices.track import STATE, track_slice
 from vidtrack.video.resources import OPENCV
 from vidtrack.video.source import duration_s
 
 ABOUT = "source.json"
 """Beside the results of a source: which source, and its row of the index. Its presence tells that they are complete."""
-_ABOUT_SLICE = "slice.json"
 _LEAST = 1.5
 """A file shorter than this many slices is not cut."""
 
@@ -33,7 +33,7 @@ def work(told: dict[str, object], beat: Callable[[], None]) -> Outcome:
     """Do a task; every error becomes an outcome.
 
     told  Task.as_dict()
-    beat  called after each frame
+    beat  called after each frame, and each piece of a copy
     """
     task = Task.of(told)
     begun = time.monotonic()
@@ -74,17 +74,21 @@ def _can_be_cut(task: Task, settings: Settings) -> bool:
 def _slice(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
     cut = task.cuts[task.number]
     with ExitStack() as stack:
-        before = stack.enter_context(place.local(task.slice_folder(cut.number - 1))) if cut.goes_on else None
+        before = (
+            stack.enter_context(place.local(task.slice_folder(cut.number - 1), beat, only=STATE))
+            if cut.goes_on
+            else None
+        )
         folder = stack.enter_context(place.workspace())
         track_slice(task.address, parse(task.settings), cut, folder, before, beat)
-        place.put(folder, task.slice_folder(cut.number), last=_ABOUT_SLICE)
+        place.put(folder, task.slice_folder(cut.number), last=ABOUT_SLICE, beat=beat)
     return {"sliced": task.number}
 
 
 def _stitch(task: Task, place: Place, beat: Callable[[], None]) -> Outcome:
     settings: Settings = parse(task.settings)
     with ExitStack() as stack:
-        folders = [stack.enter_context(place.local(task.slice_folder(one.number))) for one in task.cuts]
+        folders = [stack.enter_context(place.local(task.slice_folder(one.number), beat)) for one in task.cuts]
         folder = stack.enter_context(place.workspace())
         run = Run(stitched_pipeline(task.address, task.cuts, folders, settings), folder, force=True)
         outcome = _finished(run, task, place, folder, beat)
@@ -107,7 +111,7 @@ def _finished(run: Run, task: Task, place: Place, folder: Path, beat: Callable[[
     }
     about = task.about | found | {"key": task.key, "version": task.version}
     (folder / ABOUT).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
-    place.put(folder, task.result, last=ABOUT)
+    place.put(folder, task.result, last=ABOUT, beat=beat)
     return {"done": found}
 
 

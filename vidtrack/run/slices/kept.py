@@ -20,7 +20,8 @@ from vidtrack.video.frame import Frame
 
 _BLOCK = 500
 """Steps in a file: a minute of ten vehicles takes about 6 MB."""
-_ABOUT = "slice.json"
+ABOUT = "slice.json"
+"""What is known of a slice besides its steps; written last, so its presence tells that the slice is complete."""
 _TRACK, _SCAN, _STAGE = "track.", "scan.", "stage."
 
 
@@ -69,7 +70,7 @@ class KeptSteps:
     def about(self, about: About) -> None:
         """Write what else is known; the slice is then complete."""
         told = replace(about, stages=self._stages, columns=self._columns, ends=tuple(self._ends))
-        with replacing(self._folder / _ABOUT) as new:
+        with replacing(self._folder / ABOUT) as new:
             new.write_text(json.dumps(asdict(told)))
 
     def _write(self) -> None:
@@ -87,7 +88,7 @@ class KeptSteps:
 def read_about(folder: Path) -> About:
     """What is known of a slice. Raises FormatError."""
     try:
-        told = json.loads((folder / _ABOUT).read_text())
+        told = json.loads((folder / ABOUT).read_text())
         position, velocity = told["columns"]
         return About(**told | {"columns": (tuple(position), tuple(velocity))})
     except (OSError, ValueError, KeyError, TypeError) as error:
