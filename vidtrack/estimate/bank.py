@@ -78,4 +78,4 @@ class Mixture(Protocol):
         """The predicted measurement of each mode; S adds R."""
 
     def forget(self, rows: Ints) -> None:
-        """Undo what the last update has told of the modes of these rows."""
+        """Make all modes that a target of these rows may switch to equally probable."""

@@ -63,6 +63,8 @@ class IMMBank:
             raise ConfigError("IMM: a model is never left; each needs a rate above zero")
         self.prior = 1 / self.left[:, 0] if prior is None else np.asarray(prior, float)
         self.prior = self.prior / self.prior.sum()
+        together = np.linalg.matrix_power((self.rates > 0) + np.eye(r), r) > 0
+        self._evenly = together / together.sum(axis=1)
         self.model = models[0]
         self.banks = [KalmanBank(model) for model in models]
         self.mode = np.empty((0, r))
@@ -126,8 +128,8 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def forget(self, rows: Ints) -> None:
-        """Undo what the last update has told of the modes of these rows."""
-        self.mode[rows] = self._expected[rows]
+        """Make all modes that a target of these rows may switch to equally probable; what kind it is stays known."""
+        self.mode[rows] = self._expected[rows] @ self._evenly
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:

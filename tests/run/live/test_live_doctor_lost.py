@@ -44,7 +44,7 @@ def seen(monkeypatch, compiled):
     def see(connection):
         connect = script_of(connection)
 
-        def open_it(*given, connect):
+        def open_it(*given, **_):
             opened.append(LiveSource(*given, connect=connect))
             return opened[-1]
 
