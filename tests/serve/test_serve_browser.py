@@ -84,7 +84,7 @@ def test_one_camera_is_shown_with_all_that_is_known(tab, counted):
         assert "the camera delivers" in text(tab, "body > header")
         assert not tab.js("document.querySelector('details').open")  # technical figures are folded away
         assert text(tab, ".counts tbody tr").split() == ["north", "←", "left", "12", text_today(tab), "19"]
-        assert tab.js("document.querySelector('#one .picture img').naturalWidth") == 640
+        tab.until("document.querySelector('#one .picture img').naturalWidth === 640")
         tab.js("document.querySelector('details').open = true")
         shown = text(tab, "#one")
         for fact in (

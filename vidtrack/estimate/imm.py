@@ -164,7 +164,7 @@ class IMMBank:
         mode = self.mode @ switch
         moved = []
         for j, bank in enumerate(self.banks):
-            weight = (self.mode * switch[:, j] / mode[:, j : j + 1]).T
+            weight = (self.mode * switch[:, j] / np.maximum(mode[:, j : j + 1], LEAST)).T
             lifted = [_lifted(other, bank, 2 * self.model.dim) for other in self.banks]
             mixed = copy(bank)
             mixed.x, mixed.P = _mixture(weight, np.stack([x for x, _ in lifted]), np.stack([P for _, P in lifted]))
