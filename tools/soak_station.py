@@ -34,6 +34,7 @@ from threading import Thread
 import av
 import cv2
 import numpy as np
+from soak_live import slope
 
 from vidtrack.output.intervals.day import day_folders, read_day
 
@@ -210,14 +211,6 @@ def compared(reference, camera) -> Counter:
         warm = ((t - begins > -NEAR_S) & (t - begins < WARM_S)).any() or not inside(watched, t, 0.0)
         result["not in the reference, in a warm-up" if warm else "invented"] += inside(sure, t, NEAR_S)
     return result
-
-
-def slope(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
-    """Of a straight line through y(x), with its standard error."""
-    dx = x - x.mean()
-    b = (dx @ y) / (dx @ dx)
-    rest = y - y.mean() - b * dx
-    return float(b), float(np.sqrt(rest @ rest / max(len(x) - 2, 1) / (dx @ dx)))
 
 
 def main() -> None:
