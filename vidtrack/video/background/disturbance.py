@@ -26,6 +26,7 @@ from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
+from vidtrack.video.span import ROUNDING_S
 
 _FIRST_S = 0.1  # after a start, while all frames weigh the same in the average
 _UNSURE_S = 10.0  # after a start, while ghosts are frequent
@@ -34,7 +35,6 @@ _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost o
 _LIFT = 0.5  # grey levels a second by which the darkest luminance seen is forgotten
 _GAP_S = 2.0  # after a longer gap between frames the scene is as uncertain as after a start, and no cover is counted
 _PREVIEW_EVERY_S = 0.2  # between pictures of the preview
-_ROUNDING_S = 1e-6
 _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but not the 0 of pixels that were seen free
 
 
@@ -78,7 +78,7 @@ class Disturbance:
         """
         pictures: list[tuple[float, Picture]] = []
         for frame in frames:
-            if not pictures or frame.time_s > pictures[-1][0] + _PREVIEW_EVERY_S - _ROUNDING_S:
+            if not pictures or frame.time_s > pictures[-1][0] + _PREVIEW_EVERY_S - ROUNDING_S:
                 pictures.append((frame.time_s, smooth(self._view.reduce(frame))))
         if len(pictures) < 2:
             return
