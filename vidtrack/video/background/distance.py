@@ -28,9 +28,7 @@ def contrast(luma: Levels) -> np.float32:
     """Contrast of the scene (h, w) relative to clear light, 0.5..1; vehicles lose as much to haze and darkness."""
     rows = luma[::_ROWS]
     edges = np.abs(rows[:, 2:] - rows[:, :-2])
-    return (
-        np.float32(min(max(_upper_percentile(edges, _STEEP) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
-    )
+    return np.float32(min(max(_upper_percentile(edges, _STEEP) / _CLEAR, LEAST_CONTRAST), 1.0)) if edges.size else _ONE
 
 
 def haziness(luma: Levels) -> np.float32:

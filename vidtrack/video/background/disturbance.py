@@ -222,9 +222,8 @@ class Disturbance:
         """Remove ghosts (objects in the scene, not in the picture) from mask and scene."""
         settled_s = min(self._settings.ghost_s, _UNSURE_GHOST_S) if self._unsure else self._settings.ghost_s
         row, begin, end = find_ghosts(mask, picture.luma, scene, np.float32(settled_s))
-        if len(row):
-            adopt(picture, scene, row, begin, end)
-            paint(mask, row, begin, end, 0)
+        adopt(picture, scene, row, begin, end)
+        paint(mask, row, begin, end, 0)
 
     def _learn(self, picture: Picture, scene: Scene, mask: Image, hit: Image, dt: float, span: Ints | None) -> None:
         """Average the pixels that are neither foreground, nor near foreground, nor shadow."""

@@ -87,7 +87,7 @@ def learn(
     for y in range(h):
         free = True
         for x in range(w):
-            taken[x] = covered[y, x] | hit[y, x] & RELIT
+            taken[x] = UNSEEN if covered[y, x] == UNSEEN else covered[y, x] | hit[y, x] & RELIT
             free &= taken[x] == 0
         for x in range(w):
             noise = scene.noise[y, x]

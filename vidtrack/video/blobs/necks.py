@@ -43,13 +43,14 @@ def parts(depth: NDArray[np.float32], neck: float, least: Floats) -> tuple[Ints,
 def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[Ints, int]:
     h, w = depth.shape
     wide = w + 2  # with a rim on each side no pixel needs a look whether it has neighbours
-    rimmed = np.zeros((h + 2, wide), np.float32)
-    rimmed[1:-1, 1:-1] = depth
-    deep, label = rimmed.ravel(), np.full((h + 2) * wide, np.int32(-1))
+    deep, label = np.zeros((h + 2) * wide, np.float32), np.full((h + 2) * wide, np.int32(-1))
+    for y in range(h):
+        for x in range(w):
+            deep[(y + 1) * wide + x + 1] = depth[y, x]
     order = _deepest_first(deep)
     parent, peak = np.empty(len(order), np.int64), np.empty(len(order))
     one, other, saddle = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
-    basins = 0
+    basins = np.int64(0)
     for p in order:
         d = deep[p]
         lowest, highest = len(order), -1  # of the neighbours' labels; nearly all pixels have one, or none
@@ -81,9 +82,9 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
             best, basins = basins, basins + 1
             parent[best], peak[best] = best, d
         label[p] = best
-    basin = label.reshape(h + 2, wide)[1:-1, 1:-1]
-    _absorb_small(_extents(basin, basins), parent[:basins], one, other, saddle, least)
-    return _numbered(basin, parent[:basins])
+    basin, parent = label.reshape(h + 2, wide)[1:-1, 1:-1], parent[:basins]
+    _absorb_small(_extents(basin, basins), parent, one, other, saddle, least)
+    return _numbered(basin, parent)
 
 
 @kernel
@@ -113,7 +114,8 @@ def _extents(basin: Ints, count: int) -> Ints:
     """(count, 4) left, top, right, bottom of each basin (h, w), last pixels included."""
     h, w = basin.shape
     extent = np.empty((count, 4), np.int64)
-    extent[:, 0], extent[:, 1], extent[:, 2:] = w, h, -1
+    for b in range(count):
+        extent[b, 0], extent[b, 1], extent[b, 2], extent[b, 3] = w, h, -1, -1
     for y in range(h):
         x = 0
         while x < w:
@@ -137,7 +139,7 @@ def _absorb_small(
     for basin in range(len(parent)):
         _widen(extent, _root(parent, basin), basin)
     while True:
-        smallest, size, into = -1, least, -1
+        smallest, size, into = np.int64(-1), least, np.int64(-1)
         for r in range(len(parent)):
             area = (extent[r, 2] - extent[r, 0] + 1) * (extent[r, 3] - extent[r, 1] + 1)
             if parent[r] != r or area >= size:
