@@ -50,9 +50,9 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
     order = _deepest_first(deep)
     parent, peak = np.empty(len(order), np.int64), np.empty(len(order))
     one, other, saddle = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
-    basins = np.int64(0)
+    basins = 0
     for p in order:
-        d = deep[p]
+        d = np.float64(deep[p])
         lowest, highest = len(order), -1  # of the neighbours' labels; nearly all pixels have one, or none
         for row in range(p - wide, p + wide + 1, wide):
             for q in range(row - 1, row + 2):
@@ -66,7 +66,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
             for q in range(row - 1, row + 2):
                 if label[q] < 0:
                     continue
-                root = _root(parent, label[q])
+                root = _root(parent, np.int64(label[q]))
                 if best >= 0 and root != best:
                     if d > neck * min(peak[root], peak[best]):  # no neck: one part
                         keep, gone = (root, best) if peak[root] > peak[best] else (best, root)
@@ -83,7 +83,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
             parent[best], peak[best] = best, d
         label[p] = best
     basin, parent = label.reshape(h + 2, wide)[1:-1, 1:-1], parent[:basins]
-    _absorb_small(_extents(basin, basins), parent, one, other, saddle, least)
+    _absorb_small(_extents(basin, len(parent)), parent, one, other, saddle, least)
     return _numbered(basin, parent)
 
 
@@ -139,7 +139,7 @@ def _absorb_small(
     for basin in range(len(parent)):
         _widen(extent, _root(parent, basin), basin)
     while True:
-        smallest, size, into = np.int64(-1), least, np.int64(-1)
+        smallest, size, into = -1, least, -1
         for r in range(len(parent)):
             area = (extent[r, 2] - extent[r, 0] + 1) * (extent[r, 3] - extent[r, 1] + 1)
             if parent[r] != r or area >= size:
@@ -157,7 +157,7 @@ def _absorb_small(
         _widen(extent, into, smallest)
 
 
-@kernel
+@kernel(inline="always")
 def _widen(extent: Ints, basin: int, by: int) -> None:
     """Let the extent of a basin include that of another one."""
     for axis in range(2):
@@ -174,7 +174,7 @@ def _numbered(basin: Ints, parent: Ints) -> tuple[Ints, int]:
     h, w = basin.shape
     for y in range(h):
         for x in range(w):
-            b = basin[y, x]
+            b = np.int64(basin[y, x])
             if b >= 0 and part[b] < 0:
                 root = _root(parent, b)
                 if number[root] < 0:
