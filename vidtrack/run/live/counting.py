@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
 from vidtrack.arrays.types import Floats
+from vidtrack.config.settings import Settings
 from vidtrack.output.intervals.book import CountBook, Passage, totals
 from vidtrack.output.intervals.day import Plan
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lengths import length_sums, mean_length
-from vidtrack.traffic.lines import Crossing, LineCounter
+from vidtrack.traffic.lines import Crossing, Line, LineCounter, parse_line, parse_lines
+from vidtrack.traffic.metres import UsedSite
 
 COUNTS = "intervals"
 """Folder of the counts by interval"""
@@ -71,6 +74,7 @@ class Counting:
     late_s   crossings are decided within this time after they happened
     keep_s   older days are deleted; None: they stay
     tell     called with each batch of crossings; None: nobody else wants them
+    own      lines that are counted at every site
 
     A time is watched if frames were tracked in it and their crossings are decided.
     """
@@ -84,9 +88,11 @@ class Counting:
         late_s: float,
         keep_s: float | None = None,
         tell: Callable[[Sequence[Passage]], None] | None = None,
+        own: Sequence[Line] = (),
     ) -> None:
         self._tell = tell
         self._counter = counter
+        self._own = own
         self._book = book
         self._began_s = began_s
         self._gap_s, self._late_s, self._keep_s = gap_s, late_s, keep_s
@@ -117,9 +123,14 @@ class Counting:
         self._tell_watched(self._late_s)
         return crossings
 
-    def use(self, classes: Mapping[str, tuple[float, float]]) -> None:
-        """Go on with the classes of another site, on whose road nothing is known of the vehicles yet."""
-        self._book.use(classes)
+    def use(self, site: UsedSite) -> None:
+        """Go on with the gates and classes of another site, on whose road nothing is known of the vehicles yet.
+
+        Gates that are the same go on; those that are new count from the last frame on.
+        """
+        self._counter.use(lines_at(self._own, site))
+        since_s = self._offset_s + self._last_s if self._last_s is not None else time.time()
+        self._book.use(ways_of(self._counter), site.classes, since_s)
         self._readings = RoadReadings()
 
     def save(self) -> None:
@@ -191,12 +202,32 @@ def counting_of(
     """
     counter, settings = subject.counter, subject.settings
     assert counter is not None
-    gates = {line.name: line.directions for line in counter.lines}
-    book = CountBook(folder, Plan(gates, subject.classes, settings.live.zone))
+    book = CountBook(folder, Plan(ways_of(counter), subject.classes, settings.live.zone))
     counter.resume(totals(folder))
     coast_s, hidden_s = settings.tracker.coast_s, settings.tracker.hidden_s
     late_s = max(coast_s, hidden_s) + _MARGIN_S
-    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell)
+    own = list(map(parse_line, settings.output.lines))
+    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell, own)
+
+
+def counter_of(settings: Settings, width: int, height: int, site: UsedSite | None) -> LineCounter | None:
+    """The counter of a live run: over the lines of the settings and the gates of its site, which may come later.
+
+    None without lines and site. Raises ConfigError.
+    """
+    lines = parse_lines(settings.output.lines, width, height)
+    return LineCounter(lines_at(lines, site)) if lines or site else None
+
+
+def lines_at(own: Sequence[Line], site: UsedSite | None) -> list[Line]:
+    """The lines of the settings, and the gates of a site that have other names."""
+    names = {line.name for line in own}
+    return [*own, *(gate for gate in (site.gates if site else ()) if gate.name not in names)]
+
+
+def ways_of(counter: LineCounter) -> dict[str, tuple[str, str]]:
+    """The two directions of each line."""
+    return {line.name: line.directions for line in counter.lines}
 
 
 def _reals(rows: pa.Table, name: str) -> Floats:
