@@ -22,6 +22,9 @@ from vidtrack.traffic.lines import LineCounter
 
 log = logging.getLogger(__name__)
 
+PICTURES = "pictures"
+"""Folder of the pictures of events"""
+
 _EVERY_S = 0.5  # between two pictures that are remembered
 _KEPT_S = 10.0  # events are decided sooner than this after they happened
 _PRUNE_S = 60.0
@@ -72,7 +75,7 @@ class EventPictures:
         step = min(recent, key=lambda one: abs(one.time_s - time_s))
         when = datetime.fromtimestamp(event.unix_s, self._zone)
         stamp = f"{when:%Y-%m-%dT%H-%M-%S}.{when.microsecond // 1000:03d}"
-        path = Path("pictures", f"{when:%Y-%m-%d}", f"{stamp}-{event.id}.jpg")
+        path = Path(PICTURES, f"{when:%Y-%m-%d}", f"{stamp}-{event.id}.jpg")
         lines = self._counter.lines if self._counter else ()
         try:
             self._reserve.check_recordings(self._root)
@@ -90,7 +93,7 @@ class EventPictures:
         if not (self._limits and self._due()):
             return
         taken = 0.0
-        found = [entry for day in (self._root / "pictures").glob("*") if day.is_dir() for entry in os.scandir(day)]
+        found = [entry for day in (self._root / PICTURES).glob("*") if day.is_dir() for entry in os.scandir(day)]
         for entry in sorted(found, key=lambda entry: entry.name, reverse=True):
             with suppress(OSError):
                 status = entry.stat()
@@ -98,6 +101,6 @@ class EventPictures:
                 old = self._limits.seconds is not None and time.time() - status.st_mtime > self._limits.seconds
                 if old or (self._limits.size is not None and taken > self._limits.size):
                     os.unlink(entry.path)
-        for day in (self._root / "pictures").glob("*"):
+        for day in (self._root / PICTURES).glob("*"):
             with suppress(OSError):
                 day.rmdir()  # if it is empty

@@ -126,6 +126,7 @@ function route() {
   one.querySelector(".charts").replaceChildren();
   showOne(camera);
   showHistory(camera);
+  showEvents(camera);
   scrollTo(0, 0);
 }
 
