@@ -178,7 +178,7 @@ class Recorder:
         If not, a part begins with the next key picture.
         """
         may = place[0] == _NOWHERE[0] or self.begins(place)
-        self._wanted = self._wanted or not may
+        self._wanted |= not may and place[0] == self._part  # else one has begun, and its frames come soon
         return may
 
     def log_frame(self, frame: Frame, place: Place, beginning: Beginning | None) -> None:

@@ -23,6 +23,8 @@ COUNTS = "intervals"
 """Folder of the counts by interval"""
 
 _MARGIN_S = 1.0  # for a vehicle to be clear of the line
+_SURE = 0.5  # share of the time that tracks coast in which they are surely found again
+_UNUSUAL, _LATELY = 2.5, 0.2  # times the usual pause between frames; weight of the last one in it
 _STEP_S = 0.5  # the wall clock was set if it moved by more than this
 _SPEEDS = ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
 _NOTHING = (np.nan, np.nan, np.nan)
@@ -70,13 +72,14 @@ class Counting:
     """Counts steps of confirmed tracks over the lines of `counter`, and writes the counts by interval to `book`.
 
     began_s  returns the Unix time of time_s 0, by the wall clock as it is now
-    gap_s    no crossings are counted over a longer time without frames
-    late_s   crossings are decided within this time after they happened
+    coast_s  no track outlives a longer time without frames
+    late_s   crossings are decided within this time after they happened, and vehicles are found within it after a gap
     keep_s   older days are deleted; None: they stay
     tell     called with each batch of crossings; None: nobody else wants them
     own      lines that are counted at every site
 
-    A time is watched if frames were tracked in it and their crossings are decided.
+    A time is watched if frames were tracked in it, tracks are carried through it and found again after a gap, and their
+    crossings are decided.
     """
 
     def __init__(
@@ -84,7 +87,7 @@ class Counting:
         counter: LineCounter,
         book: CountBook,
         began_s: Callable[[], float],
-        gap_s: float,
+        coast_s: float,
         late_s: float,
         keep_s: float | None = None,
         tell: Callable[[Sequence[Passage]], None] | None = None,
@@ -95,7 +98,8 @@ class Counting:
         self._own = own
         self._book = book
         self._began_s = began_s
-        self._gap_s, self._late_s, self._keep_s = gap_s, late_s, keep_s
+        self._coast_s, self._late_s, self._keep_s = coast_s, late_s, keep_s
+        self._usual_s = np.inf  # between two frames, lately
         self._readings = RoadReadings()
         self._offset_s = began_s()
         self._last_s: float | None = None
@@ -171,11 +175,18 @@ class Counting:
             self._offset_s = offset_s
 
     def _watch(self, time_s: float) -> None:
-        """Frames were tracked until this time."""
-        if self._last_s is not None and time_s - self._last_s <= self._gap_s:
-            self._spans[-1] = (self._spans[-1][0], time_s)
+        """Frames were tracked until this time.
+
+        In a pause almost as long as tracks coast, and not usual, some are lost: it is a gap too.
+        """
+        pause_s = np.inf if self._last_s is None else time_s - self._last_s
+        if pause_s <= min(self._coast_s, max(_SURE * self._coast_s, _UNUSUAL * self._usual_s)):
+            begin_s, _ = self._spans[-1]
+            self._spans[-1] = (begin_s, max(begin_s, time_s))
         else:
-            self._spans.append((time_s, time_s))
+            self._spans.append((time_s + self._late_s, time_s + self._late_s))
+        if pause_s <= self._coast_s:
+            self._usual_s = _LATELY * pause_s + (1 - _LATELY) * min(self._usual_s, self._coast_s)
         self._last_s = time_s
 
     def _tell_watched(self, late_s: float) -> None:

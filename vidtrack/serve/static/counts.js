@@ -85,7 +85,9 @@ function showCounts(camera) {
       number(camera.status.counts?.[line]?.[name]));
     const arrow = element("i", ARROWS[name] ?? "");
     made.children[1].className = `way ${WAYS[place % 2]}`;
-    made.children[1].append(arrow, ` ${name}`);
+    const word = element("span", ` ${name}`);
+    word.className = "word";
+    made.children[1].append(arrow, word);
     return made;
   })));
 }
