@@ -90,7 +90,7 @@ function zone(pane, svg, name, { polygon, tracked }, { chosen, vertex, stays, fa
   const y = places.reduce((sum, place) => sum + place[1], 0) / places.length;
   const place = { x, "text-anchor": "middle" };
   put(parent, "text", { ...place, y, class: "label" }, name);
-  if (stays !== undefined) put(parent, "text", { ...place, y: y + 18, class: "count" }, stays);
+  if (stays !== undefined && tracked !== false) put(parent, "text", { ...place, y: y + 18, class: "count" }, stays);
 }
 
 function cross(parent, [x, y], name) {
