@@ -12,7 +12,7 @@ from pathlib import Path
 
 from vidtrack.errors import Error
 from vidtrack.output.annotated_picture import annotated_jpeg
-from vidtrack.output.events.event import Event
+from vidtrack.output.events.event import PICTURES, Event
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
@@ -21,9 +21,6 @@ from vidtrack.recording.retention import Limits
 from vidtrack.traffic.lines import LineCounter
 
 log = logging.getLogger(__name__)
-
-PICTURES = "pictures"
-"""Folder of the pictures of events"""
 
 _EVERY_S = 0.5  # between two pictures that are remembered
 _KEPT_S = 10.0  # events are decided sooner than this after they happened

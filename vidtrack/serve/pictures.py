@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from vidtrack.recording.event_pictures import PICTURES
+from vidtrack.output.events.event import PICTURES
 from vidtrack.serve.camera import Camera
 
 _DAY, _NAME = re.compile(r"\d{4}-\d\d-\d\d"), re.compile(r"[\dT.-]+-[\da-f]{24}\.jpg")
