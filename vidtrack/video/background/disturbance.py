@@ -160,6 +160,10 @@ class Disturbance:
             self._absorb(picture, scene, hit)
         return mask, weak, strength
 
+    def keep(self, mask: Image | None) -> None:
+        """Find no foreground where a mask (h, w) is dark."""
+        self._view.keep = mask
+
     def scene(self) -> Image:
         """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
         scene = self._scene

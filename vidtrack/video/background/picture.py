@@ -37,6 +37,7 @@ class View:
 
     step   source pixels per processed pixel; small pictures keep at least 2 x 2
     black  luminance of black
+    keep   where traffic is looked for; None: everywhere
     """
 
     STATE = ("_shape", "step", "black")
@@ -44,7 +45,7 @@ class View:
     def __init__(self, scale: float | None, keep: NDArray | None) -> None:
         """scale: processed over source size, None: by the rows; keep (any size): dark pixels have no foreground."""
         self._scale = scale
-        self._keep = keep
+        self.keep = keep
         self._shape: tuple[int, int] | None = None
         self.step = 1
         self.black = 0
@@ -79,9 +80,9 @@ class View:
         place, motion  (2, 3) from the mask to the scene and to the picture [processed px]
         weak, warnings, elsewhere  of the Foreground
         """
-        if self._keep is not None:
+        if self.keep is not None:
             h, w = self.reduced
-            keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)
+            keep = cv2.resize(self.keep, (w, h), interpolation=cv2.INTER_NEAREST)
             if keep.shape != mask.shape or not affine.is_identity(place):
                 back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
                 keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
