@@ -81,6 +81,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.particles": ("radar.estimator", ("particle",)),
     "radar.resampling": ("radar.estimator", ("particle",)),
     "radar.glint": ("radar.estimator", ("particle",)),
+    "radar.clutter_map": ("radar.clutter_density", (None,)),
     "radar.quiet_accel": ("radar.estimator", ("imm",)),
     "radar.quiet_s": ("radar.estimator", ("imm",)),
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),

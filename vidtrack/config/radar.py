@@ -46,6 +46,8 @@ class RadarSettings(Group):
     """probability that a scan shows a target; None: from the tracks so far"""
     clutter_density: float | None = Field(None, gt=0)
     """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from unassociated plots"""
+    clutter_map: bool = True
+    """the density of false plots is learnt by place; false: it is the same everywhere"""
     max_speed: float = Field(400.0, gt=0)
     """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
     accel: float = Field(8.0, gt=0)

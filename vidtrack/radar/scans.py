@@ -143,6 +143,15 @@ def surveyed(found: Measurements) -> float:
     return float((sides + _margin(found)).prod())
 
 
+def extent(found: Measurements) -> tuple[Floats, Floats]:
+    """Lowest and highest (2,) values of the first two axes of the measurement space that is surveyed; angles: all."""
+    margin = _margin(found)[:2] / 2
+    low, high = found.z[:, :2].min(axis=0) - margin, found.z[:, :2].max(axis=0) + margin
+    for angle in set(found.sensor.angles) & {0, 1}:
+        low[angle], high[angle] = -np.pi, np.pi
+    return low, high
+
+
 def _margin(found: Measurements) -> Floats:
     """(m,) distance that a target with twice the speed's standard deviation covers in REACH_SCANS scans."""
     step = 2 * REACH_SCANS * 2 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)

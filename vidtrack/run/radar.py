@@ -24,9 +24,10 @@ from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable
 from vidtrack.output.threaded import Threaded
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.reading import read
-from vidtrack.radar.scans import Measurements, measurements, surveyed
+from vidtrack.radar.scans import Measurements, extent, measurements, surveyed
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
+from vidtrack.tracking.clutter import ClutterMap
 from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import NoPicture
@@ -107,8 +108,15 @@ def build_radar_tracker(settings: Settings, found: Measurements, *, explain: boo
     Raises ConfigError for a filter without a smoother, or a method that needs amplitudes where there are none.
     """
     radar = settings.radar
-    station = Station(Rates(radar.detection_probability, radar.clutter_density, surveyed(found)))
+    station = Station(rates(radar, found, radar.detection_probability))
     return build_point_tracker(settings, [found], [radar.position], [station], explain=explain, seed=seed)
+
+
+def rates(radar: RadarSettings, found: Measurements, detection: float | None) -> Rates:
+    """Detection probability and clutter density of the radar that made these measurements."""
+    mapped = radar.clutter_map and radar.clutter_density is None
+    where = ClutterMap(*extent(found)) if mapped else None
+    return Rates(detection, radar.clutter_density, surveyed(found), where)
 
 
 def build_point_tracker(
