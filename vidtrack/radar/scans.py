@@ -104,9 +104,9 @@ def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
     """Plots in the coordinates of the settings' estimator.
 
     NONLINEAR estimators use range and angles directly; others use positions, converted without bias. A range rate is
-    linearised; alpha-beta uses positions only.
+    linearised; alpha-beta and groups use positions only.
     """
-    if settings.estimator == "alpha-beta":
+    if settings.estimator == "alpha-beta" or settings.group_link_m is not None:
         plots = plots.without_range_rate()
     z, R = plots.z, np.einsum("ni,ij->nij", plots.sigma**2, np.eye(plots.sigma.shape[1]))
     sensor: Sensor = PositionRangeRate(settings.position[: plots.dim]) if plots.doppler else POSITION

@@ -19,7 +19,7 @@ GLINT_FACTOR = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A part of the coverage, between two corners as those of Radar, with `more` times as many false plots in addition."""
+    """A part of the coverage, between two corners, with `more` times as many false plots in addition."""
 
     low: tuple[float, ...]
     high: tuple[float, ...]

@@ -39,9 +39,7 @@ FINE = replace(SURVEILLANCE, cell=(1.0, 0.01), p_fa=5e-9, clutter=Weibull())
 COARSE = replace(SURVEILLANCE, clutter=Weibull())
 """Track while scan in Rayleigh clutter, P_D = 0.91."""
 
-UNEVEN = replace(
-    COARSE, patches=(Patch((10e3, 20.0), (30e3, 70.0), 29.0), Patch((35e3, 150.0), (55e3, 240.0), 19.0))
-)
+UNEVEN = replace(COARSE, patches=(Patch((10e3, 20.0), (30e3, 70.0), 29.0), Patch((35e3, 150.0), (55e3, 240.0), 19.0)))
 """The same with two patches of land, from which come 13 and 15 false plots a scan more."""
 
 MULTIFUNCTION = Radar(

@@ -245,7 +245,7 @@ class Tracker:
             modes=None if self._mixture is None else self._mixture.modes(sensor),
         )  # fmt: skip
         if self.threshold is not None:
-            problem = thresholded(problem, self.threshold)
+            problem = thresholded(problem, self.threshold, zhat)
         return self.picture.weigh(problem, view)
 
     def _associate(self, problem: Problem, view: View | None, dt: float, events: list[Event]) -> Association:
