@@ -66,8 +66,8 @@ class ThresholdController:
     gate         g [standard deviations]
     p_fa_max     largest P_F; at 1 every cell is a detection
     method       "exact": optimum of the exact q2; "closed-form": the paper's, for 2 dimensions and gate 4 only
-    origin       (m,) place of a radar whose measurements are positions: cells widen with the distance; None: cells are alike
-                 everywhere, as in range and azimuth
+    origin       (m,) place of a radar whose measurements are positions: cells widen with the distance; None: they are
+                 alike everywhere, as in range and azimuth
     """
 
     snr: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
 from vidtrack.output.groups import GroupTable
 from vidtrack.output.linked import refuse_link
+from vidtrack.output.radar_page import RadarPage
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.sink import Sink
 from vidtrack.output.smoothed import smoothed_first
@@ -76,7 +77,6 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
     found = measurements(plots, settings.radar)
     refuse_link(settings.output, "radar runs")
     tracker = build_radar_tracker(settings, found, explain=extras.explain, seed=seed)
-    groups = tracker if isinstance(tracker, Groups) else None
     account: dict[str, Any] = {"plots": len(plots), "bad_rows": plots.bad_rows, **plots.losses, "truncated": False}
     if plots.plane is not None:
         account["origin"] = [plots.plane.latitude, plots.plane.longitude, plots.plane.height]
@@ -90,7 +90,7 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
         count=found.count,
         steps=scan_steps(found, tracker, settings.tracker.redundant),
         summary=summary,
-        sinks=partial(radar_sinks, settings, extras, found.dim, [settings.radar.position[:2]], groups=groups),
+        sinks=partial(radar_sinks, settings, extras, found.dim, [settings.radar.position[:2]], now=lambda: tracker),
     )
 
 
@@ -100,20 +100,38 @@ def radar_sinks(
     dim: int,
     radars: Sequence[tuple[float, float]],
     folder: Path,
-    groups: Groups | None = None,
+    now: Callable[[], Tracker | Groups | None] = lambda: None,
 ) -> Iterator[Sink]:
-    """The sinks of a run over plots in `dim` dimensions of radars at these places (x, y)."""
+    """The sinks of a run over plots in `dim` dimensions of radars at these places (x, y).
+
+    now  returns the tracker of one radar, once there is one
+    """
     table = TrackTable(folder, RADAR if dim == 2 else RADAR_3D)
     plot = RadarPlot(folder / "tracks.png", radars)
-    yield Confirmed(*smoothed_first(settings.output, table, plot), hold_s=math.inf)  # scans may be far apart
-    if groups is not None:
-        yield GroupTable(folder / "groups.csv", groups.sizes)
+    page = RadarPage(folder / "radar.html", radars, lambda: _clutter_map(now()))
+    yield Confirmed(*smoothed_first(settings.output, table, plot, page), hold_s=math.inf)  # scans may be far apart
+    if settings.radar.group_link_m is not None:
+        yield GroupTable(folder / "groups.csv", lambda: _sizes(now()))
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv", index="scan")
     if extras.rerun is not None:
         from vidtrack.output.rerun.plots import RadarRerun
 
         yield Threaded(RadarRerun(extras.rerun, settings))
+
+
+def _sizes(tracker: Tracker | Groups | None) -> list[tuple[int, int, int]]:
+    """Those of groups."""
+    return tracker.sizes() if isinstance(tracker, Groups) else []
+
+
+def _clutter_map(tracker: Tracker | Groups | None) -> dict[str, Any] | None:
+    """Where the clutter is, if a map of it has been learnt."""
+    where = None if tracker is None else tracker.rates.where
+    if not isinstance(where, ClutterMap):
+        return None
+    density = where.density.round(3).tolist()
+    return {"low": where.low.tolist(), "high": where.high.tolist(), "density": density, "polar": where.polar}
 
 
 def build_radar_tracker(
@@ -135,7 +153,7 @@ def build_radar_tracker(
 def rates(radar: RadarSettings, found: Measurements, detection: float | None) -> Rates:
     """Detection probability and clutter density of the radar that made these measurements."""
     mapped = radar.clutter_map and radar.clutter_density is None
-    where = ClutterMap(*extent(found)) if mapped else None
+    where = ClutterMap(*extent(found), polar=bool(found.sensor.angles)) if mapped else None
     return Rates(detection, radar.clutter_density, surveyed(found), where)
 
 

@@ -79,7 +79,9 @@ def feed_pipeline(
             count=None,
             steps=steps(feed),
             summary=lambda folder: Summary(folder / "summary.json", address, settings, account, unit="scans"),
-            sinks=partial(radar_sinks, settings, extras, 2, [settings.radar.position[:2]]),
+            sinks=partial(
+                radar_sinks, settings, extras, 2, [settings.radar.position[:2]], now=lambda: next(iter(trackers), None)
+            ),
         )
 
 

@@ -19,12 +19,14 @@ class ClutterMap:
     of Polya tree distributions for statistical modelling", Annals of Statistics 20(3), 1992).
 
     low, high  (2,) corners of the box, on the first two axes of the measurements; what lies outside counts at its edge
+    polar      whether these are range and azimuth, and not positions
     """
 
     STATE = ("count",)
 
-    def __init__(self, low: Floats, high: Floats) -> None:
+    def __init__(self, low: Floats, high: Floats, polar: bool = False) -> None:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
+        self.polar = polar
         self.count: Floats = np.zeros((2**_LEVELS, 2**_LEVELS))
         """False measurements remembered in each cell."""
 
