@@ -10,7 +10,7 @@ and loading. Stone Soup has no IMM; its GNN and JPDA (EHM2) have the process noi
           five scans without one
   ours    Stone Soup with our P_D, gate .999, three plots
   best    Stone Soup with the settings of a grid that have the best mean IDF1 in this very data: P_G, plots to begin,
-          scans to end, factor on the process noise
+          factor on the process noise
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from vidtrack.radar.scans import clutter_density, measurements
 
 BOATS = ("radar.max_speed=10", "radar.accel=0.5", "radar.quiet_accel=0.1")
 FAST_BOAT = ("radar.max_speed=20", "radar.accel=1", "radar.quiet_accel=0.1", "radar.detection_probability=0.85")
-SCORES = ("gospa", "idf1", "switches")
-USUAL = {"p_d": 0.85, "p_g": 0.95, "hits": 2, "misses": 5, "noise": 1.0}
-GRID = {"p_g": (0.95, 0.999, 0.99999), "hits": (2, 3, 4), "misses": (3, 6), "noise": (0.3, 1.0, 3.0)}
+SCORES = ("gospa", "idf1", "idr", "switches")
+USUAL: dict[str, Any] = {"p_d": 0.85, "p_g": 0.95, "hits": 2, "misses": 5, "noise": 1.0}
+GRID = {"p_g": (0.95, 0.999), "hits": (2, 3, 4), "noise": (0.3, 1.0, 3.0)}
 
 
 class Scenario(NamedTuple):
@@ -85,29 +85,40 @@ def ours(scenario: Scenario, settings: Settings) -> Found:
     return Found(tracks, time.process_time() - began)
 
 
-def stone_soup(kind: str, scenario: Scenario, settings: Settings, chosen: dict[str, float], python: Path) -> Found:
-    """Stone Soup's tracks with the models of our settings, and what was chosen besides."""
+def stone_soup(
+    kind: str, all_of: list[Scenario], settings: Settings, choices: list[dict[str, Any]], python: Path
+) -> list[list[Found]]:
+    """Stone Soup's tracks of all scenarios with the models of our settings, by each of the `choices` of the others."""
+    worker = Path(__file__).parent / "peers" / "plots.py"
+    with tempfile.TemporaryDirectory() as place:
+        files = []
+        for k, (chosen, scenario) in enumerate(itertools.product(choices, all_of)):
+            files += [Path(place, f"{k}.npz"), Path(place, f"{k}-tracks.npz")]
+            np.savez(files[-2], **problem(scenario, settings, chosen))
+        subprocess.run([python, worker, kind, *files], check=True)
+        found = [_read(path) for path in files[1::2]]
+    return [found[k : k + len(all_of)] for k in range(0, len(found), len(all_of))]
+
+
+def problem(scenario: Scenario, settings: Settings, chosen: dict[str, Any]) -> dict[str, Any]:
+    """What the peer's worker reads."""
     radar = settings.radar
     plots = read_plots(scenario.plots, radar)
-    with tempfile.TemporaryDirectory() as place:
-        given, result = Path(place, "data.npz"), Path(place, "result.npz")
-        count = int(plots.scan.max()) + 1
-        times = np.interp(np.arange(count), plots.scan, plots.time_s)
-        np.savez(
-            given,
-            times=times,
-            plots=plots.z,
-            scan=plots.scan,
-            sigma=plots.sigma.mean(),
-            intensity=chosen["noise"] * radar.accel**2 * radar.hold_s,
-            speed=radar.max_speed / 2,
-            clutter=clutter_density(measurements(plots, radar)),
-            **{name: chosen[name] for name in ("p_d", "p_g", "hits", "misses")},
-        )
-        worker = Path(__file__).parent / "peers" / "plots.py"
-        subprocess.run([python, worker, kind, given, result], check=True, stderr=subprocess.DEVNULL)
-        with np.load(result) as stored:
-            rows, cpu_s = stored["rows"], float(stored["cpu_s"])
+    return {
+        "times": np.interp(np.arange(int(plots.scan.max()) + 1), plots.scan, plots.time_s),
+        "plots": plots.z,
+        "scan": plots.scan,
+        "sigma": plots.sigma.mean(),
+        "intensity": chosen["noise"] * radar.accel**2 * radar.hold_s,
+        "speed": radar.max_speed / 2,
+        "clutter": clutter_density(measurements(plots, radar)),
+        **{name: chosen[name] for name in ("p_d", "p_g", "hits", "misses")},
+    }
+
+
+def _read(path: Path) -> Found:
+    with np.load(path) as stored:
+        rows, cpu_s = stored["rows"], float(stored["cpu_s"])
     frame, identity = rows[:, :2].astype(int).T
     return Found(formats.Table(frame, identity, rows[:, 2:], None, np.ones(len(rows)), unit="m"), cpu_s)
 
@@ -143,17 +154,16 @@ def compare(arguments: argparse.Namespace, all_of: list[Scenario]) -> None:
         return
     python = python_of("filters", arguments.peers_in)
 
-    def peer(kind: str, chosen: dict[str, float]) -> dict[str, float]:
-        return scored([stone_soup(kind, one, settings, chosen, python) for one in all_of], all_of)
-
     as_ours: dict[str, Any] = {**USUAL, "p_d": settings.radar.detection_probability, "p_g": 0.999, "hits": 3}
+    grid = [as_ours | dict(zip(GRID, values, strict=True)) for values in itertools.product(*GRID.values())]
+    drawn = np.random.default_rng(0).permutation(len(grid))[: arguments.grid]
+    choices = [USUAL, as_ours, *(grid[k] for k in drawn)]
     for kind in ("gnn", "jpda"):
-        show(f"Stone Soup {kind}, usual", peer(kind, USUAL))
-        show(f"Stone Soup {kind}, ours", peer(kind, as_ours))
-        grid = [dict(zip(GRID, values, strict=True)) for values in itertools.product(*GRID.values())]
-        every = [(peer(kind, as_ours | chosen), chosen) for chosen in grid[:: arguments.thin]]
-        scores, chosen = max(every, key=lambda one: one[0]["idf1"])
-        show(f"Stone Soup {kind}, best", scores, str(chosen))
+        every = [scored(found, all_of) for found in stone_soup(kind, all_of, settings, choices, python)]
+        show(f"Stone Soup {kind}, usual", every[0])
+        show(f"Stone Soup {kind}, ours", every[1])
+        best = max(range(len(every)), key=lambda k: every[k]["idf1"])
+        show(f"Stone Soup {kind}, best", every[best], str({name: choices[best][name] for name in GRID}))
 
 
 def main() -> None:
@@ -162,7 +172,7 @@ def main() -> None:
     parser.add_argument("data", choices=["autoferry", "joyride", "opensky"])
     parser.add_argument("--seeds", type=int, default=3, help="of opensky")
     parser.add_argument("--set", action="append", default=[], metavar="A.B=VALUE", help="one setting of ours")
-    parser.add_argument("--thin", type=int, default=1, help="of the grid only each so many")
+    parser.add_argument("--grid", type=int, default=18, help="so many of the 18 settings of the grid, drawn once")
     parser.add_argument("--peers-in", type=Path, metavar="DIR", help="compare with Stone Soup in this environment")
     arguments = parser.parse_args()
     logging.disable(logging.WARNING)

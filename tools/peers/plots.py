@@ -1,7 +1,7 @@
 """Track stored plots with Stone Soup's GNN, PDA or JPDA; started by track_joyride.py and compare_radar.py in the peers'
 own environment.
 
-    python plots.py gnn|pda|jpda DATA.npz RESULT.npz
+    python plots.py gnn|pda|jpda DATA.npz RESULT.npz [DATA.npz RESULT.npz ...]
 
 DATA   times (K,) [s], plots (N, 2) [m] with the scan (N,) of each, and the models: sigma [m], intensity of the white
        acceleration [m^2/s^3], speed [m/s] of a new track, p_d, p_g, clutter [per m^2], hits, misses
@@ -74,8 +74,14 @@ def tracker(kind: str, data: Data) -> MultiTargetTracker | MultiTargetMixtureTra
 
 
 def main() -> None:
-    """Track and write the rows."""
-    kind, given, result = sys.argv[1:]
+    """Track and write the rows of each pair of files."""
+    kind, *files = sys.argv[1:]
+    for given, result in zip(files[::2], files[1::2], strict=True):
+        track(kind, given, result)
+
+
+def track(kind: str, given: str, result: str) -> None:
+    """Track what a file holds and write the rows into another."""
     numbers: dict[str, int] = {}
     rows = []
     with np.load(given) as stored:
