@@ -8,13 +8,18 @@ from vidtrack.arrays.types import Floats, Ints
 
 _LEVELS = 5
 """The map has 2^5 cells along each of its two axes."""
+_WEIGHT = 16.0
+"""Measurements; weight of the prior at the first level. With 1, slow targets at the beginning of a recording are taken
+for clutter at their places before they are confirmed."""
+_NEW = 0.1
+"""Measurements of new targets per false one, as in LogRatio and LikelihoodGate; they begin anywhere."""
 
 
 class ClutterMap:
-    """The density of false measurements at a place, over their mean density in the whole box: a Polya tree.
+    """The density of measurements of no known target at a place, over its mean in the whole box.
 
-    The box is quartered, each quarter again, and so on. How the false measurements of a part at level k divide among
-    its quarters has a Dirichlet prior with the weight of k^2 measurements, evenly: where they are few, a place has the
+    New targets begin anywhere; false measurements are distributed by a Polya tree. The box is quartered, each quarter again, and so on. How the false measurements of a part at level k divide among
+    its quarters has a Dirichlet prior with the weight of 16 k^2 measurements, evenly: where they are few, a place has the
     density of what surrounds it. With k^2 the density has no steps that the data do not show (M. Lavine, "Some aspects
     of Polya tree distributions for statistical modelling", Annals of Statistics 20(3), 1992).
 
@@ -38,8 +43,8 @@ class ClutterMap:
             side = 2 ** (_LEVELS - level)
             part = self.count.reshape(2**level, side, 2**level, side).sum(axis=(1, 3))
             density, whole = (each.repeat(2, axis=0).repeat(2, axis=1) for each in (density, whole))
-            density, whole = density * (4 * part + level**2) / (whole + level**2), part
-        return density
+            density, whole = density * (4 * part + _WEIGHT * level**2) / (whole + _WEIGHT * level**2), part
+        return (density + _NEW) / (1 + _NEW)
 
     def at(self, z: Floats) -> Floats:
         """(N,) relative density at measurements (N, m)."""

@@ -111,16 +111,16 @@ class Rates:
         self.scans *= fade
         self.where.forget(fade)
 
-    def learn_clutter(self, decision: Decision, shared: Ints, known: Mask, scan: Scan, runs: int) -> None:
+    def learn_clutter(
+        self, decision: Decision, shared: Ints, known: Mask, existence: Floats, scan: Scan, runs: int
+    ) -> None:
         """Learn from a decision about the measurements of a scan in which confirmed tracks are `known` (K,).
 
-        shared (K,) measurement that each row shares, -1: none; runs: number of Monte Carlo runs
+        shared (K,) measurement that each row shares, -1: none; existence (K,) probability that it is a target: a slow
+        one would else be taken for clutter at its place before it is confirmed; runs: number of Monte Carlo runs
         """
-        claimed = np.bincount(decision.measurement, decision.beta * known[decision.row], len(scan))
-        claimed[shared[shared >= 0]] = 1.0
-        false = np.maximum(1 - claimed, 0)
-        self.where.learn(scan.z, false)
-        self.false += float(false.sum())
+        self.where.learn(scan.z, _unclaimed(decision, shared, np.where(known, 1.0, existence), len(scan)))
+        self.false += float(_unclaimed(decision, shared, known.astype(float), len(scan)).sum())
         self.scans += runs
 
     def learn_detection(self, missed: Ints, inside: Floats, seen: bool) -> None:
@@ -130,6 +130,13 @@ class Rates:
         """
         self.hits += len(missed) * seen
         self.trials += float(((missed + seen) * inside).sum())
+
+
+def _unclaimed(decision: Decision, shared: Ints, target: Floats, count: int) -> Floats:
+    """(count,) probability that no row took a measurement, rows being targets with probabilities (K,)."""
+    claimed = np.bincount(decision.measurement, decision.beta * target[decision.row], count)
+    claimed[shared[shared >= 0]] = 1.0
+    return np.maximum(1 - claimed, 0)
 
 
 def _mean(rate: float | Floats) -> float:

@@ -152,7 +152,7 @@ class Stations:
             station.rates.forget(dt)
             if now:
                 runs = 1 + int(register.run.max(initial=0))
-                station.rates.learn_clutter(found.decision, found.shared, known, problem.scan, runs)
+                station.rates.learn_clutter(found.decision, found.shared, known, register.existence, problem.scan, runs)
             missed = register.missed[count, number] - now  # this scan is counted, and was none
             station.rates.learn_detection(missed, problem.inside[count], seen=now)
         register.seen(seen)
