@@ -18,10 +18,11 @@ _NEW = 0.1
 class ClutterMap:
     """The density of measurements of no known target at a place, over its mean in the whole box.
 
-    New targets begin anywhere; false measurements are distributed by a Polya tree. The box is quartered, each quarter again, and so on. How the false measurements of a part at level k divide among
-    its quarters has a Dirichlet prior with the weight of 16 k^2 measurements, evenly: where they are few, a place has the
-    density of what surrounds it. With k^2 the density has no steps that the data do not show (M. Lavine, "Some aspects
-    of Polya tree distributions for statistical modelling", Annals of Statistics 20(3), 1992).
+    New targets begin anywhere; false measurements are distributed by a Polya tree. The box is quartered, each quarter
+    again, and so on. How the false measurements of a part at level k divide among its quarters has a Dirichlet prior
+    with the weight of 16 k^2 measurements, evenly: where they are few, a place has the density of what surrounds it.
+    With k^2 the density has no steps that the data do not show (M. Lavine, "Some aspects of Polya tree distributions
+    for statistical modelling", Annals of Statistics 20(3), 1992).
 
     low, high  (2,) corners of the box, on the first two axes of the measurements; what lies outside counts at its edge
     polar      whether these are range and azimuth, and not positions
