@@ -11,7 +11,7 @@ from vidtrack.tracking.boxes import longer
 from vidtrack.tracks import Tracks
 
 _SWARM_PER_S = 30.0  # births in the whole picture, more than traffic has anywhere
-_FEW_PER_S = 3.0  # with a swarm, larger ones that may be traffic
+_FEW_PER_S = 12.0  # with a swarm, larger ones that may be traffic
 _FORGET_S = 10.0
 _LEAST_PX, _STEPS, _BINS = 1.0, 4, 48  # sizes from 1 px to 4096 px, four bins to a factor of two
 
@@ -30,7 +30,7 @@ class Swarm:
 
     @property
     def size(self) -> float:
-        """Longer side [px] up to which objects are of the swarm: those above it appear seldom. Zero without one."""
+        """Longer side [px] up to which objects are of the swarm; larger ones begin seldom. Zero without a swarm."""
         rate = self.births[::-1].cumsum()[::-1] / _FORGET_S
         if rate[0] < _SWARM_PER_S:
             return 0.0
