@@ -176,8 +176,9 @@ class Picture:
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) longer sides, of specks that of the least object; more where the picture is restless."""
-        size = np.fmax(longer(box), self.border.speck)  # NaN where there is no box
-        return size * self.road.travel_factor(xy) if self.road else size
+        side = longer(box)
+        size = np.fmax(side, self.border.speck)  # NaN where there is no box
+        return size * self.road.travel_factor(xy, side) if self.road else size
 
     def learn(self, tracks: Tracks) -> None:
         """Update the road with the tracks of a scan."""
