@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from vidtrack.arrays.rows import each
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ScanError
 from vidtrack.estimate.motion.model import Motion
@@ -23,15 +24,6 @@ class Coverage(Protocol):
 
     def share(self, xy: Floats, v: Floats) -> Floats:
         """(T,) share of the detection probability at positions and velocities (T, d): from 0, nothing is seen, to 1."""
-
-
-@dataclass(frozen=True, slots=True)
-class Everywhere:
-    """No limit."""
-
-    def share(self, xy: Floats, v: Floats) -> Floats:
-        """Ones."""
-        return np.ones(len(xy))
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +55,14 @@ class Station:
     """One of the sensors of a tracker. A scan names its station; the measurement model is the scan's own.
 
     rates       detection probability of a visible target, and clutter density; given or estimated
-    coverage    a target outside is neither seen nor missed
+    coverage    a target outside is neither seen nor missed; None: there is no outside
     visibility  None: targets inside are always visible
     lasting_s   s; what looks like a target goes on to do so for this time: scans within it are together the evidence of
                 one. 0: each scan counts
     """
 
     rates: Rates = field(default_factory=Rates)
-    coverage: Coverage = field(default_factory=Everywhere)
+    coverage: Coverage | None = None
     visibility: Visibility | None = None
     lasting_s: float = 0.0
 
@@ -86,6 +78,7 @@ class Stations:
     def __init__(self, each: Sequence[Station]) -> None:
         self.each = tuple(each)
         self.last_s = np.full(len(self.each), np.nan)
+        self._learns = any(station.rates.estimated for station in self.each)
 
     def __len__(self) -> int:
         return len(self.each)
@@ -98,6 +91,8 @@ class Stations:
     def share(self, scan: Scan, x: Floats, model: Motion) -> Floats:
         """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""
         coverage = self.each[scan.station].coverage
+        if coverage is None:
+            return each(1.0, len(x))
         return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
 
     def take(self, scan: Scan) -> float:
@@ -138,8 +133,11 @@ class Stations:
 
     def learn(self, found: Association, register: Register, alone: Mask, looked: Mask, dt: float) -> None:
         """Learn P_D and clutter density from rows (K,) that share no measurement, dt seconds after the last scan."""
-        problem = found.problem
-        seen, known = looked & (register.history & 1 == 1), alone & (register.status != TENTATIVE)
+        problem, seen = found.problem, looked & (register.history & 1 == 1)
+        if not self._learns:
+            register.seen(seen)
+            return
+        known = alone & (register.status != TENTATIVE)
         count = known & seen & (register.status != MERGED)
         for number, station in enumerate(self.each):
             if not station.rates.estimated:

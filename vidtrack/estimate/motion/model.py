@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -60,12 +61,18 @@ class Columns:
     @property
     def position(self) -> tuple[int, ...]:
         """Columns of the state that are positions."""
-        return tuple(range(0, 2 * self.dim, 2))
+        return _columns(0, self.dim)
 
     @property
     def velocity(self) -> tuple[int, ...]:
         """Columns of the state that are velocities."""
-        return tuple(range(1, 2 * self.dim, 2))
+        return _columns(1, self.dim)
+
+
+@lru_cache
+def _columns(first: int, dim: int) -> tuple[int, ...]:
+    """Every other column from `first` on, one per axis."""
+    return tuple(range(first, 2 * dim, 2))
 
 
 def check(model: Columns, dims: tuple[int, ...], *names: str) -> None:

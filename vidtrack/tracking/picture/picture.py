@@ -170,9 +170,7 @@ class Picture:
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is within the border of the last scan."""
-        position = bank.model.position
-        var = bank.P.diagonal(axis1=1, axis2=2)
-        return self.border.in_view(bank.x.take(position, axis=1), var.take(position, axis=1))
+        return self.border.in_view(bank.x, bank.P)
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) longer sides, of specks that of the least object; more where the picture is restless."""
