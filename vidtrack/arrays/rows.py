@@ -17,6 +17,13 @@ def each(value: float | Floats, rows: int) -> Floats:
     return same
 
 
+def no_index(rows: int) -> Ints:
+    """(rows,) -1, which stands for no index."""
+    none = np.empty(rows, np.int64)
+    none.fill(-1)
+    return none
+
+
 @kernel
 def starts(row: Ints, rows: int) -> Ints:
     """(rows + 1,) index of each row's first entry in the sorted `row` (B,); the last element is B."""

@@ -70,7 +70,8 @@ class Station:
 class Stations:
     """The stations of a tracker by number, and when each made its last scan.
 
-    last_s  (S,) s; NaN before the first
+    last_s    (S,) s; NaN before the first
+    estimate  whether the rates of any of them are estimated
     """
 
     STATE = ("last_s",)
@@ -78,7 +79,7 @@ class Stations:
     def __init__(self, each: Sequence[Station]) -> None:
         self.each = tuple(each)
         self.last_s = np.full(len(self.each), np.nan)
-        self._learns = any(station.rates.estimated for station in self.each)
+        self.estimate = any(station.rates.estimated for station in self.each)
 
     def __len__(self) -> int:
         return len(self.each)
@@ -133,11 +134,8 @@ class Stations:
 
     def learn(self, found: Association, register: Register, alone: Mask, looked: Mask, dt: float) -> None:
         """Learn P_D and clutter density from rows (K,) that share no measurement, dt seconds after the last scan."""
-        problem, seen = found.problem, looked & (register.history & 1 == 1)
-        if not self._learns:
-            register.seen(seen)
-            return
-        known = alone & (register.status != TENTATIVE)
+        problem = found.problem
+        seen, known = looked & (register.history & 1 == 1), alone & (register.status != TENTATIVE)
         count = known & seen & (register.status != MERGED)
         for number, station in enumerate(self.each):
             if not station.rates.estimated:
@@ -149,4 +147,3 @@ class Stations:
                 station.rates.learn_clutter(found.decision, found.shared, known, problem.measurements, runs)
             missed = register.missed[count, number] - now  # this scan is counted, and was none
             station.rates.learn_detection(missed, problem.inside[count], seen=now)
-        register.seen(seen)
