@@ -11,6 +11,8 @@ from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
 from vidtrack.scan import Scan
 
+FAR = 6.0
+"""erf of this is one in double precision."""
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
 SPECK = 1 / 30
@@ -90,6 +92,8 @@ def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float]) -> 
         for axis in range(2):
             sigma, at = math.sqrt(2 * P[i, 2 * axis, 2 * axis]), x[i, 2 * axis] + 0.5
             below, above = (edges[axis] - at) / sigma, (edges[axis + 2] - at) / sigma
+            if below < -FAR and above > FAR:
+                continue
             inside[i] *= (math.erfc(-above) - math.erfc(-below)) / 2
     return inside
 

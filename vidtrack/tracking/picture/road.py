@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.rows import each
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
 from vidtrack.tracking.picture.restless import RestlessMap
@@ -44,7 +45,7 @@ class Road:
 
     def travel_factor(self, xy: Floats) -> Floats:
         """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""
-        return np.where(self._wary & self.restless.restless(xy), _CAUTION, 1.0)
+        return np.where(self.restless.restless(xy), _CAUTION, 1.0) if self._wary else each(1.0, len(xy))
 
 
 @kernel
