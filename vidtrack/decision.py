@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,36 +45,17 @@ class Decision:
 
     def joined(self, other: Decision) -> Decision:
         """The union of two decisions about disjoint sets of rows."""
+        from vidtrack.arrays.rows import merged  # loads the compiler
+
         return Decision(
             self.parent,
-            *_merged(
+            *merged(
                 self.row, self.measurement, self.beta, self.beta0, other.row, other.measurement, other.beta, other.beta0
             ),
             _chosen(other.row, other.inflation, self.inflation),
             self.spread,
             _chosen(other.row, other.approximate, self.approximate),
         )
-
-
-@kernel
-def _merged(
-    row: Ints, measurement: Ints, beta: Floats, beta0: Floats,
-    row2: Ints, measurement2: Ints, beta2: Floats, beta02: Floats,
-) -> tuple[Ints, Ints, Floats, Floats]:  # fmt: skip
-    """Weights of both decisions in the order of their rows, and the weights of a miss (K,)."""
-    total, a, b = len(row) + len(row2), 0, 0
-    rows, measurements, betas = np.empty(total, np.int64), np.empty(total, np.int64), np.empty(total)
-    for n in range(total):
-        if b == len(row2) or (a < len(row) and row[a] <= row2[b]):
-            rows[n], measurements[n], betas[n] = row[a], measurement[a], beta[a]
-            a += 1
-        else:
-            rows[n], measurements[n], betas[n] = row2[b], measurement2[b], beta2[b]
-            b += 1
-    missed = np.empty(len(beta0))
-    for k in range(len(beta0)):
-        missed[k] = beta0[k] + beta02[k] - 1.0
-    return rows, measurements, betas, missed
 
 
 def _chosen(theirs: Ints, other: Any, own: Any) -> Any:
