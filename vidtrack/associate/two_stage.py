@@ -25,7 +25,9 @@ class TwoStage:
 
     def sure(self, scan: Scan) -> Mask:
         """(M,) the scan's sure detections."""
-        return np.ones(len(scan), bool) if self._single(scan) else scan.score >= self.least
+        if scan.score is None or self._single(scan):
+            return np.ones(len(scan), bool)
+        return scan.score >= self.least
 
     def surely(self, scan: Scan, taken: Ints) -> Mask:
         """(T,) rows that have `taken` (T,) a sure detection; -1: none."""
