@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
 from vidtrack.arrays.types import Floats, Ints, Mask
@@ -20,12 +17,6 @@ SCANS = (1 << 63) - 1
 """Mask of the bits of a history that are kept: the 63 lowest."""
 
 
-_NUMBERS = ("born_s", "updated_s", "rest_s", "merged_since_s", "exchange", "score", "best", "alone_s", "travelled")
-_COUNTS = ("id", "history", "merged", "run", "label")
-Columns = namedtuple("Columns", (*_NUMBERS, *_COUNTS, "status", "start", "box", "rest", "missed", "visible"))  # type: ignore[misc]
-"""The columns of a register."""
-
-
 class Register:
     """Identity and history of each row; rows are in the order of the estimator's.
 
@@ -38,50 +29,38 @@ class Register:
     REST of its size), missed (T, S) scans of each station without it since it was last seen,
     visible (T, S) probability that each station could see it, NaN while nothing is known.
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
-
-    The columns are views of arrays with room for more rows: write into them, never replace one.
     """
 
-    STATE = ("next_id", "columns")
+    STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
+             "exchange", "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s",
+             "missed", "visible")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
 
-    id: Ints
-    status: NDArray[np.int8]
-    born_s: Floats
-    updated_s: Floats
-    history: Ints
-    start: Floats
-    box: Floats
-    merged: Ints
-    merged_since_s: Floats
-    exchange: Floats
-    score: Floats
-    best: Floats
-    run: Ints
-    label: Ints
-    alone_s: Floats
-    travelled: Floats
-    rest: Floats
-    rest_s: Floats
-    missed: Ints
-    visible: Floats
-
     def __init__(self, dim: int, smooth: bool = False, stations: int = 1) -> None:
         """dim of the positions; whether a smoother needs more; number of stations."""
+        self.columns = self.STATE[1:] + (self.LINKS if smooth else ())
         self.next_id = 1
-        self._numbers = np.empty((len(_NUMBERS), 0))
-        self._counts = np.empty((len(_COUNTS), 0), np.int64)
-        self._tables = {
-            "status": np.empty(0, np.int8),
-            "start": np.empty((0, dim)),
-            "box": np.empty((0, 4)),
-            "rest": np.empty((0, dim)),
-            "missed": np.empty((0, stations), np.int64),
-            "visible": np.empty((0, stations)),
-        }
-        self._smooth = smooth
-        self._show(0)
+        self.id = np.empty(0, np.int64)
+        self.status = np.empty(0, np.int8)
+        self.born_s = np.empty(0)
+        self.updated_s = np.empty(0)
+        self.history = np.empty(0, np.int64)
+        self.start = np.empty((0, dim))
+        self.box = np.empty((0, 4))
+        self.merged = np.empty(0, np.int64)
+        self.merged_since_s = np.empty(0)
+        self.exchange = np.empty(0)
+        self.score = np.empty(0)
+        self.best = np.empty(0)
+        self.run = np.empty(0, np.int64)
+        self.label = np.empty(0, np.int64)
+        self.alone_s = np.empty(0)
+        self.travelled = np.empty(0)
+        self.rest = np.empty((0, dim))
+        self.rest_s = np.empty(0)
+        self.missed = np.empty((0, stations), np.int64)
+        self.visible = np.empty((0, stations))
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
 
     def __len__(self) -> int:
@@ -142,19 +121,32 @@ class Register:
         count = len(position)
         ids = np.arange(self.next_id, self.next_id + count) if ids is None else ids
         self.next_id = max(self.next_id + count, 1 + int(ids.max(initial=0)))
-        first = len(self)
-        self._reserve(first + count)
-        self._show(first + count)
-        self.id[first:], self.run[first:] = ids, run
-        self.label[first:] = -1 if label is None else label
-        self.start[first:] = self.rest[first:] = position
-        self.box[first:] = box
-        self._numbers[:, first : first + count] = np.array([t, t, t, np.nan, 0.0, score, score, 0.0, 0.0])[:, None]
-        self.status[first:], self.history[first:], self.merged[first:] = TENTATIVE, 1, -1
-        self.missed[first:], self.visible[first:] = 0, np.nan
-        for name in self.LINKS if self._smooth else ():
+        new = {
+            "id": ids,
+            "status": TENTATIVE,
+            "born_s": t,
+            "updated_s": t,
+            "history": 1,
+            "start": position,
+            "box": box,
+            "merged": -1,
+            "exchange": 0.0,
+            "score": score,
+            "best": score,
+            "run": run,
+            "label": -1 if label is None else label,
+            "alone_s": 0.0,
+            "travelled": 0.0,
+            "rest": position,
+            "rest_s": t,
+            "missed": 0,
+        }
+        for name in self.columns:
             old = getattr(self, name)
-            setattr(self, name, np.concatenate([old, np.full((count, *old.shape[1:]), np.nan)]))
+            longer = np.empty((len(old) + count, *old.shape[1:]), old.dtype)
+            longer[: len(old)] = old
+            longer[len(old) :] = new.get(name, np.nan)
+            setattr(self, name, longer)
         return ids
 
     def rename(self, rows: np.ndarray) -> tuple[Ints, Ints]:
@@ -167,48 +159,8 @@ class Register:
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
-        count = len(rows)
-        numbers, counts = self._numbers.take(rows, axis=1), self._counts.take(rows, axis=1)
-        tables = {name: table.take(rows, axis=0) for name, table in self._tables.items()}
-        self._reserve(count)
-        self._numbers[:, :count], self._counts[:, :count] = numbers, counts
-        for name, table in tables.items():
-            self._tables[name][:count] = table
-        self._show(count)
-        for name in self.LINKS if self._smooth else ():
+        for name in self.columns:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
-
-    @property
-    def columns(self) -> Columns:
-        """All columns, for a saved state."""
-        return Columns(*(getattr(self, name) for name in Columns._fields))
-
-    @columns.setter
-    def columns(self, columns: Columns) -> None:
-        count = len(columns.id)
-        self._reserve(count)
-        self._show(count)
-        for name, column in zip(Columns._fields, columns, strict=True):
-            getattr(self, name)[:] = column
-
-    def _reserve(self, count: int) -> None:
-        """Make room for `count` rows, and for as many again."""
-        old, room = self._counts.shape[1], 2 * count
-        if count <= old:
-            return
-        self._numbers = np.hstack([self._numbers, np.empty((len(_NUMBERS), room - old))])
-        self._counts = np.hstack([self._counts, np.empty((len(_COUNTS), room - old), np.int64)])
-        for name, table in self._tables.items():
-            self._tables[name] = np.concatenate([table, np.empty((room - old, *table.shape[1:]), table.dtype)])
-
-    def _show(self, count: int) -> None:
-        """Let the columns be the first `count` rows of the room there is."""
-        for name, column in zip(_NUMBERS, self._numbers[:, :count], strict=True):
-            setattr(self, name, column)
-        for name, column in zip(_COUNTS, self._counts[:, :count], strict=True):
-            setattr(self, name, column)
-        for name, table in self._tables.items():
-            setattr(self, name, table[:count])
 
 
 @kernel

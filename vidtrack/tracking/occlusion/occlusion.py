@@ -170,7 +170,7 @@ class Occlusion:
         alone = ((merged < 0) & (register.merged >= 0)).nonzero()[0]
         register.merged_since_s[alone] = np.nan
         events.extend(Event.each(t, register.id[alone], "split", "alone on its blob again"))
-        register.merged[:] = merged
+        register.merged = merged
 
     def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
         """Those of the blobs born (B,) that are no pieces of known vehicles, boxes (V, 4)."""

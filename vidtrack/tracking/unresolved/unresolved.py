@@ -132,7 +132,7 @@ class Unresolved:
             exchange = register.exchange[alone][first]
             events.append(Event(t, int(track), "split", f"resolved; exchanged with probability {exchange:.3f}"))
         register.merged_since_s[joined], register.merged_since_s[alone] = t, np.nan
-        register.merged[:] = merged
+        register.merged = merged
 
     def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
         """All of them."""
