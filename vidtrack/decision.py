@@ -47,15 +47,12 @@ class Decision:
         """The union of two decisions about disjoint sets of rows."""
         from vidtrack.arrays.rows import merged  # loads the compiler
 
-        return Decision(
-            self.parent,
-            *merged(
-                self.row, self.measurement, self.beta, self.beta0, other.row, other.measurement, other.beta, other.beta0
-            ),
-            _chosen(other.row, other.inflation, self.inflation),
-            self.spread,
-            _chosen(other.row, other.approximate, self.approximate),
+        row, measurement, beta, beta0 = merged(
+            self.row, self.measurement, self.beta, self.beta0, other.row, other.measurement, other.beta, other.beta0
         )
+        inflation = _chosen(other.row, other.inflation, self.inflation)
+        approximate = _chosen(other.row, other.approximate, self.approximate)
+        return Decision(self.parent, row, measurement, beta, beta0, inflation, self.spread, approximate)
 
 
 def _chosen(theirs: Ints, other: Any, own: Any) -> Any:
