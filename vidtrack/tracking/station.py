@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 
-from vidtrack.arrays.rows import each
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ScanError
 from vidtrack.estimate.motion.model import Motion
@@ -95,7 +94,7 @@ class Stations:
         """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""
         coverage = self.each[scan.station].coverage
         if coverage is None:
-            return each(1.0, len(x))
+            return np.ones(len(x))
         return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
 
     def take(self, scan: Scan) -> float:
