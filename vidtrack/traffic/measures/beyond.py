@@ -38,7 +38,7 @@ def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floa
     found = parts[0].and_also(parts[1])
     ends = np.where(found.t < lives.head.t[found.track], lives.head.t[found.track], lives.tail.t[found.track])
     sure = confidence(found) * np.exp(-np.abs(found.t - ends) / _ELSEWHERE_S)
-    likely = (sure > _LIKELY) & gates.role("entry", "exit", "both")[found.gate] & (found.t <= lives.until[found.track])
+    likely = (sure > _LIKELY) & gates.role("entry", "exit", "both")[found.gate]
     found, sure = found.only(likely), sure[likely]
     alone = _alone(found, passed)
     return found.only(alone), sure[alone]

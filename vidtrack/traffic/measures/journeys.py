@@ -107,7 +107,7 @@ def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floa
 
 def _comes_again(gates: Gates, passed: Passed, vehicle: Ints) -> Mask:
     """(P,) whether a vehicle passes an entry of the leg whose exit it passed last, another gate."""
-    legs = np.unique(np.array(gates.legs), return_inverse=True)[1]
+    legs = gates.leg
     role = np.flatnonzero(gates.role("entry", "exit")[passed.gate])
     order = role[np.lexsort((passed.t[role], vehicle[role]))]
     gate, who = passed.gate[order], vehicle[order]
