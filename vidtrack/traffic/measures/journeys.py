@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,15 +36,18 @@ class Journeys:
     trips: Trips
 
 
-def journeys(gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool) -> Journeys:
+def journeys(
+    gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool, allowed: Sequence[tuple[str, str]] = ()
+) -> Journeys:
     """The journeys of T stretches of tracks.
 
     passed   passings of stretches
     spans    (S, 2) s; what was watched
     metres   positions are on the road; else broken tracks are not joined
+    allowed  pairs of legs; none: all but turning back
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
-    joins = _joins(gates, passed, lives, spans) if metres else _NONE
+    joins = _joins(gates, passed, lives, spans, allowed) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins)
     probability = np.concatenate([confidence(passed), joins.probability[across.track]])
@@ -66,15 +70,28 @@ def journeys(gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: 
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 
-def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats) -> Joins:
-    """Joins of stretches that end before an exit, and of those that begin after an entry."""
-    left, entered = np.zeros((2, len(lives.track)), bool)
+def _joins(
+    gates: Gates, passed: Passed, lives: Lives, spans: Floats, allowed: Sequence[tuple[str, str]]
+) -> Joins:
+    """Joins of stretches that end after an entry or before an exit, and of those that begin so."""
     both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
-    left[passed.track[gates.role("exit")[passed.gate] | (both & ~inwards)]] = True
-    entered[passed.track[gates.role("entry")[passed.gate] | (both & inwards)]] = True
-    ends = ~left & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
-    begins = ~entered & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
-    return joined(lives, ends, begins, float(np.diff(spans).sum()))
+    enters = gates.role("entry")[passed.gate] | (both & inwards)
+    leaves = gates.role("exit")[passed.gate] | (both & ~inwards)
+    event = np.flatnonzero(enters | leaves)
+    event = event[np.argsort(passed.t[event], kind="stable")]
+    first, last = np.full((2, len(lives.track)), -1)
+    first[passed.track[event[::-1]]], last[passed.track[event]] = event[::-1], event
+    ends = ~np.append(leaves, False)[last] & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
+    begins = ~np.append(enters, False)[first] & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
+    leg = np.append(gates.leg[passed.gate], -1)
+    legs = sorted(set(gates.legs))
+    may = np.ones((len(legs) + 1, len(legs) + 1), bool)  # the last ones: not known
+    may[:-1, :-1] = [[(one, other) in allowed if allowed else one != other for other in legs] for one in legs]
+
+    def possible(a: Ints, b: Ints) -> Mask:
+        return np.asarray(may[leg[last[a]], leg[first[b]]])
+
+    return joined(lives, ends, begins, float(np.diff(spans).sum()), possible)
 
 
 def _across(gates: Gates, lives: Lives, joins: Joins) -> Passed:

@@ -90,7 +90,7 @@ class _Figures:
         sessions, track_ids = reader.names
         self.tracks = len(track_ids)
         self.session, self.track_id = sessions[lives.track], track_ids[lives.track]
-        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres)
+        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres, site.movements.allowed)
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)

@@ -36,7 +36,7 @@ _FAR = 25.0
 """Squared distance beyond which a row is of something else"""
 _OTHER = 20.0
 """Squared distance of two states, beyond which they are of two vehicles: of one, one in 200,000"""
-_DRIVES_M_S, _KNOWN_M_S = 2.0, 0.8
+_DRIVES_M_S, _KNOWN_M_S = 3.0, 1.5
 """m/s; from which on a vehicle has a direction, if its velocity is known so well"""
 _BACK, _ROOM_M = -0.7, 6.0
 """Cosine of directions that are opposite; m to the side that a vehicle needs to turn round"""
