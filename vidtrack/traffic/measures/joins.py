@@ -41,8 +41,6 @@ _AHEAD_M, _ASIDE_M = 30.0, 1.5
 """m; how far ahead it is found, and the standard deviation of how far to the side"""
 _ONWARD = 0.5
 """Least cosine of its velocity and of where it has gone"""
-_MOVES_M_S = 1.5
-"""m/s; of a velocity that tells a direction"""
 _FREEDOM = 4.0
 """of Student's t: states of tracks that have just shared a blob are off by more than they say"""
 _VELOCITIES = 400.0
@@ -130,7 +128,8 @@ def _hidden(tail: End, head: End, a: Ints, b: Ints) -> Floats:
     """(J,) density with which a vehicle that others hid while it stood or crawled is found again."""
     gap = np.maximum(head.t[b] - tail.t[a], 1e-3)
     way = head.xy[b] - tail.xy[a]
-    v = np.where((np.linalg.norm(tail.v[a], axis=1) > _MOVES_M_S)[:, None], tail.v[a], head.v[b])
+    faster = np.linalg.norm(tail.v[a], axis=1) > np.linalg.norm(head.v[b], axis=1)
+    v = np.where(faster[:, None], tail.v[a], head.v[b])
     ahead = v / np.maximum(np.linalg.norm(v, axis=1), 1e-9)[:, None]
     along, aside = _dot(way, ahead), way[:, 0] * ahead[:, 1] - way[:, 1] * ahead[:, 0]
     onward = _dot(head.v[b], ahead) > _ONWARD * np.linalg.norm(head.v[b], axis=1)

@@ -47,7 +47,10 @@ def journeys(
     allowed  pairs of legs; none: all but turning back
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
-    joins = _joins(gates, passed, lives, spans, allowed) if metres else _NONE
+    may = _may(gates, allowed)
+    if metres:
+        passed = passed.only(~_of_others(gates, passed, lives, may))
+    joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins)
     probability = np.concatenate([confidence(passed), joins.probability[across.track]])
@@ -70,13 +73,35 @@ def journeys(
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 
+def _may(gates: Gates, allowed: Sequence[tuple[str, str]]) -> Mask:
+    """(L + 1, L + 1) whether a trip may go from a leg to another; the last ones are not known, which may be any."""
+    legs = sorted(set(gates.legs))
+    may = np.ones((len(legs) + 1, len(legs) + 1), bool)
+    may[:-1, :-1] = [[(one, other) in allowed if allowed else one != other for other in legs] for one in legs]
+    return may
+
+
+def _ways(gates: Gates, passed: Passed) -> tuple[Mask, Mask]:
+    """(P,) whether a passing enters, and whether it leaves."""
+    both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
+    return gates.role("entry")[passed.gate] | (both & inwards), gates.role("exit")[passed.gate] | (both & ~inwards)
+
+
+def _of_others(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
+    """(P,) exits of a movement that may not be, passed after the stretch was seen alone for the last time."""
+    enters, leaves = _ways(gates, passed)
+    leg = gates.leg[passed.gate]
+    came = np.full(len(lives.track), -1)
+    entry = np.flatnonzero(enters)[::-1]
+    came[passed.track[entry]] = leg[entry]
+    return np.asarray(leaves & (passed.t > lives.tail.t[passed.track]) & ~may[came[passed.track], leg])
+
+
 def _joins(
-    gates: Gates, passed: Passed, lives: Lives, spans: Floats, allowed: Sequence[tuple[str, str]]
+    gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask
 ) -> Joins:
     """Joins of stretches that end after an entry or before an exit, and of those that begin so."""
-    both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
-    enters = gates.role("entry")[passed.gate] | (both & inwards)
-    leaves = gates.role("exit")[passed.gate] | (both & ~inwards)
+    enters, leaves = _ways(gates, passed)
     event = np.flatnonzero(enters | leaves)
     event = event[np.argsort(passed.t[event], kind="stable")]
     first, last = np.full((2, len(lives.track)), -1)
@@ -84,9 +109,6 @@ def _joins(
     ends = ~np.append(leaves, False)[last] & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
     begins = ~np.append(enters, False)[first] & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
     leg = np.append(gates.leg[passed.gate], -1)
-    legs = sorted(set(gates.legs))
-    may = np.ones((len(legs) + 1, len(legs) + 1), bool)  # the last ones: not known
-    may[:-1, :-1] = [[(one, other) in allowed if allowed else one != other for other in legs] for one in legs]
 
     def possible(a: Ints, b: Ints) -> Mask:
         return np.asarray(may[leg[last[a]], leg[first[b]]])
