@@ -11,8 +11,8 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
-from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
+from vidtrack.traffic.measures.joins import Joins, gap_rows, joined, passed_by
+from vidtrack.traffic.measures.passing import Passed
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, trips_of
 
@@ -118,9 +118,7 @@ def _joins(
 
 def _across(gates: Gates, lives: Lives, joins: Joins) -> Passed:
     """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
-    passing = Passing(gates, REACH_M)
-    passing.add(gap_rows(lives, joins))
-    return passing.passed()
+    return passed_by(gates, gap_rows(lives, joins))
 
 
 def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
