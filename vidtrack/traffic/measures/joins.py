@@ -43,8 +43,8 @@ _AHEAD_M, _ASIDE_M = 30.0, 1.5
 """m; how far ahead it is found, and the standard deviation of how far to the side"""
 _BESIDE_M = 4.0
 """m; the way between two states is taken to be straight"""
-_ONWARD = 0.5
-"""Least cosine of its velocity and of where it has gone"""
+_ONWARD, _PACE_M_S = 0.5, 8.0
+"""Least cosine of its velocity and of where it has gone; m/s, the standard deviation of its velocity per axis"""
 _FREEDOM = 4.0
 """of Student's t: states of tracks that have just shared a blob are off by more than they say"""
 _VELOCITIES = 400.0
@@ -112,6 +112,12 @@ def marginals(R: Floats, a: Ints, b: Ints, ends: int) -> Floats:
 
 def odds(tail: End, head: End, length: Floats, a: Ints, b: Ints) -> Floats:
     """(J,) density with which the vehicle of stretch a is found again as stretch b, 1/(s m2 (m/s)2)."""
+    size = np.nan_to_num(np.log(length[b] / length[a]) / _LENGTH_SIGMA)
+    return np.asarray(0.5 * (driving(tail, head, a, b) + hidden(tail, head, a, b)) * np.exp(-(size**2) / 2))
+
+
+def driving(tail: End, head: End, a: Ints, b: Ints) -> Floats:
+    """(J,) the density of a vehicle that drives on, at about the same velocity."""
     gap = np.maximum(head.t[b] - tail.t[a], 0.0)
     place = head.xy[b] - tail.xy[a] - gap[:, None] * tail.v[a]
     pace = head.v[b] - tail.v[a]
@@ -123,23 +129,23 @@ def odds(tail: End, head: End, length: Floats, a: Ints, b: Ints) -> Floats:
     det = sxx * svv - sxv**2
     square = (svv * _dot(place, place) - 2 * sxv * _dot(place, pace) + sxx * _dot(pace, pace)) / det
     found = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det * (1 + square / _FREEDOM) ** -(2 + _FREEDOM / 2)
-    size = np.nan_to_num(np.log(length[b] / length[a]) / _LENGTH_SIGMA)
-    drives = np.exp(-gap / _LOST_S) / _LOST_S * found
-    return np.asarray(0.5 * (drives + _hidden(tail, head, a, b)) * np.exp(-(size**2) / 2))
+    return np.asarray(np.exp(-gap / _LOST_S) / _LOST_S * found)
 
 
-def _hidden(tail: End, head: End, a: Ints, b: Ints) -> Floats:
-    """(J,) density with which a vehicle that others hid while it stood or crawled is found again."""
+def hidden(tail: End, head: End, a: Ints, b: Ints) -> Floats:
+    """(J,) the density of a vehicle that others hid while it stood or crawled."""
     gap = np.maximum(head.t[b] - tail.t[a], 1e-3)
     way = head.xy[b] - tail.xy[a]
     faster = np.linalg.norm(tail.v[a], axis=1) > np.linalg.norm(head.v[b], axis=1)
     v = np.where(faster[:, None], tail.v[a], head.v[b])
     ahead = v / np.maximum(np.linalg.norm(v, axis=1), 1e-9)[:, None]
     along, aside = _dot(way, ahead), way[:, 0] * ahead[:, 1] - way[:, 1] * ahead[:, 0]
-    onward = _dot(head.v[b], ahead) > _ONWARD * np.linalg.norm(head.v[b], axis=1)
+    speed = np.linalg.norm(head.v[b], axis=1)
+    pace = np.exp(-((speed / _PACE_M_S) ** 2) / 2) / (2 * np.pi * _PACE_M_S**2) * np.pi / np.arccos(_ONWARD)
     late = np.exp(-((np.log(gap / _HIDDEN_S) / _HIDDEN_SIGMA) ** 2) / 2) / (gap * _HIDDEN_SIGMA * np.sqrt(2 * np.pi))
-    place = np.exp(-((aside / _ASIDE_M) ** 2) / 2) / (_ASIDE_M * np.sqrt(2 * np.pi) * _AHEAD_M)
-    return np.asarray(late * place / _VELOCITIES * (onward & (along > -_ASIDE_M) & (along < _AHEAD_M)))
+    place = np.exp(-((aside / _ASIDE_M) ** 2) / 2) / (_ASIDE_M * np.sqrt(2 * np.pi) * (_AHEAD_M + _ASIDE_M))
+    onward = (_dot(head.v[b], ahead) >= _ONWARD * speed) & (along > -_ASIDE_M) & (along < _AHEAD_M)
+    return np.asarray(late * place * pace * onward)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
