@@ -62,8 +62,22 @@ def test_who_comes_in_where_a_track_left_is_another_vehicle(tmp_path):
 def test_at_most_one_trip_a_vehicle(tmp_path):
     t = np.arange(0, 25, 0.04)
     to_and_fro = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20))
-    found = measured([write_run(tmp_path / "run", [to_and_fro], metres=True)], site(PLACE))
+    plane = site({"site": PLACE["site"], "gates": PLACE["gates"]})
+    found = measured([write_run(tmp_path / "run", [to_and_fro])], plane)
     assert len(found.tables["trips"]) == 1
+
+
+def test_a_track_that_drives_back_without_room_to_turn_is_of_two_vehicles(tmp_path):
+    t = np.arange(0, 20, 0.04)
+    back = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20))
+    round_ = along(2, t, 300 - 250 * np.cos(2 * np.pi * t / 20), 240 - 200 * np.sin(2 * np.pi * t / 20))
+    tracks = []
+    for number, rows in enumerate((back, round_)):
+        found = measured([write_run(tmp_path / str(number), [rows], metres=True)], site(PLACE))
+        tracks.append([(row["entry_gate"], row["exit_gate"]) for row in found.tables["trips"].to_pylist()])
+    assert ("west", "east") in tracks[0]
+    assert len(tracks[0]) > 1
+    assert len(tracks[1]) == 1
 
 
 def test_an_impossible_movement_is_told(tmp_path):
@@ -150,7 +164,8 @@ def test_marginals_are_those_of_all_ways_to_join(seed):
     a, b = np.array([0, 0, 1, 1]), np.array([2, 3, 2, 3])
     found = marginals(R.ravel(), a, b, 4)
     np.testing.assert_allclose(found, exact.ravel(), atol=0.12)
-    assert (np.bincount(a, found) <= 1).all() and (np.bincount(b, found) <= 1 + 1e-6).all()
+    assert (np.bincount(a, found) <= 1).all()
+    assert (np.bincount(b, found) <= 1 + 1e-6).all()
 
 
 def test_where_one_must_go_elsewhere_the_other_stays():
@@ -165,7 +180,9 @@ def test_a_hidden_vehicle_is_found_somewhere_ahead():
     vx, vy = (grid.ravel() for grid in np.meshgrid(np.arange(-40, 40, 1.0), np.arange(-40, 40, 1.0)))
     tail, nothing = end([0.0], [0.0], [60.0]), np.zeros(len(x), int)
     places = End(np.full(len(x), 5.0), np.column_stack([x, y]), np.tile([5.0, 0.0], (len(x), 1)), np.ones((len(x), 3)))
-    paces = End(np.full(len(vx), 5.0), np.tile([9.0, 0.5], (len(vx), 1)), np.column_stack([vx, vy]), np.ones((len(vx), 3)))
+    paces = End(
+        np.full(len(vx), 5.0), np.tile([9.0, 0.5], (len(vx), 1)), np.column_stack([vx, vy]), np.ones((len(vx), 3))
+    )
     everywhere = hidden(tail, places, nothing, np.arange(len(x)))
     anyhow = hidden(tail, paces, np.zeros(len(vx), int), np.arange(len(vx)))
     here = np.flatnonzero((x == 9.0) & (y == 0.5))[0]
@@ -205,7 +222,8 @@ def met(tmp_path, swapped):
 @pytest.mark.parametrize("swapped", [False, True])
 def test_tracks_that_change_vehicles_are_broken_and_joined(tmp_path, swapped):
     gates = PLACE["gates"] | {name: PLACE["gates"][name] | {"role": "both"} for name in ("west", "east")}
-    found = measured([met(tmp_path, swapped)], site(PLACE | {"gates": gates}))
+    allowed = {"allowed": [["west", "east"], ["east", "west"]]}
+    found = measured([met(tmp_path, swapped)], site(PLACE | {"gates": gates, "movements": allowed}))
     rows = found.tables["trips"].to_pylist()
     assert sorted((row["entry_gate"], row["exit_gate"], row["complete"]) for row in rows) == [
         ("east", "west", True),

@@ -20,6 +20,8 @@ REACH_S = 1.5
 _LEAST_M_S, _SURE = 1.5, 3.0
 """m/s; of the vehicle, and standard deviations of its velocity in it"""
 _LIKELY = 0.5
+_TRUE = 0.65
+"""Share of such passings that are right: 26 of 52, for which a mean of 0.79 was stated without it"""
 _ELSEWHERE_S = 4.0
 """s; the mean time in which a vehicle has come from elsewhere, such as out of another one's blob"""
 _ALONE_S, _ALONE_M = 1.0, 1.75
@@ -39,7 +41,7 @@ def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floa
     ends = np.where(found.t < lives.head.t[found.track], lives.head.t[found.track], lives.tail.t[found.track])
     sure = confidence(found) * np.exp(-np.abs(found.t - ends) / _ELSEWHERE_S)
     likely = (sure > _LIKELY) & gates.role("entry", "exit", "both")[found.gate]
-    found, sure = found.only(likely), sure[likely]
+    found, sure = found.only(likely), _TRUE * sure[likely]
     alone = _alone(found, passed)
     return found.only(alone), sure[alone]
 

@@ -57,7 +57,7 @@ class Gates:
 
     @property
     def length(self) -> Floats:
-        """(G,)"""
+        """(G,) in the unit of positions."""
         last = self.first[1:] - 1
         return np.asarray(self.begin[last] + np.linalg.norm(self.segment[last, 2:] - self.segment[last, :2], axis=1))
 
@@ -71,7 +71,7 @@ class Gates:
         return np.asarray(start + (along - self.begin[s])[:, None] * ahead)
 
     def widened(self, most: float) -> Gates:
-        """The same gates, longer at both ends: by `most`, and by no more than half of the way to another gate."""
+        """The same gates, longer at both ends by `most`, and by no more than half of the way to another gate."""
         begin, end = self.first[:-1], self.first[1:] - 1
         ends = np.stack([self.segment[begin, :2], self.segment[end, 2:]], axis=1)
         owner = np.repeat(np.arange(len(self)), np.diff(self.first))
@@ -87,7 +87,7 @@ class Gates:
         return replace(self, segment=segment, begin=self.begin - shift)
 
     def _room(self, ends: Floats, owner: Ints) -> Floats:
-        """(G, 2) distances of both ends (G, 2, 2) of each gate from the nearest other one; S segments are of `owner`."""
+        """(G, 2) distances of both ends (G, 2, 2) of each gate from the nearest other one; `owner` (S,) of segments."""
         a, way = self.segment[:, :2], self.segment[:, 2:] - self.segment[:, :2]
         from_a = ends[:, :, None] - a
         share = np.clip((from_a * way).sum(axis=-1) / (way**2).sum(axis=-1), 0, 1)

@@ -5,11 +5,11 @@ The odds that they are, against a vehicle that is lost for good and another that
     R = (1/2 h(gap) t(difference of states; S) + 1/2 k(gap) u(place, velocity)) exp(-d^2 / 2) / rate
 
 The first term is of a vehicle that drives on: h the density of the time that a track is lost for, t that of place and
-velocity in which it is found (Student's t of four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after a
-motion of nearly constant velocity. The second is of one that others hide while it stands or crawls: it is found somewhere
-ahead, after a time whose logarithm is normal. d is the difference of the lengths in standard deviations. Two stretches of
-one track are SAME times as likely one vehicle, and a movement that is not allowed is none. `rate` is that at which
-tracks begin by chance between the gates, per second and unit of place and velocity: what no join explains.
+velocity in which it is found (Student's t of four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after
+a motion of nearly constant velocity. The second is of one that others hide while it stands or crawls: it is found
+somewhere ahead, after a time whose logarithm is normal. d is the difference of the lengths in standard deviations. Two
+stretches of one track are SAME times as likely one vehicle, and a movement that is not allowed is none. `rate` is that
+at which tracks begin by chance between the gates, per second and unit of place and velocity: what no join explains.
 
 All ends are decided together: the probability of a pair is its marginal over all ways to join ends one to one, each as
 likely as the product of its odds. Belief propagation finds these marginals (Williams and Lau, IEEE Transactions on
@@ -70,9 +70,7 @@ class Joins:
         return first
 
 
-def joined(
-    lives: Lives, ends: Mask, begins: Mask, watched_s: float, allowed: Callable[[Ints, Ints], Mask]
-) -> Joins:
+def joined(lives: Lives, ends: Mask, begins: Mask, watched_s: float, allowed: Callable[[Ints, Ints], Mask]) -> Joins:
     """The joins of T stretches.
 
     ends, begins   (T,) those that end, and that begin, between the gates

@@ -97,9 +97,7 @@ def _of_others(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
     return np.asarray(leaves & (passed.t > lives.tail.t[passed.track]) & ~may[came[passed.track], leg])
 
 
-def _joins(
-    gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask
-) -> Joins:
+def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:
     """Joins of stretches that end after an entry or before an exit, and of those that begin so."""
     enters, leaves = _ways(gates, passed)
     event = np.flatnonzero(enters | leaves)

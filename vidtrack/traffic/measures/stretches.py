@@ -1,10 +1,10 @@
 """Tracks are broken into stretches where their motion on the road cannot be that of one vehicle.
 
 Where vehicles meet in one blob, or one hides the other, a track may go on as the other vehicle. A Kalman filter of
-nearly constant velocity follows each track through the rows in which the picture shows it alone. Again and again another
-filter begins, also after rows that the track shared, and where a row is far from the prediction. If its state after
-_CHECK_S is not where the first one led to when it began, the rest of the track is another stretch: of which vehicle is
-decided by `joins`. So it is where a track drives back the way that it came, without room to turn.
+nearly constant velocity follows each track through the rows in which the picture shows it alone. Again and again
+another filter begins, also after rows that the track shared, and where a row is far from the prediction. If its state
+after _CHECK_S is not where the first one led to when it began, the rest of the track is another stretch: of which
+vehicle is decided by `joins`. So it is where a track drives back the way that it came, without room to turn.
 
 The noise of the two axes is the same and independent, so a filter has six numbers beside its time: position,
 velocity, and for each axis the variances of both and their covariance. Errors of footprints last, so the variance of
@@ -153,8 +153,8 @@ def _follow(
     state   (K, 1 + 2 _CHECKS, 9) of each track the long filter, then for each check what this was when the check began,
             and the filter that began with it
     onward, turned   (K, 4), (K, 9) as in `_backs`
-    since   (K, 2 + 2 _CHECKS) when the long filter began, and 1 after rows in which the track was not alone; then of each
-            check when it began (NaN: it has not) and how many rows it has
+    since   (K, 2 + 2 _CHECKS) when the long filter began, and 1 after rows in which the track was not alone; then of
+            each check when it began (NaN: it has not) and how many rows it has
     """
     begun = np.empty(9)
     for i in range(len(track)):

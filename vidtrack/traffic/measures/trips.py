@@ -49,8 +49,8 @@ class Trips:
 def trips_of(passed: Passed, gates: Gates, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
     """The trip of each vehicle: from its first entry to the last exit after it.
 
-    Who is not known to enter, or to leave, by a gate for this may pass one of another leg the wrong way: in over an exit,
-    or out over an entry, as a place that is a lane off has it.
+    Who is not known to enter, or to leave, by a gate for this may pass one of another leg the wrong way: in over an
+    exit, or out over an entry, as a place that is a lane off has it.
 
     vehicle      (P,) of each passing
     begin, end   (T,) s; first and last row of vehicles by number
