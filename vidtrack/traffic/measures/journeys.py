@@ -37,7 +37,7 @@ class Journeys:
 
 
 def journeys(
-    gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool, allowed: Sequence[tuple[str, str]] = ()
+    gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool, allowed: Sequence[tuple[str, str]]
 ) -> Journeys:
     """The journeys of T stretches of tracks.
 
