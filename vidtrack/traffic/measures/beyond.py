@@ -11,8 +11,8 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.traffic.measures.crossings import confidence
 from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.joins import Joins, passed_by, step_rows
-from vidtrack.traffic.measures.passing import Passed
+from vidtrack.traffic.measures.joins import Joins, step_rows
+from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
 from vidtrack.traffic.measures.stretches import End, Lives
 
 REACH_S = 1.5
@@ -56,7 +56,9 @@ def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Pa
     room = np.abs(spans[span, 0 if way < 0 else 1] - end.t[who])
     known = End(end.t[who], end.xy[who], end.v[who], end.spread[who])
     far = known.after(way * np.minimum(REACH_S, room))
-    found = passed_by(gates, step_rows(far, known) if way < 0 else step_rows(known, far))
+    passing = Passing(gates, REACH_M)
+    passing.add(step_rows(far, known) if way < 0 else step_rows(known, far))
+    found = passing.passed()
     return found.of(who[found.track]).nowhere()
 
 
