@@ -6,6 +6,7 @@ import signal
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from subprocess import PIPE, Popen
 from threading import Thread
 
 import pytest
@@ -151,20 +152,41 @@ def test_a_full_disk_costs_a_warning_and_no_result(add, tmp_path, monkeypatch, c
     assert "No space left" in caplog.text
 
 
+COMPILE = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import summed
+print("ready", flush=True)
+sys.stdin.readline()
+summed.add(1, 2)
+print(sum(summed.add.stats.cache_misses.values()))
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="needs file locks")
-def test_processes_take_turns_at_keeping(add, tmp_path):
+def test_of_several_processes_one_compiles_and_the_others_wait(tmp_path):
+    (tmp_path / "summed.py").write_text(
+        "from vidtrack.compiled import kernel\n@kernel\ndef add(x, y):\n    return x + y\n"
+    )
+    command = [sys.executable, "-c", COMPILE, str(tmp_path)]
+    own = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    several = [Popen(command, stdin=PIPE, stdout=PIPE, text=True, env=own) for _ in range(3)]
+    for process in several:
+        assert process.stdout.readline() == "ready\n"
+    for process in several:
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    assert sorted(int(process.communicate()[0]) for process in several) == [0, 0, 1]
+    assert [path.suffix for path in sorted((tmp_path / "kernels").rglob("*.*"))] == [".nbc", ".nbi"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs file locks")
+def test_a_process_that_hangs_in_the_compiler_is_not_waited_for_without_end(add, tmp_path, monkeypatch):
     import fcntl
 
-    add(1, 2)
-    (index,) = tmp_path.rglob("*.nbi")
-    other = os.open(index.parent, os.O_RDONLY)
-    fcntl.flock(other, fcntl.LOCK_EX)
-    found = []
-    thread = Thread(target=lambda: found.append(add(1.5, 2.0)))
-    thread.start()
-    thread.join(0.5)
-    assert len(list(tmp_path.rglob("*.nbc"))) == 1
-    os.close(other)
-    thread.join()
-    assert found == [3.5]
-    assert len(list(tmp_path.rglob("*.nbc"))) == 2
+    monkeypatch.setattr("vidtrack.compiled._TURN_S", 0.05)
+    lock = add._cache._lock
+    with open(lock, "w") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        assert add(1.5, 2.0) == 3.5
+    assert list(tmp_path.rglob("*.nbi"))

@@ -20,7 +20,7 @@ from vidtrack.video.frame import Frame
 
 def test_every_association_method_has_a_name():
     assert set(get_args(names.Method)) == set(METHODS)
-    made = {type(rule(TrackerSettings(method=method))) for method in METHODS}
+    made = {repr(rule(TrackerSettings(method=method))) for method in METHODS}
     assert len(made) == len(METHODS)
 
 

@@ -41,7 +41,7 @@ def halves(frames):
 @pytest.mark.parametrize(
     "setting",
     ["detector.kind=disturbance", "detector.kind=paper"]
-    + [f"tracker.method={method}" for method in ("nn", "generalized-nn", "psn", "pda", "jpda", "split", "mht")],
+    + [f"tracker.method={method}" for method in ("nn", "generalized-nn", "psn", "pda", "jpda-star", "split", "mht")],
 )
 def test_it_goes_on_bit_by_bit(tmp_path, frames, setting):
     settings = load(assignments=[setting])

@@ -1,12 +1,13 @@
 """A station of four cameras with pixels, left alone while it is hurt: what it counts, and whether it grows.
 
-    python tools/soak_station.py [--minutes 30] [--seed 0] [--every 40]
+    python tools/soak_station.py [--minutes 30] [--seed 0] [--every 40] [--folder DIR]
 
 Four cameras show the junction round and round, by one clock; `vidtrack live` tracks them with --http, --record, --roll,
 --state and --keep, as a user would start it. A fifth camera, of the same pictures, is tracked without faults by a run
-of its own: the reference. About every 40 s one fault of these happens: a camera hangs up and refuses for a while, or
-sends nothing; the process of a camera is killed; all processes are killed, and the command is started again; no file
-takes another byte for a while, as on a full disk.
+of its own: the reference. A sixth one is too: it says how much two runs differ that nothing happens to. About every 40
+s one fault of these happens: a camera hangs up and refuses for a while, or sends nothing; the process of a camera is
+killed; all processes are killed, and the command is started again; no file takes another byte for a while, as on a
+full disk.
 
 Once in 10 s a line is printed: resident MB of all processes, their handles, MB on the disk, what /healthz says. At the
 end their slopes over the second half, and the crossings of each camera beside those of the reference: there once, in a
@@ -39,7 +40,7 @@ from soak_live import slope
 from vidtrack.output.intervals.day import day_folders, read_day
 
 SAMPLE = Path(__file__).parent.parent / "samples" / "junction.avi"
-NAMES = ("north", "east", "south", "west")
+NAMES, SOUND = ("north", "east", "south", "west"), ("reference", "control")
 FPS, LOOK_S, NEAR_S = 8.0, 10.0, 1.5
 WARM_S = 30.0
 """s after a fault in which a vehicle may be counted that the reference lacks, or twice: the scene is learnt"""
@@ -56,7 +57,7 @@ class Pictures(ThreadingHTTPServer):
         with av.open(str(SAMPLE)) as film:
             arrays = [picture.to_ndarray(format="bgr24") for picture in film.decode(video=0)]
         self.jpegs = [cv2.imencode(".jpg", array)[1].tobytes() for array in arrays]
-        self.mode = dict.fromkeys((*NAMES, "reference"), "runs")
+        self.mode = dict.fromkeys((*NAMES, *SOUND), "runs")
 
     def handle_error(self, *_: object) -> None:
         """Whoever hangs up does."""
@@ -213,34 +214,32 @@ def compared(reference, camera) -> Counter:
     return result
 
 
+def sound_run(address: str, folder: Path) -> subprocess.Popen:
+    """A run over a camera that nothing happens to."""
+    lines = [word for line in LINES for word in ("--line", line)]
+    command = [sys.executable, "-m", "vidtrack", "live", address, "-o", str(folder), "--quiet", *lines]
+    return subprocess.Popen([*command, "--set", "output.level=counts", "--roll", "1h"])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--every", type=float, default=40.0, metavar="SECONDS")
+    parser.add_argument("--folder", type=Path, help="where the results stay; it must not exist")
     options = parser.parse_args()
     rng, happened, seen = Random(options.seed), Counter(), []
     with ExitStack() as stack:
-        root = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        root = options.folder or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         folder = root / "disk"
-        folder.mkdir()
+        folder.mkdir(parents=True)
         pictures = Pictures()
         Thread(target=pictures.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{pictures.server_address[1]}"
-        sound = [
-            sys.executable,
-            "-m",
-            "vidtrack",
-            "live",
-            f"{url}/reference.mjpg",
-            "-o",
-            str(root / "sound"),
-            "--quiet",
-        ]
-        lines = [word for line in LINES for word in ("--line", line)]
-        reference = subprocess.Popen([*sound, *lines, "--set", "output.level=counts", "--roll", "1h"])
-        stack.callback(reference.wait)
-        stack.callback(reference.terminate)
+        sound = [sound_run(f"{url}/{name}.mjpg", root / name) for name in SOUND]
+        for process in sound:
+            stack.callback(process.wait)
+            stack.callback(process.terminate)
         station = Station(folder, url)
         stack.callback(station.kill_all)
         began, until_s = time.time(), time.time() + 60 * options.minutes
@@ -256,17 +255,18 @@ def main() -> None:
             )
         station.process.terminate()
         code = station.process.wait()
-        reference.terminate()
-        reference.wait()
+        for process in sound:
+            process.terminate()
+            process.wait()
         late = np.array(seen[len(seen) // 2 :], float)
         whole = late[late[:, 1] > 0.9 * np.median(late[:, 1])]  # while no process is being started
         for column, name in enumerate(("MB resident", "handles", "MB on the disk"), 1):
             b, error = slope(whole[:, 0], whole[:, column])
             print(f"{name}: {3600 * b:+.1f} +- {3600 * error:.1f} per hour, at {np.median(whole[:, column]):.1f}")
         print(f"faults {dict(happened)}, starts {station.starts}, exit code {code}")
-        expected = crossings(root / "sound" / "intervals")
-        for name in NAMES:
-            print(name, dict(compared(expected, crossings(folder / "out" / name / "intervals"))))
+        expected = crossings(root / "reference" / "intervals")
+        for name, place in [("control", root / "control"), *((name, folder / "out" / name) for name in NAMES)]:
+            print(name, dict(compared(expected, crossings(place / "intervals"))))
 
 
 def hurting(

@@ -6,11 +6,12 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from threading import current_thread, main_thread
+from time import monotonic, sleep
 from types import FrameType
 from typing import Any
 
@@ -26,6 +27,7 @@ if sys.platform != "win32":
 log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parent
+_TURN_S, _LOOK_S = 60.0, 0.02  # no kernel takes longer to compile: another process that does hangs
 
 
 def _writable(folder: Path) -> bool:
@@ -36,16 +38,18 @@ def _writable(folder: Path) -> bool:
 
 
 IN_TREE = _writable(PACKAGE / "__pycache__")
-CACHE = bool(os.environ.get("NUMBA_CACHE_DIR")) or IN_TREE or _writable(Path(AppDirs("numba", False).user_cache_dir))
-"""Whether kernels can be cached. numba refuses to compile a cached function if no cache folder is writable.
+KERNELS = Path(os.environ.get("NUMBA_CACHE_DIR") or (PACKAGE if IN_TREE else AppDirs("numba", False).user_cache_dir))
+"""The folder below which kernels are kept: NUMBA_CACHE_DIR, else the package, else one of the user"""
+CACHE = _writable(KERNELS)
+"""Whether kernels can be kept. numba refuses to compile a cached function if no cache folder is writable.
 
-Without a cache, as in a read-only container, each run compiles anew; NUMBA_CACHE_DIR names another folder.
+Without a cache, as in a read-only container, each run compiles anew.
 """
 
 
 def first_run() -> bool:
-    """Whether no kernel is compiled yet in the package's own folders."""
-    return IN_TREE and not os.environ.get("NUMBA_CACHE_DIR") and not any(PACKAGE.rglob("*.nbi"))
+    """Whether no kernel is kept yet."""
+    return CACHE and not any(KERNELS.rglob("*.nbi"))
 
 
 def forget_stale(package: Path) -> None:
@@ -67,34 +71,60 @@ def _older_than_source(kernel: Path) -> bool:
 
 
 class KernelCache(FunctionCache):
-    """Cache of one function's kernels on the disk, safe for concurrent processes. A full disk does not end the run."""
+    """Cache of one function's kernels on the disk. A full disk does not end the run.
+
+    Of several processes that need a kernel at once, one compiles it, and the others wait and load it.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._lock = Path(self.cache_path, f"{self._impl.filename_base}.lock")
+        self._turn: int | None = None  # handle of the lock while this process compiles
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kernel from the disk; None if this process is to compile it."""
+        found = super().load_overload(sig, target_context)
+        if found is None and self._turn is None:
+            self._wait_for_turn()
+            found = super().load_overload(sig, target_context)  # another process may have compiled it meanwhile
+            if found is not None:
+                self._end_turn()
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a kernel for later runs; warn if it cannot be saved."""
-        folder = Path(self.cache_path)
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with _one_writer(folder):
-                super().save_overload(sig, data)
+            super().save_overload(sig, data)
         except OSError as error:
             _warn_once(
-                f"compiled kernels cannot be kept in {folder} ({error.strerror}); the next run compiles them again"
+                f"compiled kernels cannot be kept in {self.cache_path} ({error.strerror}); "
+                "the next run compiles them again"
             )
+        finally:
+            self._end_turn()
 
+    def _wait_for_turn(self) -> None:
+        """Lock the function, where the file system has locks and as far as nobody hangs."""
+        if sys.platform == "win32":
+            return
+        with suppress(OSError):
+            self._lock.parent.mkdir(parents=True, exist_ok=True)
+            self._turn = os.open(self._lock, os.O_RDWR | os.O_CREAT)
+            until_s = monotonic() + _TURN_S
+            while monotonic() < until_s:
+                try:
+                    fcntl.flock(self._turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    return
+                except BlockingIOError:
+                    sleep(_LOOK_S)
 
-@contextmanager
-def _one_writer(folder: Path) -> Iterator[None]:
-    """Lock the folder: numba reads a function's index, adds a line and writes it back."""
-    if sys.platform == "win32":
-        yield
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):  # the file system has no locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
+    def _end_turn(self) -> None:
+        """Let others have the function; who waits for it finds the kernel."""
+        if self._turn is not None:
+            with suppress(OSError):
+                self._lock.unlink()
+            os.close(self._turn)
+            self._turn = None
 
 
 @cache
@@ -156,6 +186,15 @@ class SignalsWait(Listener):
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         self._caught.append(number)
+
+
+def compiling() -> bool:
+    """Whether another thread of this process compiles or loads a kernel now."""
+    lock = global_compiler_lock._lock
+    free = lock.acquire(blocking=False)
+    if free:
+        lock.release()
+    return not free
 
 
 register("numba:compiler_lock", SignalsWait())

@@ -1,7 +1,7 @@
 """Saves the state of a pipeline to a file and restores it, so that a run continues with the same results.
 
-A class lists its state in `STATE`: names of attributes that are arrays, numbers, named tuples of arrays, or objects
-with a STATE. Settings are not part of the state; the user gives them each time.
+A class lists its state in `STATE`: names of attributes that are arrays, numbers, named tuples of arrays, objects with a
+STATE, or tuples of such objects. Settings are not part of the state; the user gives them each time.
 """
 
 from __future__ import annotations
@@ -43,6 +43,9 @@ def gather(thing: Any, prefix: str = "") -> State:
             found[prefix + name] = value.copy()
         elif isinstance(value, np.generic):
             found[prefix + name] = value.item()
+        elif _is_of_parts(value):
+            for k, part in enumerate(value):
+                found |= gather(part, f"{prefix}{name}.{k}.")
         elif isinstance(value, tuple):
             found |= _unpacked(prefix + name, value)
         else:
@@ -102,6 +105,9 @@ def _restored(thing: Any, state: State, prefix: str) -> set[str]:
         value = getattr(thing, name)
         if hasattr(value, "STATE"):
             used |= _restored(value, state, f"{prefix}{name}.")
+        elif _is_of_parts(value):
+            for k, part in enumerate(value):
+                used |= _restored(part, state, f"{prefix}{name}.{k}.")
         elif hasattr(value, "_fields"):
             names = [f"{prefix}{name}.{field}" for field in value._fields]
             setattr(thing, name, type(value)(*(_get(state, each) for each in names)))
@@ -112,6 +118,11 @@ def _restored(thing: Any, state: State, prefix: str) -> set[str]:
             setattr(thing, name, tuple(found) if isinstance(found, list) else found)
             used.add(prefix + name)
     return used
+
+
+def _is_of_parts(value: Any) -> bool:
+    """Whether the value is a tuple of objects with a STATE."""
+    return isinstance(value, tuple) and len(value) > 0 and all(hasattr(part, "STATE") for part in value)
 
 
 def _unpacked(name: str, value: tuple[Any, ...]) -> State:

@@ -93,3 +93,14 @@ def test_the_closed_form_is_refused_outside_its_fit():
         ThresholdController(10.0, 0.0)
     with pytest.raises(ConfigError, match="p_fa_max"):
         ThresholdController(10.0, 1.0, p_fa_max=1.5)
+
+
+def test_cells_of_positions_widen_with_the_distance():
+    controller = ThresholdController(10.0, 150.0 * 0.02, origin=(100.0, 0.0))
+    np.testing.assert_allclose(controller.volumes(np.array([[100.0, 2000.0], [1100.0, 0.0]])), [6000.0, 3000.0])
+    space = ThresholdController(10.0, 2.0, origin=(0.0, 0.0, 0.0))
+    np.testing.assert_allclose(space.volumes(np.array([[3.0, 0.0, 4.0]])), [2.0 * 3.0 * 5.0])
+    S = np.tile(1e4 * np.eye(2), (2, 1, 1))
+    near, far = controller.p_fa(S, np.array([3000.0, 6000.0]))
+    assert far == pytest.approx(ThresholdController(10.0, 6000.0).p_fa(S)[0])
+    assert near < far, "more cells in the gate ask for a higher threshold"

@@ -9,6 +9,9 @@ from hypothesis import strategies as st
 
 from vidtrack.associate.kbest import k_best
 
+MANY = 10**9
+"""Solutions; more than any search here needs."""
+
 
 def enumerated(offset, held, start, column, cost, alone):
     """Cost of every assignment of every problem, as {(problem, choices): cost}."""
@@ -51,7 +54,7 @@ def random_problems(rng, problems, rows, columns, ties):
 def test_best_assignments_are_those_of_an_enumeration(seed, problems, rows, columns, most, ties):
     given_problems = random_problems(np.random.default_rng(seed), problems, rows, columns, ties)
     every = enumerated(*given_problems)
-    problem, choice, cost = k_best(*given_problems, most, np.inf)
+    problem, choice, cost = k_best(*given_problems, most, np.inf, MANY)
     expected = np.sort(list(every.values()))[:most]
     np.testing.assert_allclose(cost, expected, rtol=1e-12, atol=1e-12)
     ours = {(h, tuple(c)): w for h, c, w in zip(problem.tolist(), choice.tolist(), cost, strict=True)}
@@ -63,7 +66,7 @@ def test_best_assignments_are_those_of_an_enumeration(seed, problems, rows, colu
 def test_what_costs_much_more_than_the_best_is_left_out():
     given_problems = random_problems(np.random.default_rng(5), 3, 4, 4, False)
     every = np.sort(list(enumerated(*given_problems).values()))
-    cost = k_best(*given_problems, 10_000, 1.5)[2]
+    cost = k_best(*given_problems, 10_000, 1.5, MANY)[2]
     np.testing.assert_allclose(cost, every[every <= every[0] + 1.5])
 
 
@@ -71,8 +74,18 @@ def test_impossible_choices_are_never_made():
     """A column that nobody holds is nobody's, whatever it offers."""
     problem, choice, cost = k_best(
         np.zeros(1), np.array([[False]]), np.array([0, 1]), np.array([0]), np.array([-50.0]), np.array([[1.0, 2.0]]),
-        10, np.inf,
+        10, np.inf, MANY,
     )  # fmt: skip
     np.testing.assert_array_equal(choice, [[-1], [-2]])
     np.testing.assert_allclose(cost, [1.0, 2.0])
     np.testing.assert_array_equal(problem, [0, 0])
+
+
+def test_the_work_is_bounded_though_all_assignments_cost_the_same():
+    count = 30
+    start, column = np.arange(0, count * count + 1, count), np.tile(np.arange(count), count)
+    cost, alone = np.zeros(count * count), np.full((count, 2), np.inf)
+    found = k_best(np.zeros(1), np.ones((1, count), bool), start, column, cost, alone, 100_000, np.inf, 50)
+    assert 1 <= len(found[2]) <= 50, "each that is found has been solved"
+    none = k_best(np.zeros(1), np.ones((1, count), bool), start, column, cost, alone, 100_000, np.inf, 0)
+    np.testing.assert_array_equal(none[2], [0.0], "the cheapest is always found")

@@ -61,7 +61,7 @@ def scores(out, folder, max_distance):
 
 def test_a_run_writes_what_it_promises(tmp_path, scenario):
     out = run(scenario("radar-tws"), tmp_path / "out", extras=Extras(decisions=True))
-    names = {"tracks.csv", "tracks.parquet", "summary.json", "tracks.png", "decisions.csv"}
+    names = {"tracks.csv", "tracks.parquet", "summary.json", "tracks.png", "radar.html", "decisions.csv"}
     assert {path.name for path in out.iterdir()} == names
     assert (out / "tracks.csv").read_text().splitlines()[0] == f"{HEADER},{OF_VELOCITY},exchange"
     assert (out / "decisions.csv").read_text().startswith("scan,time_s,track_id,event,")

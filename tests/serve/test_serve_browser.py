@@ -181,3 +181,16 @@ def test_the_token_reaches_everything_that_the_page_loads(tab):
         tab.until("document.querySelector('#one .name')?.textContent === 'gate'")
         tab.until("document.querySelector('#one .picture img').naturalWidth === 640")
         assert camera.pictures > 0
+
+
+def test_the_pictures_of_events_are_shown_with_their_time(tab, tmp_path):
+    name = "2026-11-22T14-03-07.250-0123456789abcdef01234567.jpg"
+    camera = MadeUp()
+    camera.counts = tmp_path / "intervals"
+    (tmp_path / "pictures" / "2026-11-22").mkdir(parents=True)
+    (tmp_path / "pictures" / "2026-11-22" / name).write_bytes(camera.picture())
+    with page_over({"gate": camera}) as url:
+        tab.open(url)
+        tab.until("document.querySelector('.events img')?.naturalWidth === 640")
+        assert text(tab, ".events li") == "14:03:07"
+        assert tab.js("document.querySelector('.events a').href").endswith(f"/camera/gate/pictures/2026-11-22/{name}")

@@ -99,7 +99,7 @@ def test_who_saves_second_is_told_and_nothing_is_lost(desk):
 def test_pages_know_of_each_other_and_of_the_file(desk):
     url, path = desk
     digest = ask_json(url, "drawing")["digest"]
-    assert ask_json(url, "here", {"editor": "a", "open": True}) == {"digest": digest, "others": 0}
+    assert ask_json(url, "here", {"editor": "a", "open": True}) == {"digest": digest, "others": 0, "shown": None}
     assert ask_json(url, "here", {"editor": "b", "open": True})["others"] == 1
     assert ask_json(url, "here", {"editor": "b", "open": False})["others"] == 1
     path.write_text(PLACE + "\n")

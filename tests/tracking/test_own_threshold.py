@@ -26,7 +26,7 @@ def test_a_wide_gate_asks_for_a_higher_threshold():
     cov = np.array([1.0, 100.0])[:, None, None] * np.eye(2)
     amplitude = RAYLEIGH.threshold(np.array([5e-3, 1e-6]))
     scan = Scan(0.0, np.zeros((2, 2)), R, amplitude=amplitude)
-    problem = thresholded(Problem.gated(Gate(gated(2, 4.0)), np.zeros((2, 2)), cov, scan), CONTROLLER)
+    problem = thresholded(Problem.gated(Gate(gated(2, 4.0)), np.zeros((2, 2)), cov, scan), CONTROLLER, np.zeros((2, 2)))
     p_fa = CONTROLLER.p_fa(cov + R)
     assert p_fa[1] < p_fa[0] < 5e-3
     assert set(zip(problem.pairs.row.tolist(), problem.pairs.measurement.tolist(), strict=True)) == {(0, 1), (1, 1)}

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from synthetic_steps import make_tracks
 
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.lines import LineCounter, parse_line, parse_lines
+from vidtrack.traffic.lines import LineCounter, parse_line, parse_lines, segments
 
 GATE = "gate:100,0,100,200"
 
@@ -169,3 +169,29 @@ def test_counts_go_on_from_earlier_ones():
     counter = LineCounter([parse_line(GATE)])
     counter.resume({"gate": {"left": 3, "right": 4}, "gone": {"up": 9}})
     assert counter.totals() == {"gate": {"left": 3, "right": 4}}
+
+
+def test_a_line_with_corners_counts_where_it_is_crossed_and_not_beside_it():
+    """A corner at (100, 100); vehicles cross the one leg, the other, and none: only where the legs would go on."""
+    bent = LineCounter(segments("bend", [(100, 0), (100, 100), (200, 200)]))
+    ways = {(80, 50): (120, 50), (80, 160): (180, 140), (90, 80): (140, 190)}
+    for number, (start, end) in enumerate(ways.items()):
+        for frame, (x, y) in enumerate(np.linspace(start, end, 9)):
+            bent.step(frame, make_tracks(frame / 10, [(number, "c", x, y)]))
+    assert bent.totals() == {"bend": {"left": 0, "right": 2}}
+
+
+def test_other_lines_count_from_now_on_and_the_same_ones_go_on():
+    """The line at 100 stays while the vehicle is on it; that at 200 goes, and one at 150 comes."""
+    stays, goes, comes = (parse_line(f"{name}:{x},0,{x},200") for name, x in (("a", 100), ("b", 200), ("c", 150)))
+    counter = LineCounter([goes, stays])
+    found = []
+    for frame, x in enumerate([60, 80, 99, 101, 120, 140, 160, 180, 220, 240]):
+        if frame == 4:
+            counter.use([stays, comes])
+        found += counter.step(frame, make_tracks(frame / 10, [(1, "c", float(x), 50.0)]))
+    assert [(one.line, one.direction, round(one.time_s, 3)) for one in found] == [
+        ("a", "right", 0.25),
+        ("c", "right", 0.55),
+    ]
+    assert counter.totals() == {"a": {"left": 0, "right": 1}, "c": {"left": 0, "right": 1}}

@@ -61,10 +61,13 @@ class ThresholdController:
     """Sets a tracker's detection threshold in each scan from its innovation covariances (paper 000).
 
     snr          linear SNR of the target
-    cell_volume  V_c of a resolution cell, in the units of the measurement
+    cell_volume  V_c of a resolution cell, in the units of the measurement; with an origin, product of its
+                 sides in m and rad
     gate         g [standard deviations]
     p_fa_max     largest P_F; at 1 every cell is a detection
     method       "exact": optimum of the exact q2; "closed-form": the paper's, for 2 dimensions and gate 4 only
+    origin       (m,) place of a radar whose measurements are positions: cells widen with the distance; None: they are
+                 alike everywhere, as in range and azimuth
     """
 
     snr: float
@@ -72,6 +75,7 @@ class ThresholdController:
     gate: float = 4.0
     p_fa_max: float = 1.0
     method: Literal["exact", "closed-form"] = "exact"
+    origin: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("snr", "cell_volume", "gate"):
@@ -83,13 +87,21 @@ class ThresholdController:
         if self.method == "closed-form" and self.gate != KE_GATE:
             raise ConfigError(f"the closed form is fitted to a gate of 4 and not {self.gate}; use method exact")
 
-    def p_fa(self, S: Floats) -> Floats:
-        """P_F (T,) for innovation covariances S (T, m, m).
+    def volumes(self, zhat: Floats) -> Floats:
+        """(T,) volumes of the resolution cells at predicted measurements (T, m)."""
+        if self.origin is None:
+            return np.full(len(zhat), self.cell_volume)
+        away = zhat - np.array(self.origin)
+        widths = [np.linalg.norm(away[:, :axes], axis=1) for axes in range(2, zhat.shape[1] + 1)]
+        return np.asarray(self.cell_volume * np.prod(widths, axis=0))
+
+    def p_fa(self, S: Floats, cell_volume: float | Floats | None = None) -> Floats:
+        """P_F (T,) for innovation covariances S (T, m, m) and cells of volumes (T,); None: `cell_volume`.
 
         The exact optimum is interpolated in a table, computed once for each SNR, gate and dimension.
         """
         dim = S.shape[-1]
-        cells = gate_volume(S, self.gate) / self.cell_volume
+        cells = gate_volume(S, self.gate) / (self.cell_volume if cell_volume is None else cell_volume)
         if self.method == "exact":
             return np.exp(_interpolated(np.log(cells), _optimum_table(self.snr, self.p_fa_max, dim, self.gate)))
         if dim != KE_DIM:

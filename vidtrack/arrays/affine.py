@@ -12,6 +12,11 @@ from vidtrack.compiled import kernel
 IDENTITY: Floats = np.eye(2, 3)
 
 
+def is_identity(plane: Floats) -> bool:
+    """Whether a map moves nothing; IDENTITY itself, which most maps are, needs no look."""
+    return plane is IDENTITY or bool((plane == IDENTITY).all())
+
+
 @kernel
 def after(second: Floats, first: Floats) -> Floats:
     """The composition: `first`, then `second`."""

@@ -16,7 +16,15 @@ IMPOSSIBLE, FEASIBLE = 1e12, 1e11
 
 @kernel
 def k_best(
-    offset: Floats, held: Mask, start: Ints, column: Ints, cost: Floats, alone: Floats, most: int, slack: float
+    offset: Floats,
+    held: Mask,
+    start: Ints,
+    column: Ints,
+    cost: Floats,
+    alone: Floats,
+    most: int,
+    slack: float,
+    solutions: int,
 ) -> tuple[Ints, Ints, Floats]:
     """The `most` cheapest assignments over all problems; those over `slack` costlier than the cheapest are left out.
 
@@ -27,7 +35,8 @@ def k_best(
 
     A node of the search is a problem whose first rows are fixed as in its parent's solution, and whose next row may
     not make its ancestors' choices. Its bound is its parent's cost plus the smallest remaining reduced cost of that
-    row. It is solved only when its bound is the smallest.
+    row. It is solved only when its bound is the smallest. After so many `solutions` the search ends with what it has
+    found, the cheapest at least, so that its work is bounded however many assignments cost nearly the same.
     """
     rows, cheapest = len(start) - 1, 0.0
     for i in range(rows):
@@ -50,6 +59,8 @@ def k_best(
             break
         h = problem[node]
         if solution[node] < 0:
+            if solved >= solutions and found:
+                break
             if solved == len(choices):
                 choices, gaps = _doubled(choices), _doubled(gaps)
             bans.clear()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from vidtrack.associate.generalized_nn import GeneralizedNN
 from vidtrack.associate.hard import GNN, NN, Associator
@@ -18,6 +19,7 @@ METHODS: dict[str, Callable[[], Associator]] = {
     "psn": PSN,
     "pda": PDA,
     "jpda": JPDA,
+    "jpda-star": partial(JPDA, star=True),
 }
 """They take no arguments: each problem holds all data."""
 

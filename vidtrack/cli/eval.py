@@ -53,7 +53,7 @@ SECTIONS = {
     },
     "consistency": {
         "nis": "mean normalised innovation squared",
-        "nis_low": "... lower 95 % bound of independent errors; video's last",
+        "nis_low": "... lower 95 % bound; not of video, whose errors last",
         "nis_high": "... upper 95 % bound, likewise",
         "nis_inside": "share below the 95 % quantile",
         "nis_samples": "number of values",

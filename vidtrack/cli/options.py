@@ -25,6 +25,8 @@ SETTING = {
     "detector": "detector.kind",
     "estimator": "radar.estimator",
     "model": "radar.model",
+    "snr_db": "radar.snr_db",
+    "group": "radar.group_link_m",
     "start": "source.start_s",
     "end": "source.end_s",
     "scale": "source.scale",

@@ -36,6 +36,8 @@ class RadarOptions(TrackingOptions):
     smooth: bool | None
     estimator: str | None
     model: str | None
+    snr_db: float | None
+    group: float | None
     skip_bad_rows: bool | None
     radar_position: tuple[float, float, float] | None
 
@@ -49,6 +51,8 @@ Examples:
   vidtrack radar recording.pcap --set radar.sac=25 --set radar.sic=201 --radar-position 45.74,16.07,105
   vidtrack radar udp://239.1.2.3:8600 -o live
   vidtrack radar north.csv south.csv --radars radars.toml -o picture
+  vidtrack radar plots.csv --method pda --snr-db 13 --set radar.cell_range_m=150 --set radar.cell_azimuth_deg=1.5
+  vidtrack radar formation.csv --group 300
   vidtrack radar radar.csv --radars radars.toml --camera traffic.mp4 --site site.toml
   vidtrack simulate radar-tws -o tws && vidtrack radar tws/plots.csv -o run && vidtrack eval run tws/truth.csv""",
 )
@@ -77,6 +81,13 @@ Examples:
     help="Filter of each track.  [default: imm]",
 )
 @click.option("--model", type=choice(names.Model), help="How targets move.  [default: ct for imm, else cv]")
+@click.option(
+    "--snr-db",
+    type=float,
+    metavar="DB",
+    help="Each track sets its own detection threshold, the best for targets of this SNR; plots need amplitudes.",
+)
+@click.option("--group", type=float, metavar="M", help="Track groups: plots at most so many metres apart are one.")
 @click.option(
     "--skip-bad-rows", is_flag=True, default=None, help="Leave out rows that cannot be right, and count them."
 )

@@ -76,6 +76,8 @@ def install(options: InstallOptions) -> int:
         click.echo(unit.text(), nl=False)
         return 0
     _check_user(unit)
+    if Path(sys.executable).is_relative_to("/tmp"):
+        raise ConfigError(f"{sys.executable} lies in /tmp, of which a service has one of its own; install it elsewhere")
     try:
         Path(unit.path).write_text(unit.text(), encoding="utf-8")
     except OSError as error:
@@ -159,4 +161,4 @@ def _systemctl(order: list[str]) -> None:
     except OSError as error:
         raise ConfigError(f"cannot call systemctl: {error.strerror}; this machine is not run by systemd") from None
     if result.returncode:
-        raise ConfigError(f"systemctl {' '.join(order)} failed: {result.stderr.strip().splitlines()[-1:]}")
+        raise ConfigError(f"systemctl {' '.join(order)} failed: {' '.join(result.stderr.split())}")

@@ -19,6 +19,7 @@ VIDEO = ("crossing", "crossing-45", "nine", "junction")
 ROADS = ("road", "junction-3d", "roundabout", "motorway")
 RADAR = (
     "radar-tws",
+    "radar-uneven",
     "radar-incoming",
     "radar-altitude",
     "radar-speed",
@@ -176,6 +177,7 @@ def command(options: SimulateOptions) -> None:
 
     \b
     radar-tws         track while scan: eight aircraft, two of them turn with 2.5 g, Weibull clutter
+    radar-uneven      the same in Rayleigh clutter, with two patches of land: 37 false plots a scan
     radar-incoming    one aircraft comes in, seen 7.7 times a second in range, azimuth and elevation
     radar-altitude    the same, its altitude swings by 300 m
     radar-speed       the same, it accelerates with 2.5 g from 200 to 350 m/s

@@ -93,6 +93,7 @@ def command(options: SiteOptions) -> None:
 def desk_of(options: SiteOptions) -> Desk:
     """What the options ask for. Raises an Error for a run, a site or a picture that does not fit."""
     from vidtrack.errors import SourceError
+    from vidtrack.output.scene import SCENE
     from vidtrack.recording.retention import parts_of
     from vidtrack.serve.site.app import Desk
     from vidtrack.serve.site.file import SiteFile
@@ -116,8 +117,9 @@ def desk_of(options: SiteOptions) -> Desk:
     if options.plan is not None:
         read_world(options.plan)  # refuses what is none
         plan = options.plan, _encoded(str(options.plan), None)
-    scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts)
-    return Desk(run.name, recount, file, new, scene, plan)
+    live = run / SCENE if options.picture is None and run != parts[-1] else None
+    scene = _encoded(options.picture, drawn) if options.picture is not None else _scene(parts, live)
+    return Desk(run.name, recount, file, new, scene, plan, live)
 
 
 def _tracked_with(run: Path) -> Path | None:
@@ -132,8 +134,8 @@ def _name(folder: str) -> str:
     return re.sub(r"[^\w .-]+", "_", folder).strip("_ .-")[:64].strip() or "site"
 
 
-def _scene(runs: list[Path]) -> Picture | None:
-    """The newest scene; of a run without one, its paths over it. A part of a live run has one when it has ended."""
+def _scene(runs: list[Path], live: Path | None) -> Picture | None:
+    """The newest scene of ended parts; of those without one, their paths over it."""
     from vidtrack.output.scene import SCENE
     from vidtrack.serve.site.app import Picture
 
@@ -141,7 +143,8 @@ def _scene(runs: list[Path]) -> Picture | None:
         for name, kind in ((SCENE, "image/jpeg"), ("tracks.png", "image/png")):
             if (run / name).is_file():
                 return Picture(name, (run / name).read_bytes(), kind)
-    log.warning("%s has no picture yet, so the page is grey; give one with --picture", runs[-1])
+    if live is None or not live.is_file():
+        log.warning("%s has no picture yet, so the page is grey; give one with --picture", runs[-1])
     return None
 
 

@@ -57,6 +57,21 @@ _UNREAD = {
 }
 """Groups and settings without effect on an input."""
 
+
+class _Given:
+    """Equal to every value but None."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        return other is not None
+
+    def __str__(self) -> str:
+        return "NUMBER"
+
+
+GIVEN = _Given()
+
 _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "detector.disturbance": ("detector.kind", ("disturbance",)),
     "detector.disturbance.chroma_threshold": ("detector.disturbance.chroma", (True,)),
@@ -81,6 +96,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.particles": ("radar.estimator", ("particle",)),
     "radar.resampling": ("radar.estimator", ("particle",)),
     "radar.glint": ("radar.estimator", ("particle",)),
+    "radar.clutter_map": ("radar.clutter_density", (None,)),
     "radar.quiet_accel": ("radar.estimator", ("imm",)),
     "radar.quiet_s": ("radar.estimator", ("imm",)),
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
@@ -88,12 +104,22 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.cell_range_m": ("radar.unresolved", (True,)),
     "radar.cell_azimuth_deg": ("radar.unresolved", (True,)),
     "radar.cell_elevation_deg": ("radar.unresolved", (True,)),
+    "radar.pfa_max": ("radar.snr_db", (GIVEN,)),
+    "radar.group_merge_m": ("radar.group_link_m", (GIVEN,)),
     "live.keep_pictures_s": ("events.pictures", (True,)),
     "live.keep_pictures_bytes": ("events.pictures", (True,)),
     "output.every_s": ("output.level", ("tracks", "all")),
     "output.smooth_lag_s": ("output.smooth", (True,)),
 }
 """Groups and settings that have an effect only if another setting has one of these values."""
+
+_CELL = ("cell_range_m", "cell_azimuth_deg", "cell_elevation_deg")
+
+_REPLACED: Mapping[str, tuple[str, ...]] = {
+    "radar.snr_db": ("radar.detection_probability", "radar.clutter_density", "radar.clutter_map"),
+    "radar.group_link_m": tuple(f"radar.{name}" for name in ("unresolved", *_CELL)),
+}
+"""Settings without effect if this one is given."""
 _OTHER_LIFE = {Input.RADAR: "radar.life"}
 
 
@@ -106,6 +132,9 @@ def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Settings on which the effect of this one depends, each with its required values."""
     if name == "output.link_s":  # stored detections are linked by default
         yield "output.link", (True, None) if kind is Input.DETECTIONS else (True,)
+    for other, idle in _REPLACED.items():
+        if name in idle:
+            yield other, (None,)
     for part, (other, values) in _NEEDS.items():
         if _is_within(name, part):
             yield _OTHER_LIFE.get(kind, other) if other == "tracker.life" else other, values

@@ -46,6 +46,8 @@ class RadarSettings(Group):
     """probability that a scan shows a target; None: from the tracks so far"""
     clutter_density: float | None = Field(None, gt=0)
     """false plots per scan and unit of measurement space (m^2, m^3, m rad, ...); None: from unassociated plots"""
+    clutter_map: bool = True
+    """the density of false plots is learnt by place; false: it is the same everywhere"""
     max_speed: float = Field(400.0, gt=0)
     """m/s; fastest target; a new track's velocity is unknown by half of it in each direction"""
     accel: float = Field(8.0, gt=0)
@@ -76,6 +78,14 @@ class RadarSettings(Group):
     """degrees; the same in azimuth"""
     cell_elevation_deg: float | None = Field(None, gt=0, le=90)
     """degrees; the same in elevation"""
+    snr_db: float | None = Field(None, ge=0, le=60)
+    """dB; mean SNR of targets, by which each track sets a detection threshold of its own; None: all plots are used"""
+    pfa_max: float | None = Field(None, gt=0, le=1)
+    """P_FA with which the plots were detected, the highest that tracks may set; None: from the weakest plot"""
+    group_link_m: float | None = Field(None, gt=0)
+    """m; plots no farther apart are one group, and groups are tracked; None: single targets"""
+    group_merge_m: float | None = Field(None, gt=0)
+    """m; groups whose middles are closer become one; None: radar.group_link_m"""
     life: Life = "llr"
     """what confirms a track, as tracker.life; in clutter the score (llr), which also ends tracks, is better"""
     coast_scans: int = Field(5, ge=1, le=62)

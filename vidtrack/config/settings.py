@@ -63,7 +63,7 @@ class TrackerSettings(Group):
     """Object size is the longer side of a vehicle's box."""
 
     method: Method = "gnn"
-    """association: one measurement (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda), deferred (split, mht)"""
+    """association: one (nn, gnn, sn), weights (generalized-nn, psn, pda, jpda, jpda-star), later (split, mht)"""
     n_scan: int = Field(3, ge=1, le=20)
     """scans after which split and mht decide"""
     distance: Distance = "mahalanobis"

@@ -99,7 +99,8 @@ def draw_lines(pen: Pen, lines: Sequence[Line], totals: Mapping[str, Mapping[str
     """Counting lines with their names and, given totals, their counts; returns the patches of the labels."""
     for line in lines:
         pen.path([[line.x1, line.y1], [line.x2, line.y2]], LINE)
-    return [pen.label(counted(k.name, (totals or {}).get(k.name, {})), k.x1, k.y1, LINE) for k in lines]
+    named = {line.name: line for line in reversed(lines)}.values()  # the first part of each
+    return [pen.label(counted(k.name, (totals or {}).get(k.name, {})), k.x1, k.y1, LINE) for k in named]
 
 
 def moved_lines(lines: Sequence[Line], motion: Floats | None) -> list[Line]:
@@ -107,7 +108,7 @@ def moved_lines(lines: Sequence[Line], motion: Floats | None) -> list[Line]:
     if motion is None:
         return list(lines)
     ends = [affine.points(motion, np.array([[k.x1, k.y1], [k.x2, k.y2]])).ravel().tolist() for k in lines]
-    return [Line(k.name, *end) for k, end in zip(lines, ends, strict=True)]
+    return [Line(k.name, x1, y1, x2, y2) for k, (x1, y1, x2, y2) in zip(lines, ends, strict=True)]
 
 
 def draw_clock(pen: Pen, clock: str, facts: Iterable[str] = ()) -> None:

@@ -14,10 +14,18 @@ from pathlib import Path
 
 from vidtrack.errors import OutputError, StoppedEarly
 
-LINE_FILES = ("tracks.csv", "mot.txt", "counts.csv", "decisions.csv", "registration.csv")
+LINE_FILES = ("tracks.csv", "mot.txt", "counts.csv", "decisions.csv", "registration.csv", "groups.csv")
 """The files of a run's folder that are written line by line; `vidtrack repair` cuts a half-written last line."""
 
-RESULTS = (*LINE_FILES, "tracks.parquet", "tracks.parquet.parts", "summary.json", "tracks.png", "scene.jpg")
+RESULTS = (
+    *LINE_FILES,
+    "tracks.parquet",
+    "tracks.parquet.parts",
+    "summary.json",
+    "tracks.png",
+    "scene.jpg",
+    "radar.html",
+)
 """All files of a run's folder; `--force` replaces these and keeps other files."""
 
 

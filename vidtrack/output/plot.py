@@ -13,7 +13,7 @@ from vidtrack.compiled import kernel
 from vidtrack.output.colours import colour
 from vidtrack.output.draw import Patch, Pen, draw_lines
 from vidtrack.output.folder import replacing
-from vidtrack.output.scene import SCENE, jpeg
+from vidtrack.output.scene import write_scene
 from vidtrack.output.sink import Step
 from vidtrack.tracks import Tracks
 from vidtrack.traffic.lines import Line
@@ -92,8 +92,7 @@ class TrajectoryPlot:
         scene = np.full((*self._shape, 3), 60, np.uint8)
         if self._scene and self._stepped:
             scene = self._scene()
-            with replacing(self._path.with_name(SCENE)) as new:
-                new.write_bytes(jpeg(scene))
+            write_scene(self._path.parent, scene)
         picture = np.asarray(cv2.resize(scene, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
         _lay_over(self._layer, picture)
         pen = Pen(picture)

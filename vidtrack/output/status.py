@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from vidtrack.compiled import compiling
 from vidtrack.config.settings import OutputSettings
 from vidtrack.output.annotated_picture import annotated_jpeg
 from vidtrack.output.sink import Step
@@ -26,7 +27,8 @@ _RATE_S = 5.0  # time over which fps_out is counted, and after which tracks are 
 class Account:
     """State and counters of a live source.
 
-    state     "connecting", "running", "waiting" (before the next attempt) or "ended"
+    state     "connecting", "compiling" (before the first frame), "running", "waiting" (before the next attempt) or
+              "ended"
     reading   counters as in summary.json: width, height, fps_in, frames_dropped, reconnects, stalls, lost, ...
     problems  (Unix time [s], message) of the last problems
     failing   outputs that cannot be written now, and why
@@ -139,7 +141,7 @@ class StatusBoard:
         age_s = now_s - done[-1] if done else None
         fresh = age_s is not None and age_s < _RATE_S
         return LiveStatus(
-            state=account.state,
+            state="compiling" if step is None and account.state == "running" and compiling() else account.state,
             reading=account.reading,
             problems=account.problems,
             failing=account.failing,

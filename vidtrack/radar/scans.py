@@ -104,9 +104,9 @@ def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
     """Plots in the coordinates of the settings' estimator.
 
     NONLINEAR estimators use range and angles directly; others use positions, converted without bias. A range rate is
-    linearised; alpha-beta uses positions only.
+    linearised; alpha-beta and groups use positions only.
     """
-    if settings.estimator == "alpha-beta":
+    if settings.estimator == "alpha-beta" or settings.group_link_m is not None:
         plots = plots.without_range_rate()
     z, R = plots.z, np.einsum("ni,ij->nij", plots.sigma**2, np.eye(plots.sigma.shape[1]))
     sensor: Sensor = PositionRangeRate(settings.position[: plots.dim]) if plots.doppler else POSITION
@@ -141,6 +141,15 @@ def surveyed(found: Measurements) -> float:
     for angle in found.sensor.angles:
         sides[angle] = _sector(found.z[:, angle])
     return float((sides + _margin(found)).prod())
+
+
+def extent(found: Measurements) -> tuple[Floats, Floats]:
+    """Lowest and highest (2,) values of the first two axes of the measurement space that is surveyed; angles: all."""
+    margin = _margin(found)[:2] / 2
+    low, high = found.z[:, :2].min(axis=0) - margin, found.z[:, :2].max(axis=0) + margin
+    for angle in set(found.sensor.angles) & {0, 1}:
+        low[angle], high[angle] = -np.pi, np.pi
+    return low, high
 
 
 def _margin(found: Measurements) -> Floats:

@@ -6,20 +6,19 @@ import logging
 import os
 import time
 from collections import deque
-from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime, tzinfo
 from pathlib import Path
 
 from vidtrack.errors import Error
 from vidtrack.output.annotated_picture import annotated_jpeg
-from vidtrack.output.events.event import Event
+from vidtrack.output.events.event import PICTURES, Event
 from vidtrack.output.folder import replacing, writing
 from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Limits
-from vidtrack.traffic.lines import Line
+from vidtrack.traffic.lines import LineCounter
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +33,7 @@ class EventPictures:
         pictures/2026-11-22/2026-11-22T14-03-07.250-ID.jpg
 
     root     folder above `pictures`
-    lines    to draw
+    counter  whose lines are drawn; None without any
     zone     of the days and of the clock on the pictures
     quality  of JPEG, 1 to 100
     limits   beyond which the oldest pictures are deleted
@@ -43,10 +42,16 @@ class EventPictures:
     """
 
     def __init__(
-        self, root: Path, lines: Sequence[Line], zone: tzinfo | None, quality: int, limits: Limits, reserve: Reserve
+        self,
+        root: Path,
+        counter: LineCounter | None,
+        zone: tzinfo | None,
+        quality: int,
+        limits: Limits,
+        reserve: Reserve,
     ) -> None:
         self._root = root
-        self._lines, self._zone, self._quality = lines, zone, quality
+        self._counter, self._zone, self._quality = counter, zone, quality
         self._limits, self._reserve = limits, reserve
         self._recent: deque[Step] = deque(maxlen=round(_KEPT_S / _EVERY_S))
         self._due = Every(_PRUNE_S)
@@ -67,13 +72,14 @@ class EventPictures:
         step = min(recent, key=lambda one: abs(one.time_s - time_s))
         when = datetime.fromtimestamp(event.unix_s, self._zone)
         stamp = f"{when:%Y-%m-%dT%H-%M-%S}.{when.microsecond // 1000:03d}"
-        path = Path("pictures", f"{when:%Y-%m-%d}", f"{stamp}-{event.id}.jpg")
+        path = Path(PICTURES, f"{when:%Y-%m-%d}", f"{stamp}-{event.id}.jpg")
+        lines = self._counter.lines if self._counter else ()
         try:
             self._reserve.check_recordings(self._root)
             with writing(self._root / path):
                 (self._root / path).parent.mkdir(parents=True, exist_ok=True)
             with replacing(self._root / path) as new:
-                new.write_bytes(annotated_jpeg(step, self._lines, None, when, self._quality))
+                new.write_bytes(annotated_jpeg(step, lines, None, when, self._quality))
         except (Error, OSError) as error:
             log.warning("an event has no picture: %s", error)
             return None
@@ -84,7 +90,7 @@ class EventPictures:
         if not (self._limits and self._due()):
             return
         taken = 0.0
-        found = [entry for day in (self._root / "pictures").glob("*") if day.is_dir() for entry in os.scandir(day)]
+        found = [entry for day in (self._root / PICTURES).glob("*") if day.is_dir() for entry in os.scandir(day)]
         for entry in sorted(found, key=lambda entry: entry.name, reverse=True):
             with suppress(OSError):
                 status = entry.stat()
@@ -92,6 +98,6 @@ class EventPictures:
                 old = self._limits.seconds is not None and time.time() - status.st_mtime > self._limits.seconds
                 if old or (self._limits.size is not None and taken > self._limits.size):
                     os.unlink(entry.path)
-        for day in (self._root / "pictures").glob("*"):
+        for day in (self._root / PICTURES).glob("*"):
             with suppress(OSError):
                 day.rmdir()  # if it is empty

@@ -59,6 +59,10 @@ class NoRecorder(NoPacketSink):
         """False."""
         return False
 
+    def may_change(self, place: Place) -> bool:
+        """True."""
+        return True
+
     def log_frame(self, frame: Frame, place: Place, beginning: Beginning | None) -> None:
         """Do nothing."""
 
@@ -93,6 +97,7 @@ class Recorder:
     ) -> None:
         self.lost = 0
         self.failing: str | None = None
+        self._wanted = False  # a part, with the next key picture
         self._root = usable(root)
         self._reserve = reserve
         self._tell = tell
@@ -167,6 +172,15 @@ class Recorder:
         """Whether the frame at this place is the first tracked frame of its part."""
         return place[0] not in (self._logged, _NOWHERE[0])
 
+    def may_change(self, place: Place) -> bool:
+        """Whether another site may be used from the frame at this place on: its part has the new one, or it is in none.
+
+        If not, a part begins with the next key picture.
+        """
+        may = place[0] == _NOWHERE[0] or self.begins(place)
+        self._wanted |= not may and place[0] == self._part  # else one has begun, and its frames come soon
+        return may
+
     def log_frame(self, frame: Frame, place: Place, beginning: Beginning | None) -> None:
         """Log the frame that is tracked next; `beginning` if it `begins` a part."""
         part, packet = place
@@ -195,7 +209,7 @@ class Recorder:
     def _due(self, muxer: Muxer) -> bool:
         limit = self._retention.recordings_part
         large = limit is not None and muxer.size + self._state_bytes > limit
-        return large or self._period != self._now()
+        return large or self._wanted or self._period != self._now()
 
     def _now(self) -> int:
         """Number of the current period of `roll_s` seconds."""
@@ -203,6 +217,7 @@ class Recorder:
 
     def _begin(self, connection: Connection) -> None:
         folder = new_part(self._root)
+        self._wanted = False
         self._part += 1
         self._folders[self._part] = folder
         self._period = self._now()

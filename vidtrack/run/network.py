@@ -17,10 +17,8 @@ from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 from vidtrack.radar.network.network import Feed, Network, read_feeds
 from vidtrack.radar.network.radars import Radars, read_radars
-from vidtrack.radar.scans import surveyed
-from vidtrack.run.radar import build_point_tracker, radar_sinks
+from vidtrack.run.radar import build_point_tracker, radar_sinks, rates
 from vidtrack.run.run import Extras, Pipeline, Run
-from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.station import Station
 from vidtrack.tracking.tracker import Tracker
 
@@ -59,9 +57,9 @@ def network_pipeline(
 
     def reading() -> dict[str, object]:
         own = zip(network.feeds, tracker.stations.each, strict=True)
-        rates = {feed.placed.name: station.rates.as_dict() for feed, station in own}
+        learnt = {feed.placed.name: station.rates.as_dict() for feed, station in own}
         biases = network.as_dict()
-        return account | {"radars": {name: rates[name] | biases[name] for name in rates}}
+        return account | {"radars": {name: learnt[name] | biases[name] for name in learnt}}
 
     def summary(folder: Path) -> Summary:
         return Summary(folder / "summary.json", ", ".join(paths), settings, reading, unit="scans")
@@ -126,4 +124,4 @@ def build_network_tracker(settings: Settings, network: Network, *, explain: bool
 def _station(feed: Feed, settings: RadarSettings) -> Station:
     own = feed.placed.radar.detection_probability
     detection = settings.detection_probability if own is None else own
-    return Station(Rates(detection, settings.clutter_density, surveyed(feed.found)), feed.coverage)
+    return Station(rates(settings, feed.found, detection), feed.coverage)

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from vidtrack.amplitude.reduction import gated
+from vidtrack.amplitude.threshold import ThresholdController
+from vidtrack.associate.gate import Gate, quantile
 from vidtrack.associate.methods import STRENGTH
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import Confirmed
 from vidtrack.output.decisions import DecisionLog
+from vidtrack.output.groups import GroupTable
 from vidtrack.output.linked import refuse_link
+from vidtrack.output.radar_page import RadarPage
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.sink import Sink
 from vidtrack.output.smoothed import smoothed_first
@@ -23,10 +28,13 @@ from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable
 from vidtrack.output.threaded import Threaded
 from vidtrack.radar.filters import estimator, motion
+from vidtrack.radar.own_threshold import GATE, controller
 from vidtrack.radar.reading import read
-from vidtrack.radar.scans import Measurements, measurements, surveyed
+from vidtrack.radar.scans import Measurements, extent, measurements, surveyed
+from vidtrack.run.groups import Groups
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
+from vidtrack.tracking.clutter import ClutterMap
 from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import NoPicture
@@ -82,17 +90,28 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
         count=found.count,
         steps=scan_steps(found, tracker, settings.tracker.redundant),
         summary=summary,
-        sinks=partial(radar_sinks, settings, extras, found.dim, [settings.radar.position[:2]]),
+        sinks=partial(radar_sinks, settings, extras, found.dim, [settings.radar.position[:2]], now=lambda: tracker),
     )
 
 
 def radar_sinks(
-    settings: Settings, extras: Extras, dim: int, radars: Sequence[tuple[float, float]], folder: Path
+    settings: Settings,
+    extras: Extras,
+    dim: int,
+    radars: Sequence[tuple[float, float]],
+    folder: Path,
+    now: Callable[[], Tracker | Groups | None] = lambda: None,
 ) -> Iterator[Sink]:
-    """The sinks of a run over plots in `dim` dimensions of radars at these places (x, y)."""
+    """The sinks of a run over plots in `dim` dimensions of radars at these places (x, y).
+
+    now  returns the tracker of one radar, once there is one
+    """
     table = TrackTable(folder, RADAR if dim == 2 else RADAR_3D)
     plot = RadarPlot(folder / "tracks.png", radars)
-    yield Confirmed(*smoothed_first(settings.output, table, plot), hold_s=math.inf)  # scans may be far apart
+    page = RadarPage(folder / "radar.html", radars, lambda: _clutter_map(now()))
+    yield Confirmed(*smoothed_first(settings.output, table, plot, page), hold_s=math.inf)  # scans may be far apart
+    if settings.radar.group_link_m is not None:
+        yield GroupTable(folder / "groups.csv", lambda: _sizes(now()))
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv", index="scan")
     if extras.rerun is not None:
@@ -101,14 +120,41 @@ def radar_sinks(
         yield Threaded(RadarRerun(extras.rerun, settings))
 
 
-def build_radar_tracker(settings: Settings, found: Measurements, *, explain: bool = False, seed: int = 0) -> Tracker:
+def _sizes(tracker: Tracker | Groups | None) -> list[tuple[int, int, int]]:
+    """Those of groups."""
+    return tracker.sizes() if isinstance(tracker, Groups) else []
+
+
+def _clutter_map(tracker: Tracker | Groups | None) -> dict[str, Any] | None:
+    """Where the clutter is, if a map of it has been learnt."""
+    where = None if tracker is None else tracker.rates.where
+    if not isinstance(where, ClutterMap):
+        return None
+    density = where.density.round(3).tolist()
+    return {"low": where.low.tolist(), "high": where.high.tolist(), "density": density, "polar": where.polar}
+
+
+def build_radar_tracker(
+    settings: Settings, found: Measurements, *, explain: bool = False, seed: int = 0
+) -> Tracker | Groups:
     """The tracker of the settings for these measurements in metres; `seed` is for the particle filter.
 
-    Raises ConfigError for a filter without a smoother, or a method that needs amplitudes where there are none.
+    Raises ConfigError for a filter without a smoother, a method that needs amplitudes where there are none, and
+    settings that exclude each other.
     """
     radar = settings.radar
-    station = Station(Rates(radar.detection_probability, radar.clutter_density, surveyed(found)))
+    learnt = rates(radar, found, radar.detection_probability)
+    if radar.group_link_m is not None:
+        return Groups(settings, found, learnt, seed)
+    station = Station(learnt)
     return build_point_tracker(settings, [found], [radar.position], [station], explain=explain, seed=seed)
+
+
+def rates(radar: RadarSettings, found: Measurements, detection: float | None) -> Rates:
+    """Detection probability and clutter density of the radar that made these measurements."""
+    mapped = radar.clutter_map and radar.clutter_density is None
+    where = ClutterMap(*extent(found), polar=bool(found.sensor.angles)) if mapped else None
+    return Rates(detection, radar.clutter_density, surveyed(found), where)
 
 
 def build_point_tracker(
@@ -131,12 +177,16 @@ def build_point_tracker(
         )
     if settings.output.smooth and radar.estimator == "alpha-beta":
         raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
+    if radar.group_link_m is not None or (radar.snr_db is not None and len(found) > 1):
+        raise ConfigError("radar.group_link_m and radar.snr_db are for one radar; leave them out")
     sharing = _sharing(radar, [place[:dim] for place in places])
+    admits, threshold = _gate_and_threshold(settings, found[0])
     return Tracker(
         model=motion(radar, dim),
         estimator=estimator(radar, found[0], seed),
         associate=rule(common, unresolved=isinstance(sharing, Unresolved)),
-        gate=gate(common, radar.euclidean_radius_m, adaptive=True),
+        gate=admits,
+        threshold=threshold,
         life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
         picture=NoPicture(),
         sharing=sharing,
@@ -144,6 +194,20 @@ def build_point_tracker(
         explain=explain,
         smooth=settings.output.smooth,
     )
+
+
+def _gate_and_threshold(settings: Settings, found: Measurements) -> tuple[Gate, ThresholdController | None]:
+    """The gate, and the controller of the detection threshold, whose gate has a fixed width."""
+    radar, common = settings.radar, settings.tracker
+    if radar.snr_db is None:
+        return gate(common, radar.euclidean_radius_m, adaptive=True), None
+    if common.distance != "mahalanobis":
+        raise ConfigError(
+            f"radar.snr_db needs the distance mahalanobis, and not {common.distance}; leave one of them out"
+        )
+    dim, share = found.z.shape[1], common.gate_probability
+    width = GATE if share is None else math.sqrt(quantile(share, dim))
+    return Gate(gated(dim, width)), controller(radar, found, width)
 
 
 def _sharing(radar: RadarSettings, places: Sequence[tuple[float, ...]]) -> Sharing:

@@ -17,6 +17,7 @@ from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.radar.feeds.stream import SILENT_SCANS, ScanStream
 from vidtrack.radar.feeds.udp import UdpFeed
+from vidtrack.run.groups import Groups
 from vidtrack.run.radar import build_radar_tracker, radar_sinks
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
@@ -53,7 +54,7 @@ def feed_pipeline(
     """The pipeline of a feed. Raises SourceError, ConfigError; its steps raise PlotFormatError."""
     refuse_link(settings.output, "radar runs")
     stream = ScanStream(settings.radar, address)
-    trackers: list[Tracker] = []
+    trackers: list[Tracker | Groups] = []
 
     def account() -> dict[str, Any]:
         origin = stream.plane and {"origin": [stream.plane.latitude, stream.plane.longitude, stream.plane.height]}
@@ -78,7 +79,9 @@ def feed_pipeline(
             count=None,
             steps=steps(feed),
             summary=lambda folder: Summary(folder / "summary.json", address, settings, account, unit="scans"),
-            sinks=partial(radar_sinks, settings, extras, 2, [settings.radar.position[:2]]),
+            sinks=partial(
+                radar_sinks, settings, extras, 2, [settings.radar.position[:2]], now=lambda: next(iter(trackers), None)
+            ),
         )
 
 

@@ -128,6 +128,8 @@ def build_road_tracker(
 ) -> Tracker:
     """The tracker in metres: a station for each radar, then one for the camera; each may lose sight of a vehicle."""
     radar, common = settings.radar, settings.tracker
+    if radar.group_link_m is not None or radar.snr_db is not None:
+        raise ConfigError("radar.group_link_m and radar.snr_db are for one radar without a camera; leave them out")
     stations = [
         Station(
             Rates(

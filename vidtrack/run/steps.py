@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from time import perf_counter
+from typing import Protocol
 
 from vidtrack.associate.redundancy import combined
 from vidtrack.output.sink import Step
 from vidtrack.scan import Scan
-from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import Tracks
 
 
-def scan_steps(scans: Iterable[tuple[int, Scan]], tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:
+class Stepping(Protocol):
+    """What takes scans and gives tracks: a tracker of targets or of groups."""
+
+    def step(self, scan: Scan) -> Tracks: ...
+
+
+def scan_steps(scans: Iterable[tuple[int, Scan]], tracker: Stepping, redundant: float | None = None) -> Iterator[Step]:
     """Yields a step for each (number, scan), with the tracks after it.
 
     redundant  probability with which two measurements of one target are combined first; None: they are not combined

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from itertools import pairwise
@@ -25,13 +25,14 @@ from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.traffic.metres import footprints_of
+from vidtrack.traffic.site import read_site
 from vidtrack.video import background
 from vidtrack.video.background.disturbance import Disturbance
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Background
-from vidtrack.video.frame import Frame
-from vidtrack.video.mask import read_mask
+from vidtrack.video.frame import Frame, Image
+from vidtrack.video.mask import Corners, read_mask, without
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import Source, open_source
 
@@ -124,10 +125,20 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
 
 
 def build_detector(settings: Settings) -> Background:
-    """The detector of the settings. Raises ConfigError for a mask that is not a picture."""
-    path = settings.source.mask
-    keep = None if path is None else read_mask(path)
+    """The detector of the settings, with the masks of their site. Raises ConfigError for a bad mask or site."""
+    site = settings.output.site
+    drawn = None if site is None else read_site(site)
+    keep = kept(settings) if drawn is None else kept(settings, drawn.masked, drawn.camera.width, drawn.camera.height)
     return background.create(settings.detector, settings.source.scale, keep)
+
+
+def kept(settings: Settings, masked: Sequence[Corners] = (), width: int = 0, height: int = 0) -> Image | None:
+    """Where traffic is looked for: by the mask of the settings, without the areas in a picture of this size [px].
+
+    None: everywhere. Raises ConfigError.
+    """
+    path = settings.source.mask
+    return without(None if path is None else read_mask(path), masked, width, height)
 
 
 def look_ahead(source: Source, detector: Background, settings: Settings) -> None:

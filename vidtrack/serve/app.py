@@ -18,6 +18,7 @@ from starlette.staticfiles import StaticFiles
 from vidtrack.serve.camera import Camera, Shared, Status
 from vidtrack.serve.counts import Counts
 from vidtrack.serve.metrics import CONTENT_TYPE, metrics
+from vidtrack.serve.pictures import Pictures
 
 log = logging.getLogger(__name__)
 
@@ -33,12 +34,13 @@ class Answers:
     """
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
-        self._counts = Counts(cameras)
+        self._counts, self._events = Counts(cameras), Pictures(cameras)
         self.show(cameras)
 
     def show(self, cameras: Mapping[str, Camera]) -> None:
         """Show these cameras from now on."""
         self._counts.show(cameras)
+        self._events.show(cameras)
         self._pictures = [Shared(camera.picture, _PICTURE_S) for camera in cameras.values()]
         self._cameras = [(name, camera, Shared(camera.status, _STATUS_S)) for name, camera in cameras.items()]
 
@@ -53,6 +55,7 @@ class Answers:
                 Route("/metrics", self.metrics),
                 Route("/healthz", self.healthz),
                 *self._counts.routes(),
+                *self._events.routes(),
                 Mount("/static", StaticFiles(directory=_STATIC)),
             ],
             exception_handlers={Exception: _failed},

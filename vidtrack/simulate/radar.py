@@ -18,6 +18,15 @@ GLINT_FACTOR = 5.0
 
 
 @dataclass(frozen=True, slots=True)
+class Patch:
+    """A part of the coverage, between two corners, with `more` times as many false plots in addition."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    more: float
+
+
+@dataclass(frozen=True, slots=True)
 class Radar:
     """What the radar can see and how well; range [m], azimuth [deg][, elevation [deg]].
 
@@ -31,6 +40,7 @@ class Radar:
     glint      probability that a component of a plot has GLINT_FACTOR times its standard deviation
     place      (x, y, z) of the radar [m]
     start_s    time of the first scan
+    patches    parts with more clutter
     """
 
     scan_s: float
@@ -44,6 +54,7 @@ class Radar:
     glint: float = 0.0
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_s: float = 0.0
+    patches: tuple[Patch, ...] = ()
 
     @property
     def dim(self) -> int:
@@ -174,7 +185,12 @@ def _echoes(radar: Radar, true: Floats, there: Mask, leader: Ints, rng: Generato
 
 
 def _clutter(radar: Radar, scans: int, rng: Generator) -> tuple[Ints, Floats, Floats]:
-    """Scan, measurement and amplitude of false plots: Poisson in number, alike in all resolution cells."""
-    scan = np.repeat(np.arange(scans), rng.poisson(radar.p_fa * radar.cells, scans))
-    z = rng.uniform(radar.low, radar.high, (len(scan), radar.dim))
+    """Scan, measurement and amplitude of false plots: Poisson in number, alike in all resolution cells of a part."""
+    parts = (Patch(radar.low, radar.high, 1.0), *radar.patches)
+    drawn = []
+    for part in parts:
+        cells = np.prod((np.array(part.high) - part.low) / radar.cell)
+        false = np.repeat(np.arange(scans), rng.poisson(part.more * radar.p_fa * cells, scans))
+        drawn.append((false, rng.uniform(part.low, part.high, (len(false), radar.dim))))
+    scan, z = (np.concatenate(each) for each in zip(*drawn, strict=True))
     return scan, z, radar.clutter.sample(rng, len(scan), above=radar.threshold)

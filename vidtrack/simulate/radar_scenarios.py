@@ -13,7 +13,7 @@ from vidtrack.amplitude.densities import Weibull
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
 from vidtrack.simulate.flight import Flight, G, Leg, fly, sidestep, swing, weave
-from vidtrack.simulate.radar import Radar, Seen, Target, observe
+from vidtrack.simulate.radar import Patch, Radar, Seen, Target, observe
 
 MOST_FALSE_PLOTS = 3e6
 """In all scans together; more would fill the memory."""
@@ -38,6 +38,9 @@ FINE = replace(SURVEILLANCE, cell=(1.0, 0.01), p_fa=5e-9, clutter=Weibull())
 
 COARSE = replace(SURVEILLANCE, clutter=Weibull())
 """Track while scan in Rayleigh clutter, P_D = 0.91."""
+
+UNEVEN = replace(COARSE, patches=(Patch((10e3, 20.0), (30e3, 70.0), 29.0), Patch((35e3, 150.0), (55e3, 240.0), 19.0)))
+"""The same with two patches of land, from which come 13 and 15 false plots a scan more."""
 
 MULTIFUNCTION = Radar(
     scan_s=1 / 7.7,
@@ -147,6 +150,7 @@ def _meets(seen: Seen) -> bool:
 
 SCENARIOS: dict[str, tuple[Radar, Draw, int, Holds]] = {
     "radar-tws": (SURVEILLANCE, tws, 60, _apart),
+    "radar-uneven": (UNEVEN, tws, 60, _apart),
     "radar-incoming": (MULTIFUNCTION, incoming, 232, _all_seen),
     "radar-altitude": (MULTIFUNCTION, altitude, 232, _all_seen),
     "radar-speed": (MULTIFUNCTION, speed, 232, _all_seen),

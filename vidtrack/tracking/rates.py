@@ -8,6 +8,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Scan
+from vidtrack.tracking.clutter import ClutterMap, EvenClutter
 
 MEMORY_S = 300.0
 """Time constant with which old scans are forgotten."""
@@ -24,6 +25,7 @@ class Rates:
 
     detection, clutter   one number for all, or (B,) one for each Monte Carlo run; density in px^-2, m^-2, ... per scan
     space                what the sensor surveys, in px^2, m^2, ...; None: the extent of all measurements so far
+    where                how the estimated clutter is distributed; None: evenly
 
     P_D: scans in which tracks were seen, of all scans of confirmed tracks that share no blob. Misses count once the
     track is seen again, by whatever station: those of a target that has gone say nothing of how well targets are seen.
@@ -33,9 +35,15 @@ class Rates:
     Raises ConfigError for numbers that are no probability, density or area.
     """
 
-    STATE = ("hits", "trials", "false", "scans", "low", "high")
+    STATE = ("hits", "trials", "false", "scans", "low", "high", "where")
 
-    def __init__(self, detection: Rate = 0.9, clutter: Rate = 1e-5, space: float | None = None) -> None:
+    def __init__(
+        self,
+        detection: Rate = 0.9,
+        clutter: Rate = 1e-5,
+        space: float | None = None,
+        where: ClutterMap | None = None,
+    ) -> None:
         if detection is not None and not np.all((np.asarray(detection) >= 0) & (np.asarray(detection) <= 1)):
             raise ConfigError(f"detection probability is {detection}; it must lie in 0..1")
         if clutter is not None and not np.all((np.asarray(clutter) >= 0) & np.isfinite(clutter)):
@@ -45,6 +53,7 @@ class Rates:
         self._detection = detection
         self._clutter = clutter
         self._space = space
+        self.where = where or EvenClutter()
         self.hits = 0.0
         self.trials = 0.0
         self.false = 0.0
@@ -76,11 +85,11 @@ class Rates:
         """Both, by name."""
         return {"detection_probability": self.detection_probability, "clutter_density": self.clutter_density}
 
-    def of(self, run: Ints) -> tuple[float | Floats, float | Floats]:
-        """P_D and clutter density for rows (T,) of these runs."""
+    def of(self, run: Ints, zhat: Floats) -> tuple[float | Floats, float | Floats]:
+        """P_D and clutter density for rows (T,) of these runs, at their predicted measurements (T, m)."""
         return (
             self._detection[run] if isinstance(self._detection, np.ndarray) else self.detection_probability,
-            self._clutter[run] if isinstance(self._clutter, np.ndarray) else self.clutter_density,
+            self._clutter[run] if isinstance(self._clutter, np.ndarray) else self.clutter_density * self.where.at(zhat),
         )
 
     def look(self, scan: Scan) -> None:
@@ -100,15 +109,18 @@ class Rates:
         self.trials *= fade
         self.false *= fade
         self.scans *= fade
+        self.where.forget(fade)
 
-    def learn_clutter(self, decision: Decision, shared: Ints, known: Mask, count: int, runs: int) -> None:
-        """Learn from a decision about `count` measurements of a scan in which confirmed tracks are `known` (K,).
+    def learn_clutter(
+        self, decision: Decision, shared: Ints, known: Mask, existence: Floats, scan: Scan, runs: int
+    ) -> None:
+        """Learn from a decision about the measurements of a scan in which confirmed tracks are `known` (K,).
 
-        shared (K,) measurement that each row shares, -1: none; runs: number of Monte Carlo runs
+        shared (K,) measurement that each row shares, -1: none; existence (K,) probability that it is a target: a slow
+        one would else be taken for clutter at its place before it is confirmed; runs: number of Monte Carlo runs
         """
-        claimed = np.bincount(decision.measurement, decision.beta * known[decision.row], count)
-        claimed[shared[shared >= 0]] = 1.0
-        self.false += float(np.maximum(1 - claimed, 0).sum())
+        self.where.learn(scan.z, _unclaimed(decision, shared, np.where(known, 1.0, existence), len(scan)))
+        self.false += float(_unclaimed(decision, shared, known.astype(float), len(scan)).sum())
         self.scans += runs
 
     def learn_detection(self, missed: Ints, inside: Floats, seen: bool) -> None:
@@ -118,6 +130,13 @@ class Rates:
         """
         self.hits += len(missed) * seen
         self.trials += float(((missed + seen) * inside).sum())
+
+
+def _unclaimed(decision: Decision, shared: Ints, target: Floats, count: int) -> Floats:
+    """(count,) probability that no row took a measurement, rows being targets with probabilities (K,)."""
+    claimed = np.bincount(decision.measurement, decision.beta * target[decision.row], count)
+    claimed[shared[shared >= 0]] = 1.0
+    return np.maximum(1 - claimed, 0)
 
 
 def _mean(rate: float | Floats) -> float:

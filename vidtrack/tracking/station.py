@@ -74,6 +74,8 @@ class Station:
     visibility: Visibility | None = None
     lasting_s: float = 0.0
 
+    STATE = ("rates",)
+
 
 class Stations:
     """The stations of a tracker by number, and when each made its last scan.
@@ -81,7 +83,7 @@ class Stations:
     last_s  (S,) s; NaN before the first
     """
 
-    STATE = ("last_s",)
+    STATE = ("last_s", "each")
 
     def __init__(self, each: Sequence[Station]) -> None:
         self.each = tuple(each)
@@ -108,14 +110,16 @@ class Stations:
         self.last_s[scan.station] = scan.t
         return 0.0 if np.isnan(before) else scan.t - before
 
-    def expected(self, scan: Scan, register: Register, share: Floats, since: float) -> tuple[Floats, float | Floats]:
-        """P_D (T,) of the rows of which the station covers a share (T,), and its clutter density.
+    def expected(
+        self, scan: Scan, zhat: Floats, register: Register, share: Floats, since: float
+    ) -> tuple[Floats, float | Floats]:
+        """P_D (T,) of the rows of which the station covers a share (T,), and its clutter density there.
 
-        since  seconds after the station's last scan
+        zhat (T, m) predicted measurements; since: seconds after the station's last scan
         """
         station, number = self.each[scan.station], scan.station
         station.rates.look(scan)
-        detection, clutter = station.rates.of(register.run)
+        detection, clutter = station.rates.of(register.run, zhat)
         if station.visibility is not None:
             known = register.visible[:, number]
             before = np.where(np.isnan(known), station.visibility.usual, known)
@@ -148,7 +152,7 @@ class Stations:
             station.rates.forget(dt)
             if now:
                 runs = 1 + int(register.run.max(initial=0))
-                station.rates.learn_clutter(found.decision, found.shared, known, problem.measurements, runs)
+                station.rates.learn_clutter(found.decision, found.shared, known, register.existence, problem.scan, runs)
             missed = register.missed[count, number] - now  # this scan is counted, and was none
             station.rates.learn_detection(missed, problem.inside[count], seen=now)
         register.seen(seen)

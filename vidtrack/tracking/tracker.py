@@ -81,7 +81,7 @@ class Tracker:
                and clutter density then follow from it, and those given are ignored. None: all measurements are used
     surveyed   area [px^2 or m^2] over which the clutter is estimated; None: the picture, else the measurements' extent
     stations   several sensors, each with its own P_D, clutter density and coverage; scans say by number whose they are.
-               None: one, with the P_D and clutter density given. Saved states hold the first only
+               None: one, with the P_D and clutter density given
     explain    keep each scan's choices (runner-up and distances) in the snapshot
     smooth     keep in the snapshot what a smoother needs
 
@@ -89,7 +89,7 @@ class Tracker:
     with the sharing.
     """
 
-    STATE = ("t", "bank", "register", "timing", "sharing", "stations", "rates", "picture")
+    STATE = ("t", "bank", "register", "timing", "sharing", "stations", "picture")
 
     def __init__(
         self,
@@ -238,14 +238,14 @@ class Tracker:
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
         share = self.stations.share(scan, self.bank.x, self.model)
-        detection, clutter = self.stations.expected(scan, self.register, share, since)
+        detection, clutter = self.stations.expected(scan, zhat, self.register, share, since)
         problem = Problem.gated(
             self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
             modes=None if self._mixture is None else self._mixture.modes(sensor),
         )  # fmt: skip
         if self.threshold is not None:
-            problem = thresholded(problem, self.threshold)
+            problem = thresholded(problem, self.threshold, zhat)
         return self.picture.weigh(problem, view)
 
     def _associate(self, problem: Problem, view: View | None, dt: float, events: list[Event]) -> Association:

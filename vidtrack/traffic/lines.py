@@ -6,6 +6,7 @@ import logging
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,13 +23,17 @@ _MARGIN = 0.15
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A named segment from (x1, y1) to (x2, y2) in source pixels."""
+    """A named segment from (x1, y1) to (x2, y2) in source pixels.
+
+    chord  from the first to the last corner of the line that the segment is a part of; None: it is the whole line
+    """
 
     name: str
     x1: float
     y1: float
     x2: float
     y2: float
+    chord: tuple[float, float] | None = None
 
     @property
     def directions(self) -> tuple[str, str]:
@@ -37,10 +42,16 @@ class Line:
         A line that lies flatter than 45 degrees is crossed "up" or "down", a steeper one "left" or "right",
         whichever way it was drawn.
         """
-        dx, dy = self.x2 - self.x1, self.y2 - self.y1
+        dx, dy = self.chord or (self.x2 - self.x1, self.y2 - self.y1)
         if abs(dx) > abs(dy):
             return ("up", "down") if dx > 0 else ("down", "up")
         return ("right", "left") if dy > 0 else ("left", "right")
+
+
+def segments(name: str, corners: Sequence[tuple[float, float]]) -> list[Line]:
+    """The parts of a line with two or more corners, over which together a track counts once per direction."""
+    (x1, y1), (x2, y2) = corners[0], corners[-1]
+    return [Line(name, *start, *end, (x2 - x1, y2 - y1)) for start, end in pairwise(corners)]
 
 
 def parse_line(text: str) -> Line:
@@ -110,6 +121,12 @@ class _State:
         for name, values in vars(old).items():
             getattr(self, name)[rows] = values[old_rows]
 
+    def keep(self, columns: Sequence[int], old: _State, old_columns: Sequence[int]) -> None:
+        """Take the memory of the same tracks at lines that were there before."""
+        self.confirmed = old.confirmed
+        for name in ("distance", "side", "counted", "seen", "inside", "time_s", "frame"):
+            getattr(self, name)[:, columns] = getattr(old, name)[:, old_columns]
+
 
 class LineCounter:
     """Counts tracks over lines by their position (the centroid, not a corner of the box).
@@ -120,15 +137,34 @@ class LineCounter:
     """
 
     def __init__(self, lines: Sequence[Line]) -> None:
-        self.lines = list(lines)
+        self._set(lines)
+        empty = np.empty((0, len(lines)))
+        self._state = _State(np.empty(0, np.int64), np.empty((0, 2)), empty, 0.0, 0)
+        self._t, self._frame = 0.0, 0
+        self._totals: Counter[tuple[str, str]] = Counter()
+
+    def use(self, lines: Sequence[Line]) -> None:
+        """Count over these lines from the last scan on; lines that were there before go on as if nothing happened."""
+        old, before = self._state, self.lines
+        self._set(lines)
+        now = _State(old.id, old.xy, self._distance(old.xy), self._t, self._frame)
+        kept = [(new, before.index(line)) for new, line in enumerate(lines) if line in before]
+        now.keep([new for new, _ in kept], old, [was for _, was in kept])
+        self._state = now
+
+    def _set(self, lines: Sequence[Line]) -> None:
+        names = np.array([line.name for line in lines], str)
+        self._same = names[:, None] == names  # (L, L) parts of one line
         self._start = np.array([[line.x1, line.y1] for line in lines]).reshape(-1, 2)
         along = np.array([[line.x2, line.y2] for line in lines]).reshape(-1, 2) - self._start
         self._length = np.linalg.norm(along, axis=1)
         self._along = along / self._length[:, None]
         self._normal = np.column_stack([-self._along[:, 1], self._along[:, 0]])
-        self._state = _State(np.empty(0, np.int64), np.empty((0, 2)), np.empty((0, len(lines))), 0.0, 0)
-        self._t = 0.0
-        self._totals: Counter[tuple[str, str]] = Counter()
+        self.lines = list(lines)
+
+    def _distance(self, xy: Floats) -> Floats:
+        """(T, L) signed distances of places (T, 2) from the lines."""
+        return np.einsum("tld,ld->tl", xy[:, None] - self._start, self._normal)
 
     def totals(self) -> dict[str, dict[str, int]]:
         """Counts so far, by line and direction."""
@@ -142,7 +178,7 @@ class LineCounter:
         """Crossings that this scan decided, in order of time."""
         old = self._state
         xy = tracks.xy
-        distance = np.einsum("tld,ld->tl", xy[:, None] - self._start, self._normal)
+        distance = self._distance(xy)
         now = _State(tracks.id, xy, distance, tracks.t, frame)
         _, rows, old_rows = np.intersect1d(tracks.id, old.id, assume_unique=True, return_indices=True)
         now.replace(rows, old, old_rows)
@@ -153,7 +189,7 @@ class LineCounter:
         extent = np.abs(self._normal) @ np.nan_to_num(tracks.box[:, 2:]).T
         clear = np.abs(distance) > _MARGIN * extent.T
         crossings = self._collect(now, clear) + self._collect_gone(old, tracks.id)
-        self._state, self._t = now, tracks.t
+        self._state, self._t, self._frame = now, tracks.t, frame
         return sorted(crossings, key=lambda crossing: crossing.time_s)
 
     def close(self) -> list[Crossing]:
@@ -189,7 +225,7 @@ class LineCounter:
             along_normal = int(side[row, line])
             if state.counted[row, line, along_normal]:
                 continue
-            state.counted[row, line, along_normal] = True
+            state.counted[row, self._same[line], along_normal] = True
             direction = self.lines[line].directions[along_normal]
             self._totals[self.lines[line].name, direction] += 1
             crossings.append(

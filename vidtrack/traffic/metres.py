@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vidtrack.traffic.lines import Line, segments
+
 if TYPE_CHECKING:
     from vidtrack.traffic.footprint import Footprints
 
@@ -21,11 +23,15 @@ class UsedSite:
     text     of the file
     road     where vehicles stand on the road; None without a calibration
     classes  low and high length of each class [m]; empty without a calibration
+    gates    as lines in the pictures
+    masked   corners of the areas in which nothing is tracked [px]
     """
 
     text: str
     road: Footprints | None
     classes: Mapping[str, tuple[float, float]]
+    gates: tuple[Line, ...] = ()
+    masked: tuple[tuple[tuple[float, float], ...], ...] = ()
 
 
 def used_site(site: Path, width: int, height: int) -> UsedSite:
@@ -40,9 +46,11 @@ def used_site(site: Path, width: int, height: int) -> UsedSite:
 
     text = read_toml_text(site, "site")
     drawn = parse_site(text, site).scaled(width, height)
+    gates = tuple(line for name, gate in drawn.gates.items() for line in segments(name, gate.line))
     if drawn.calibration is None:
-        return UsedSite(text, None, {})
-    return UsedSite(text, Footprints(calibrated(drawn), (width, height), drawn.classes), drawn.classes)
+        return UsedSite(text, None, {}, gates, drawn.masked)
+    road = Footprints(calibrated(drawn), (width, height), drawn.classes)
+    return UsedSite(text, road, drawn.classes, gates, drawn.masked)
 
 
 def footprints_of(site: Path | None, width: int, height: int) -> Footprints | None:

@@ -160,6 +160,8 @@ class Zone(Group):
 
     polygon: Annotated[tuple[Point, ...], AfterValidator(_outline)]
     """px; its corners in order"""
+    tracked: bool = True
+    """false: a mask, inside which nothing is tracked"""
 
 
 class Section(Group):
@@ -241,6 +243,11 @@ class Site(Group):
                 if leg not in self.legs:
                     raise ValueError(f"movements.allowed: no gate is on a leg {leg!r}{_near(leg, self.legs)}")
         return self
+
+    @property
+    def masked(self) -> tuple[tuple[Point, ...], ...]:
+        """The zones in which nothing is tracked."""
+        return tuple(zone.polygon for zone in self.zones.values() if not zone.tracked)
 
     def scaled(self, width: int, height: int) -> Site:
         """The site for another size of the same picture. Raises ConfigError where the aspect is another."""

@@ -75,5 +75,8 @@ class Background(Protocol):
         known (K, 4): left, top, width, height [source px of the scene] of predicted vehicles.
         """
 
+    def keep(self, mask: Image | None) -> None:
+        """Find no foreground where a mask (h, w) of any size is dark, from the next frame on; None: find all."""
+
     def scene(self) -> Image:
         """(H, W, 3) the learnt scene in coordinates of the first picture, in source size, blue-green-red."""

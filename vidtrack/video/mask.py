@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,19 @@ import numpy as np
 
 from vidtrack.errors import ConfigError
 from vidtrack.video.frame import Image
+
+Corners = Sequence[tuple[float, float]]
+
+
+def without(keep: Image | None, areas: Sequence[Corners], width: int, height: int) -> Image | None:
+    """The mask without areas, given by their corners [px] in a picture of this size; None: everything is kept."""
+    if not areas:
+        return keep
+    kept = np.full((height, width), 255, np.uint8) if keep is None else keep.copy()
+    scale = np.array([kept.shape[1] / width, kept.shape[0] / height])
+    for area in areas:
+        cv2.fillPoly(kept, [np.rint((np.asarray(area) + 0.5) * scale - 0.5).astype(np.int32)], 0)
+    return kept
 
 
 def read_mask(path: Path) -> Image:

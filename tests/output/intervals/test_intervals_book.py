@@ -246,3 +246,22 @@ def test_a_plan_that_cannot_be_read(tmp_path, content):
 def test_a_plan_is_what_was_written(tmp_path):
     CountBook(tmp_path, PLAN)
     assert Plan.read(tmp_path) == PLAN
+
+
+def test_a_gate_that_is_drawn_during_the_day_was_not_watched_before(tmp_path):
+    """`ramp` comes at 10:20, `gate` goes at 10:40; the next run has both again at 10:50, with a fake clock."""
+    ways = dict(PLAN.gates)
+    book = CountBook(tmp_path, Plan({"gate": ways["gate"]}, {}, BERLIN))
+    book.watch(NOON, NOON + 1200)
+    book.use(ways, {}, NOON + 1200)
+    book.add([passage(NOON + 1500, "ramp", "up")])
+    book.use({"ramp": ways["ramp"]}, {}, NOON + 2400)
+    book.watch(NOON + 1200, NOON + 3600)
+    book.close()
+    book.save()
+    plan = Plan(ways, {}, BERLIN).after(Plan.read(tmp_path), NOON + 3000)
+    quarters = read_day(tmp_path / "2026-10-24").intervals(900, plan).to_pylist()
+    covered = {gate: [round(row["coverage"], 3) for row in quarters if row["gate"] == gate][:4] for gate in ways}
+    assert covered == {"gate": [1, 1, 0.667, 0.667], "ramp": [0, 0.667, 1, 1]}
+    counts = [row["count"] for row in quarters if (row["gate"], row["direction"]) == ("ramp", "up")]
+    assert counts == [None, 1, 0, 0]

@@ -4,13 +4,18 @@ import json
 import os
 
 import pytest
-from live_runs import NEVER_ROLLS, play, settings
+from live_runs import NEVER_ROLLS, play, rows, settings
 
 from vidtrack.cli.measure import command
 from vidtrack.cli.site import SiteOptions, desk_of
+from vidtrack.config.load import load
 from vidtrack.errors import ConfigError
+from vidtrack.output.intervals.day import day_folders, read_day
 from vidtrack.output.repair import read_tracks
 from vidtrack.recording.retention import parts_of
+from vidtrack.recording.source import recorded_settings
+from vidtrack.run.files import run_file
+from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.run import LiveRun
 from vidtrack.run.live.site import FollowedSite
 
@@ -116,6 +121,14 @@ def test_a_site_that_the_page_saves_begins_a_part(camera, tmp_path, monkeypatch)
     assert json.loads((tmp_path / "all" / "measures.json").read_text())["metres"]
     plan = json.loads((folder / "intervals" / "plan.json").read_text())
     assert plan["classes"] == {"car": [1, 40]}  # those of the last site
+    assert list(plan["gates"]) == ["gate", "middle"]  # the gate that was drawn counts from the second part on
+    assert list(summary(first)["counts"]) == ["gate"]
+    ((since_s, until_s),) = plan["spans"]["middle"]
+    assert until_s is None
+    counted = read_day(day_folders(folder / "intervals")[-1]).crossings.to_pylist()
+    late = [(row["gate"], row["direction"]) for row in counted if row["utc"].timestamp() > since_s + 1]
+    assert late.count(("gate", "right")) == late.count(("middle", "right")) > 0  # both are in the same place
+    assert (folder / "scene.jpg").exists()
 
 
 def test_what_a_look_finds(tmp_path):
@@ -157,3 +170,27 @@ def test_what_a_look_finds(tmp_path):
     assert followed.used.text == calibrated(10)
     with pytest.raises(ConfigError, match="not the same shape"):
         FollowedSite(site, 320, 200, told.append)
+
+
+def test_a_mask_that_is_drawn_is_used_from_a_part_of_the_recording_on(camera, tmp_path):
+    """All over the picture, so that nothing is tracked any more; every part is repeated with the masks that it had."""
+    site, tape, out = tmp_path / "yard.toml", tmp_path / "tape", tmp_path / "out"
+    site.write_text(BARE)
+    chosen = settings(NEVER_ROLLS, "tracker.confirm_s=0.1", f"output.site={site}")
+    with LiveRun(camera.url("video.ts"), chosen, out, LiveExtras(record=tape)) as run:
+
+        def story(seen):
+            yield rows(20)
+            put(site, f"{BARE}[zones.all]\npolygon = {CORNERS}\ntracked = false\n")
+            yield lambda seen: len(parts_of(tape)) == 2 and not any(one.tracks for one in seen[-20:])
+
+        seen = play(run, story)
+    assert run._source.stats.reconnects == 0
+    lived = [row for part in parts_of(out) for row in (part / "tracks.csv").read_text().splitlines()[1:]]
+    again = []
+    for number, part in enumerate(parts_of(tape)):
+        with run_file(str(part), load(base=recorded_settings(str(part))), tmp_path / f"again-{number}") as repeated:
+            frames = sum(1 for _ in repeated)
+        again += (tmp_path / f"again-{number}" / "tracks.csv").read_text().splitlines()[1:]
+    assert frames < len(seen)  # the part before the mask had its own
+    assert again == lived

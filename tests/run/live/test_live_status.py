@@ -1,30 +1,50 @@
 """What a run says of itself now is of now."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from datetime import datetime
 from zoneinfo import ZoneInfo
 
 import pytest
+from numba.core.compiler_lock import global_compiler_lock
 from synthetic_steps import make_step
 
 from vidtrack.config.settings import OutputSettings
 from vidtrack.output import status
-from vidtrack.output.status import Account, StatusBoard
+from vidtrack.output.status import Account, StatusBoard, trouble_of
 from vidtrack.video.live.stats import LiveStats
 
 
 @pytest.fixture
-def board():
-    """Of a camera whose pictures are 2 s old when they are tracked."""
-    board = StatusBoard(
+def new():
+    """Of a camera whose pictures are 2 s old when they are tracked; none is yet."""
+    return StatusBoard(
         "cam",
         lambda: Account("running", {}, [], {"video": "no space"}),
         lambda time_s: 2.0,
         OutputSettings(),
         zone=ZoneInfo("Asia/Tokyo"),
     )
-    board.step(make_step(3, [(7, "c", 50, 50)], shape=(100, 200)))
-    return board
+
+
+@pytest.fixture
+def board(new):
+    new.step(make_step(3, [(7, "c", 50, 50)], shape=(100, 200)))
+    return new
+
+
+def test_before_the_first_frame_it_says_that_kernels_are_compiled(new):
+    def asked():
+        """As by the page, in another thread than the tracker's."""
+        with ThreadPoolExecutor(1) as thread:
+            return thread.submit(lambda: trouble_of(asdict(new.now()), 10.0)).result()
+
+    assert asked() == "no frames"
+    with global_compiler_lock:
+        assert asked() == "compiling"
+        new.step(make_step(3, [], shape=(100, 200)))
+        assert new.now().state == "running"
 
 
 def test_tracks_and_rates_of_a_camera_that_is_down_are_not_shown(board, monkeypatch):

@@ -11,6 +11,9 @@ from enum import StrEnum
 from math import isnan
 from typing import Any
 
+PICTURES = "pictures"
+"""Folder of the pictures of events, below that of their camera"""
+
 _ID_LENGTH = 24
 _DECIMALS = 3
 

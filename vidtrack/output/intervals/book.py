@@ -18,7 +18,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from datetime import UTC, datetime
 from math import isnan
 from pathlib import Path
@@ -83,6 +83,9 @@ class CountBook:
     def __init__(self, folder: Path, plan: Plan) -> None:
         self.lost = 0
         self._folder = folder
+        with suppress(FormatError):  # a damaged one: all gates were always there
+            if (folder / PLAN).exists():
+                plan = plan.after(Plan.read(folder), time.time())
         self._plan = plan
         self._zone = zone_of(plan.zone)
         self._waiting: deque[Passage] = deque(maxlen=_MOST)
@@ -109,9 +112,14 @@ class CountBook:
             begin_s = self._watched.pop()[0]
         self._watched.append((begin_s, end_s))
 
-    def use(self, classes: Mapping[str, tuple[float, float]]) -> None:
-        """Sort lengths by other classes from now on, and of the day so far; `save` writes it."""
-        self._plan = replace(self._plan, classes=classes)
+    def use(
+        self, gates: Mapping[str, tuple[str, str]], classes: Mapping[str, tuple[float, float]], since_s: float
+    ) -> None:
+        """Count over these gates from a Unix time [s] on; sort lengths by these classes, of the day so far too.
+
+        `save` writes it.
+        """
+        self._plan = Plan(gates, classes, self._plan.zone).after(self._plan, since_s)
         self._planned = False
 
     def save(self, keep_s: float | None = None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, date, datetime
 from io import BytesIO
 from pathlib import Path
@@ -36,6 +36,8 @@ CROSSING_COLUMNS = {
 }
 WATCHED_COLUMNS = {"begin_utc": _TIME, "end_utc": _TIME}
 
+Spans = tuple[tuple[float | None, float | None], ...]
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -44,15 +46,38 @@ class Plan:
     gates    names of the counting lines, each with its two directions
     classes  low and high length of each class [m]; empty without a calibrated site
     zone     time zone of the days; None: that of this machine
+    spans    begin and end of the times in which a gate was counted, Unix times [s], None: open; a gate without any was
+             always there
     """
 
     gates: Mapping[str, tuple[str, str]]
     classes: Mapping[str, tuple[float, float]]
     zone: str | None
+    spans: Mapping[str, Spans] = field(default_factory=dict)
+
+    def after(self, before: Plan, now_s: float) -> Plan:
+        """This plan from now on [Unix s], with what is known of the time before it."""
+        spans = dict(before.spans)
+        for name in before.gates.keys() - self.gates.keys():
+            *earlier, (begin_s, _) = before.spans.get(name, ((None, None),))
+            spans[name] = (*earlier, (begin_s, now_s))
+        for name in self.gates.keys() - before.gates.keys():
+            spans[name] = (*before.spans.get(name, ()), (now_s, None))
+        return replace(self, spans=spans)
+
+    def watched(self, gate: str, watched: Floats) -> Floats:
+        """(S, 2) the watched times in which a gate was counted."""
+        if gate not in self.spans:
+            return watched
+        begin, end = np.array(
+            [[-np.inf if b is None else b, np.inf if e is None else e] for b, e in self.spans[gate]]
+        ).T
+        low, high = np.maximum(watched[:, :1], begin), np.minimum(watched[:, 1:], end)
+        return np.column_stack([low[low < high], high[low < high]])
 
     def to_json(self) -> str:
         """The content of plan.json."""
-        return json.dumps({"gates": self.gates, "classes": self.classes, "zone": self.zone}, indent=2) + "\n"
+        return json.dumps(asdict(self), indent=2) + "\n"
 
     @classmethod
     def read(cls, folder: Path) -> Plan:
@@ -62,8 +87,9 @@ class Plan:
             tree: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             gates = {str(name): (str(one), str(other)) for name, (one, other) in tree["gates"].items()}
             classes = {str(name): (float(low), float(high)) for name, (low, high) in tree["classes"].items()}
+            spans = {name: tuple((begin, end) for begin, end in of) for name, of in tree.get("spans", {}).items()}
             zone_of(tree["zone"])
-            return cls(gates, classes, tree["zone"])
+            return cls(gates, classes, tree["zone"], spans)
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise FormatError(f"cannot read the plan of the counts {path}: {error}") from None
 
@@ -82,17 +108,14 @@ class Day:
     def intervals(self, every_s: float, plan: Plan) -> pa.Table:
         """A row per gate, direction and interval, from the first watched interval to the last one.
 
-        Crossings outside of what was watched, such as the last ones before a kill, are in `count` alone.
+        A gate that was not there yet, or no more, is not watched. Crossings outside of what was watched, such as the
+        last ones before a kill, are in `count` alone.
         """
         edges = edges_of_day(self.date, every_s, zone_of(plan.zone))
-        watched = coverage(self.watched, edges)
         counted = np.histogram(_unix(self.crossings["utc"]), edges)[0]
-        kept = np.flatnonzero((watched > 0) | (counted > 0))
-        if len(kept):
-            edges, watched = edges[kept[0] : kept[-1] + 2], watched[kept[0] : kept[-1] + 1]
-        else:
-            edges, watched = edges[:1], watched[:0]
-        return _table(self.crossings, edges, watched, plan)
+        kept = np.flatnonzero((coverage(self.watched, edges) > 0) | (counted > 0))
+        edges = edges[kept[0] : kept[-1] + 2] if len(kept) else edges[:1]
+        return _table(self, edges, plan)
 
 
 def read_day(folder: Path) -> Day:
@@ -117,10 +140,12 @@ def read_lines(path: Path, columns: Mapping[str, pa.DataType]) -> pa.Table:
         raise FormatError(f"{path} is damaged: {error}") from None
 
 
-def _table(crossings: pa.Table, edges: Floats, watched: Floats, plan: Plan) -> pa.Table:
+def _table(day: Day, edges: Floats, plan: Plan) -> pa.Table:
+    crossings = day.crossings
     gates = _all_gates(crossings, plan)
     ways = [(gate, way) for gate, pair in gates.items() for way in pair]
-    bins = len(watched)
+    bins = len(edges) - 1
+    watched = np.array([coverage(plan.watched(gate, day.watched), edges) for gate, _ in ways]).reshape(len(ways), bins)
     unix, length = _unix(crossings["utc"]), _reals(crossings, "length_m")
     inside = (unix >= edges[0]) & (unix < edges[-1]) & (bins > 0)
     crossings, unix, length = crossings.filter(pa.array(inside)), unix[inside], length[inside]
@@ -140,7 +165,7 @@ def _table(crossings: pa.Table, edges: Floats, watched: Floats, plan: Plan) -> p
         "direction": ("", [direction for _, direction in ways for _ in range(bins)]),
         "begin_utc": ("utc", stamps(utc, when[0])),
         "end_utc": ("utc", stamps(utc, when[1])),
-        "coverage": ("1", np.tile(watched, len(ways))),
+        "coverage": ("1", watched.ravel()),
         **figure_columns(found),
     }
     named = np.array(class_of(length, dict(plan.classes)), object)

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 
 from vidtrack.arrays.types import Floats
+from vidtrack.config.settings import Settings
 from vidtrack.output.intervals.book import CountBook, Passage, totals
 from vidtrack.output.intervals.day import Plan
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lengths import length_sums, mean_length
-from vidtrack.traffic.lines import Crossing, LineCounter
+from vidtrack.traffic.lines import Crossing, Line, LineCounter, parse_line, parse_lines
+from vidtrack.traffic.metres import UsedSite
 
 COUNTS = "intervals"
 """Folder of the counts by interval"""
 
 _MARGIN_S = 1.0  # for a vehicle to be clear of the line
+_SURE = 0.8  # share of the time that tracks coast in which they are surely found again
+_UNUSUAL, _LATELY = 2.5, 0.2  # times the usual pause between frames; weight of the last one in it
 _STEP_S = 0.5  # the wall clock was set if it moved by more than this
 _SPEEDS = ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
 _NOTHING = (np.nan, np.nan, np.nan)
@@ -67,12 +72,14 @@ class Counting:
     """Counts steps of confirmed tracks over the lines of `counter`, and writes the counts by interval to `book`.
 
     began_s  returns the Unix time of time_s 0, by the wall clock as it is now
-    gap_s    no crossings are counted over a longer time without frames
-    late_s   crossings are decided within this time after they happened
+    coast_s  no track outlives a longer time without frames
+    late_s   crossings are decided within this time after they happened, and vehicles are found within it after a gap
     keep_s   older days are deleted; None: they stay
     tell     called with each batch of crossings; None: nobody else wants them
+    own      lines that are counted at every site
 
-    A time is watched if frames were tracked in it and their crossings are decided.
+    A time is watched if frames were tracked in it, tracks are carried through it and found again after a gap, and their
+    crossings are decided.
     """
 
     def __init__(
@@ -80,16 +87,19 @@ class Counting:
         counter: LineCounter,
         book: CountBook,
         began_s: Callable[[], float],
-        gap_s: float,
+        coast_s: float,
         late_s: float,
         keep_s: float | None = None,
         tell: Callable[[Sequence[Passage]], None] | None = None,
+        own: Sequence[Line] = (),
     ) -> None:
         self._tell = tell
         self._counter = counter
+        self._own = own
         self._book = book
         self._began_s = began_s
-        self._gap_s, self._late_s, self._keep_s = gap_s, late_s, keep_s
+        self._coast_s, self._late_s, self._keep_s = coast_s, late_s, keep_s
+        self._usual_s = np.inf  # between two frames, lately
         self._readings = RoadReadings()
         self._offset_s = began_s()
         self._last_s: float | None = None
@@ -117,9 +127,14 @@ class Counting:
         self._tell_watched(self._late_s)
         return crossings
 
-    def use(self, classes: Mapping[str, tuple[float, float]]) -> None:
-        """Go on with the classes of another site, on whose road nothing is known of the vehicles yet."""
-        self._book.use(classes)
+    def use(self, site: UsedSite) -> None:
+        """Go on with the gates and classes of another site, on whose road nothing is known of the vehicles yet.
+
+        Gates that are the same go on; those that are new count from the last frame on.
+        """
+        self._counter.use(lines_at(self._own, site))
+        since_s = self._offset_s + self._last_s if self._last_s is not None else time.time()
+        self._book.use(ways_of(self._counter), site.classes, since_s)
         self._readings = RoadReadings()
 
     def save(self) -> None:
@@ -160,11 +175,18 @@ class Counting:
             self._offset_s = offset_s
 
     def _watch(self, time_s: float) -> None:
-        """Frames were tracked until this time."""
-        if self._last_s is not None and time_s - self._last_s <= self._gap_s:
-            self._spans[-1] = (self._spans[-1][0], time_s)
+        """Frames were tracked until this time.
+
+        In a pause almost as long as tracks coast, and not usual, some are lost: it is a gap too.
+        """
+        pause_s = np.inf if self._last_s is None else time_s - self._last_s
+        if pause_s <= min(self._coast_s, max(_SURE * self._coast_s, _UNUSUAL * self._usual_s)):
+            begin_s, _ = self._spans[-1]
+            self._spans[-1] = (begin_s, max(begin_s, time_s))
         else:
-            self._spans.append((time_s, time_s))
+            self._spans.append((time_s + self._late_s, time_s + self._late_s))
+        if pause_s <= self._coast_s:
+            self._usual_s = _LATELY * pause_s + (1 - _LATELY) * min(self._usual_s, self._coast_s)
         self._last_s = time_s
 
     def _tell_watched(self, late_s: float) -> None:
@@ -191,12 +213,32 @@ def counting_of(
     """
     counter, settings = subject.counter, subject.settings
     assert counter is not None
-    gates = {line.name: line.directions for line in counter.lines}
-    book = CountBook(folder, Plan(gates, subject.classes, settings.live.zone))
+    book = CountBook(folder, Plan(ways_of(counter), subject.classes, settings.live.zone))
     counter.resume(totals(folder))
     coast_s, hidden_s = settings.tracker.coast_s, settings.tracker.hidden_s
     late_s = max(coast_s, hidden_s) + _MARGIN_S
-    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell)
+    own = list(map(parse_line, settings.output.lines))
+    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell, own)
+
+
+def counter_of(settings: Settings, width: int, height: int, site: UsedSite | None) -> LineCounter | None:
+    """The counter of a live run: over the lines of the settings and the gates of its site, which may come later.
+
+    None without lines and site. Raises ConfigError.
+    """
+    lines = parse_lines(settings.output.lines, width, height)
+    return LineCounter(lines_at(lines, site)) if lines or site else None
+
+
+def lines_at(own: Sequence[Line], site: UsedSite | None) -> list[Line]:
+    """The lines of the settings, and the gates of a site that have other names."""
+    names = {line.name for line in own}
+    return [*own, *(gate for gate in (site.gates if site else ()) if gate.name not in names)]
+
+
+def ways_of(counter: LineCounter) -> dict[str, tuple[str, str]]:
+    """The two directions of each line."""
+    return {line.name: line.directions for line in counter.lines}
 
 
 def _reals(rows: pa.Table, name: str) -> Floats:

@@ -30,6 +30,7 @@ class Part:
 
     def __init__(self, folder: Path, subject: Subject, decisions: bool) -> None:
         self.subject = subject
+        self._ways = [(line.name, way) for line in subject.lines for way in line.directions]
         self._counted: Counter[tuple[str, str]] = Counter()
         with ExitStack() as stack:  # on a full disk, files already open are closed
             self._summary = subject.summary(folder, self._totals)
@@ -81,9 +82,10 @@ class Part:
 
     def _totals(self) -> dict[str, dict[str, int]]:
         """The part's counts by line and direction."""
-        return {
-            line.name: {way: self._counted[line.name, way] for way in line.directions} for line in self.subject.lines
-        }
+        found: dict[str, dict[str, int]] = {}
+        for line, way in self._ways:
+            found.setdefault(line, {})[way] = self._counted[line, way]
+        return found
 
 
 def columns_of(subject: Subject) -> Sequence[Column]:

@@ -7,7 +7,7 @@ import shutil
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Thread
 
@@ -18,6 +18,7 @@ from vidtrack.errors import Error, StoppedEarly
 from vidtrack.output.folder import writing
 from vidtrack.output.linefile import Every
 from vidtrack.output.repair import is_unfinished, repair
+from vidtrack.output.scene import SCENE, write_scene
 from vidtrack.output.sink import Step
 from vidtrack.output.tables import track_rows
 from vidtrack.output.thinned import Pace
@@ -34,6 +35,7 @@ from vidtrack.traffic.metres import UsedSite
 log = logging.getLogger(__name__)
 
 _LOOK_S = 2.0  # between two checks of sizes
+_SCENE_S = 10.0  # between two pictures of the scene, over which a site is drawn meanwhile
 _MOST = 100_000  # crossings that wait for room on the disk
 
 
@@ -77,7 +79,7 @@ class Parts:
         self._pace = Pace(subject.settings.output.every_s)
         self._crossings: deque[Crossing] = deque(maxlen=_MOST)
         self._ended: list[Part] = []
-        self._look = Every(_LOOK_S)
+        self._look, self._show = Every(_LOOK_S), Every(_SCENE_S)
         self._finishing: list[Thread] = []
         unfinished = [part for part in parts_of(root) if is_unfinished(part)]
         self._whole = None if roll_s is None else subject.summary(root)
@@ -91,6 +93,10 @@ class Parts:
         """Write a batch. Raises StoppedEarly on a write error; a later batch may succeed."""
         if self._site is not None and self._site.changed():
             self._use(self._site.used)
+        if self._site is not None and self._subject.scene is not None and steps and self._is_scene_due():
+            with suppress(Error, OSError):  # whoever draws has the last one
+                self._reserve.check_tracks(self._root)
+                write_scene(self._root, self._subject.scene())
         filled = [step for step in steps if len(step.tracks)]
         needed = self._subject.road is not None or self._subject.settings.output.level != "counts"
         rows = track_rows(filled, columns_of(self._subject), self._subject.road) if filled and needed else None
@@ -174,10 +180,13 @@ class Parts:
         """Go on at another site; the next part is its first."""
         self._subject = self._subject.at(site)
         if self._counting is not None:
-            self._counting.use(site.classes)
+            self._counting.use(site)
         if self._events is not None:
             self._events.change(self._subject)
         log.info("the site has changed; a new part begins with it")
+
+    def _is_scene_due(self) -> bool:
+        return self._show() or not (self._root / SCENE).exists()
 
     def _begin(self) -> Part:
         self._number = self._period()

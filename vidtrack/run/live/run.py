@@ -21,19 +21,20 @@ from vidtrack.output.lock import exclusive
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard, trouble_of
 from vidtrack.recording.event_pictures import EventPictures
-from vidtrack.recording.recorder import Beginning, NoRecorder, Recorder
+from vidtrack.recording.recorder import Beginning, NoRecorder, Place, Recorder
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Limits
 from vidtrack.run.live.checkpoint import Checkpoint, CheckpointFile, NoCheckpointFile
-from vidtrack.run.live.counting import COUNTS, counting_of
+from vidtrack.run.live.counting import COUNTS, counter_of, counting_of
 from vidtrack.run.live.events import OUTBOX, LiveEvents
 from vidtrack.run.live.limits import part_sizes, retention_of
 from vidtrack.run.live.outputs import LiveExtras, Outputs, lock_extras, lock_folder
 from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.run import recorded
-from vidtrack.run.sinks import Subject, line_counter
+from vidtrack.run.sinks import Subject
 from vidtrack.run.trackers import build_blob_tracker
-from vidtrack.run.video import build_detector, video_steps
+from vidtrack.run.video import build_detector, kept, video_steps
+from vidtrack.traffic.metres import UsedSite
 from vidtrack.video.frame import Frame
 from vidtrack.video.live.address import parse_address
 from vidtrack.video.live.connection import Connection, connection_to
@@ -54,7 +55,7 @@ class LiveRun:
     name    of the source, without credentials
     folder  of the results
     board   current status, for other threads
-    counts  folder of the counts by interval; None without counting lines
+    counts  folder of the counts by interval; None without counting lines and site
 
     After the first picture only `stop` ends the iteration: a lost camera is reopened without limit, and results that
     cannot be written are counted.
@@ -113,7 +114,9 @@ class LiveRun:
                 self._checkpoint.gather()  # raises ConfigError for a detector that cannot be saved
             if retention.has_sizes:
                 retention.refuse_small(*part_sizes(settings, source.like, recorded=extras.record is not None))
-            counter = line_counter(settings, source.width, source.height)
+            self._site = self._followed(stats.warn)
+            self._at = None if self._site is None else self._site.used  # the site that is tracked at
+            counter = counter_of(settings, source.width, source.height, self._at)
             shown, scene = self._address.shown, self._checkpoint.detector.scene
             self.folder = lock_folder(output, self.name, extras, locks, force=force, in_parts=roll_s is not None)
             retention.results.append(self.folder)
@@ -121,7 +124,6 @@ class LiveRun:
             self.board = StatusBoard(shown, self._account, source.latency_s, settings.output, counter, zone)
             self._status = lambda: asdict(self.board.now())
             subject = Subject(shown, settings, source.like.shape, source.fps, scene, self._reading, counter, None)
-            self._site = self._followed(stats.warn)
             subject = subject if self._site is None else subject.at(self._site.used)
             self.counts = None if counter is None else (extras.lasting or self.folder) / COUNTS
             told = None if self._events is None else self._events.crossed
@@ -214,7 +216,7 @@ class LiveRun:
             return None
         limits = Limits(live.keep_pictures_s, live.keep_pictures_bytes)
         quality, reserve = self._settings.output.jpeg_quality, Reserve(live.reserve_bytes)
-        return EventPictures(root, subject.lines, zone_of(live.zone), quality, limits, reserve)
+        return EventPictures(root, subject.counter, zone_of(live.zone), quality, limits, reserve)
 
     def _trouble(self) -> str | None:
         """Why the camera does not deliver, with the last problem of a lost one; None if it does."""
@@ -255,6 +257,8 @@ class LiveRun:
             if span.over(frame.time_s):
                 break
             place = self._source.place
+            if self._site is not None and self._site.used is not self._at:
+                self._use(self._site.used, place)
             recorder.log_frame(frame, place, self._beginning() if recorder.begins(place) else None)
             self._checkpoint_file.offer(checkpoint)
             self._in_work = True
@@ -262,7 +266,15 @@ class LiveRun:
 
     def _beginning(self) -> Beginning:
         """What the repetition of a recording begins with, now."""
-        return Beginning(self._checkpoint.gather(), None if self._site is None else self._site.used.text)
+        return Beginning(self._checkpoint.gather(), None if self._at is None else self._at.text)
+
+    def _use(self, site: UsedSite, place: Place) -> None:
+        """Track at another site: with other masks from the next part of the recording on, which has the site's text."""
+        was = () if self._at is None else self._at.masked
+        if site.masked == was or self._recorder.may_change(place):
+            mask = kept(self._settings, site.masked, self._source.width, self._source.height)
+            self._checkpoint.detector.keep(mask)
+            self._at = site
 
     def _reading(self) -> Mapping[str, Any]:
         """The run's counters, for the summary and the page."""

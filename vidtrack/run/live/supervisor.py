@@ -122,8 +122,9 @@ class Supervisor:
         return self._request(PICTURE) or None
 
     def counts(self) -> Path | None:
-        """The folder of its counts by interval; None without counting lines."""
-        return counts_of(self.job) if self.job.settings.output.lines else None
+        """The folder of its counts by interval; None without counting lines and site."""
+        output = self.job.settings.output
+        return counts_of(self.job) if output.lines or output.site else None
 
     @property
     def error(self) -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
@@ -50,14 +51,15 @@ class Desk:
     file     of the site; new: the site, where there is no file yet
     scene    the camera's picture; None: plain grey
     plan     a plan of the road beside it, and the file that its world file stands beside
+    live     file of the camera's newest picture, if the run goes on: it takes the place of `scene`
     """
 
     def __init__(
         self, name: str, recount: Recount, file: SiteFile, new: Tree, scene: Picture | None,
-        plan: tuple[Path, Picture] | None,
+        plan: tuple[Path, Picture] | None, live: Path | None = None,
     ) -> None:  # fmt: skip
         self._name, self._recount, self.file, self._new = name, recount, file, new
-        self._scene, self._plan = scene, plan
+        self._scene, self._plan, self._live = scene, plan, live
         self._draft, self._counting = Draft(recount), Lock()
         self._editors: dict[str, float] = {}
 
@@ -67,7 +69,7 @@ class Desk:
             routes=[
                 Route("/", lambda request: FileResponse(_STATIC / "page.html")),
                 Route("/drawing", self.drawing),
-                Route("/scene", lambda request: _picture(self._scene)),
+                Route("/scene", lambda request: _picture(self._newest() or self._scene)),
                 Route("/plan", lambda request: _picture(self._plan and self._plan[1])),
                 Route("/look", self.look, methods=["POST"]),
                 Route("/paths", self.paths, methods=["POST"]),
@@ -91,7 +93,8 @@ class Desk:
                 "file": str(self.file.path),
                 "tree": tree or self._new,
                 "digest": digest,
-                "scene": self._scene and self._scene.name,
+                "scene": self._live.name if self._live and self._shown() else self._scene and self._scene.name,
+                "shown": self._shown(),
                 "plan": plan,
                 "until_s": self._recount.until_s,
             }
@@ -113,14 +116,31 @@ class Desk:
         return JSONResponse(await run_in_threadpool(self._save, asked["tree"], asked["digest"], asked["world"]))
 
     async def here(self, request: Request) -> Response:
-        """A page tells that it is open, or closes: {editor, open}. The file's digest, and how many others are open."""
+        """A page tells that it is open, or closes: {editor, open}.
+
+        The file's digest, how many others are open, and which picture of a run that goes on is the newest.
+        """
         asked = await _asked(request, editor=str, open=bool)
         now = time.monotonic()
         self._editors = {one: at for one, at in self._editors.items() if now - at < _GONE_S and one != asked["editor"]}
         others = len(self._editors)
         if asked["open"] and others < _MOST_EDITORS:
             self._editors[asked["editor"]] = now
-        return JSONResponse({"digest": await run_in_threadpool(self.file.digest), "others": others})
+        found = {"digest": await run_in_threadpool(self.file.digest), "others": others, "shown": self._shown()}
+        return JSONResponse(found)
+
+    def _shown(self) -> str | None:
+        """What is another for every picture of a run that goes on."""
+        with suppress(OSError):
+            if self._live is not None:
+                return str(self._live.stat().st_mtime_ns)
+        return None
+
+    def _newest(self) -> Picture | None:
+        with suppress(OSError):
+            if self._live is not None:
+                return Picture(self._live.name, self._live.read_bytes(), "image/jpeg")
+        return None
 
     def _look(self, tree: Tree, count: bool) -> dict[str, Any]:
         with self._counting:

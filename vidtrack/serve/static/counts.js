@@ -16,6 +16,7 @@ async function followCounts(camera) {
         if (chosen() === camera) {
           showCounts(camera);
           showHistory(camera);
+          showEvents(camera);
         }
       }
     }
@@ -84,7 +85,9 @@ function showCounts(camera) {
       number(camera.status.counts?.[line]?.[name]));
     const arrow = element("i", ARROWS[name] ?? "");
     made.children[1].className = `way ${WAYS[place % 2]}`;
-    made.children[1].append(arrow, ` ${name}`);
+    const word = element("span", ` ${name}`);
+    word.className = "word";
+    made.children[1].append(arrow, word);
     return made;
   })));
 }
@@ -113,6 +116,29 @@ async function showHistory(camera) {
   if (!counts || section.dataset.asked !== asked) return;
   const since = day.value ? counts.since_s : beginning(counts.intervals, counts.since_s, counts.until_s);
   draw(section.querySelector(".charts"), { ...counts, since_s: since }, linesOf(camera));
+}
+
+/* The pictures of the last events of the enlarged camera, where they are kept. */
+async function showEvents(camera) {
+  const section = one.querySelector(".events");
+  const place = `camera/${encodeURIComponent(camera.status.name)}/`;
+  const paths = (await fetched(`${place}pictures.json`)) ?? [];
+  if (one.camera !== camera || section.dataset.of === `${place} ${paths}`) return;
+  section.dataset.of = `${place} ${paths}`;
+  section.hidden = paths.length === 0;
+  section.querySelector("ul").replaceChildren(...paths.map((path) => {
+    const [day, time] = path.split("/").at(-1).split("T");
+    const [link, picture] = [document.createElement("a"), document.createElement("img")];
+    link.href = picture.src = place + path;
+    link.target = "_blank";
+    picture.loading = "lazy";
+    picture.alt = "";
+    link.append(picture, element("time", time.slice(0, 8).replaceAll("-", ":")));
+    link.title = day;
+    const item = document.createElement("li");
+    item.append(link);
+    return item;
+  }));
 }
 
 function draw(charts, counts, lines) {

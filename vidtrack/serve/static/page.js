@@ -126,6 +126,7 @@ function route() {
   one.querySelector(".charts").replaceChildren();
   showOne(camera);
   showHistory(camera);
+  showEvents(camera);
   scrollTo(0, 0);
 }
 
@@ -157,14 +158,19 @@ async function watch(picture, of, every) {
   }
 }
 
-function alarm(camera) {
-  const [word, why] = trouble(camera.status);
-  const item = document.createElement("li");
-  const link = document.createElement("a");
-  link.href = `#${encodeURIComponent(camera.status.name)}`;
-  link.append(element("b", camera.status.name), ` ${word}${why ? `: ${why}` : ""}`);
-  item.append(link);
-  return item;
+/* The cameras that are down; a link that is there stays, so that a click begins and ends on it. */
+function alarms(down) {
+  const list = document.getElementById("alerts");
+  while (list.children.length > down.length) list.lastChild.remove();
+  down.forEach((camera, place) => {
+    const [word, why] = trouble(camera.status);
+    if (place === list.children.length) list.append(document.createElement("li"));
+    const item = list.children[place];
+    const link = item.firstChild ?? document.createElement("a");
+    link.href = `#${encodeURIComponent(camera.status.name)}`;
+    link.replaceChildren(element("b", camera.status.name), ` ${word}${why ? `: ${why}` : ""}`);
+    if (!item.firstChild) item.append(link);
+  });
 }
 
 function showAll(statuses) {
@@ -180,7 +186,7 @@ function showAll(statuses) {
   summary.textContent = down.length ? `${count - down.length} of ${count} cameras deliver` : all;
   summary.classList.toggle("bad", down.length > 0);
   document.title = down.length ? `vidtrack (${down.length} down)` : "vidtrack";
-  document.getElementById("alerts").replaceChildren(...down.map(alarm));
+  alarms(down);
   wall.classList.toggle("dense", count > FEW);
   wall.style.setProperty("--columns", Math.min(5, Math.ceil(Math.sqrt(count))));
   wall.style.setProperty("--head", `${document.querySelector("header").offsetHeight}px`);

@@ -9,6 +9,9 @@ from vidtrack.associate.kbest import k_best
 from vidtrack.compiled import kernel
 from vidtrack.tracking.deferred.hypotheses import Hypotheses, log_sum
 
+WORK = 2_000_000
+"""Measurements, leaves and pairs of a cluster that the search for its children may go through, in all its solutions."""
+
 NEVER = -1e6
 """ln of the factor that stands for probability zero; hypotheses with the fewest such factors win."""
 
@@ -30,7 +33,7 @@ def children(
     / clutter density); log_missed (T,) = ln(1 - P_D); log_new (M,) = ln(new density / clutter density), -inf for
     what starts no track. In each child every measurement continues one leaf of its parent, starts a track or is
     false (Reid's formula over the clutter density of all measurements, SPEC 001). Children less probable than the
-    likeliest by over `slack` [ln] are left out.
+    likeliest by over `slack` [ln] are left out, in very large clusters those that WORK does not reach too.
 
     The children's leaves are codes: pair p is p, leaf t missed is P + t, a track that measurement j starts is
     P + T + j.
@@ -83,7 +86,10 @@ def _children(
                     cost.append(log_missed[t] - log_ratio[p])
             bound[i + 1] = len(edge)
             alone[i, 1] = -log_new[own[i]]
-        problem, choice, total = k_best(offset, held, bound, np.array(column), np.array(cost), alone, most, slack)
+        solutions = WORK // (len(edge) + len(own) + len(members) + 1)
+        problem, choice, total = k_best(
+            offset, held, bound, np.array(column), np.array(cost), alone, most, slack, solutions
+        )
         total = -total - log_sum(-total)
         for n in range(len(problem)):
             h = a + problem[n]

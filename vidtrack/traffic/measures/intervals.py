@@ -79,12 +79,15 @@ def figure_columns(found: Figures) -> dict[str, tuple[str, Any]]:
 
 
 def figures(passed: Passed, confidence: Floats, length: Floats, edges: Floats, watched: Floats, ways: int) -> Figures:
-    """Sum up passings; `watched` (I,) is the coverage. Where nobody watched all is NaN, else zeros are written."""
+    """Sum up passings. Where nobody watched all is NaN, else zeros are written.
+
+    watched  (I,) or (W, I) the coverage
+    """
     bins = len(edges) - 1
     interval = np.clip(np.searchsorted(edges, passed.t, side="right") - 1, 0, bins - 1)
     cell = (2 * passed.gate + passed.side) * bins + interval
     cells = ways * bins
-    seen = np.tile(np.where(watched > 0, watched, np.nan), ways)
+    seen = np.broadcast_to(np.where(watched > 0, watched, np.nan), (ways, bins)).ravel()
     seconds = np.tile(np.diff(edges), ways) * seen
 
     count = _sum(cell, None, cells) + 0 * seen

@@ -19,9 +19,19 @@ _OPEN = 4  # least number of pixels over which a beam fades into the scene
 
 def lamps_light(luma: Image, scene: Levels, black: np.float32) -> bool:
     """Whether lamps light the scene (h, w): it is dark, and they are seen in the picture's luma (h, w)."""
-    looked_at = scene[::_EVERY, ::_EVERY]
-    dark = 2 * np.count_nonzero(looked_at < black + _DARK) > looked_at.size  # a median takes six times as long
-    return bool(dark and luma.max() > black + _LAMP)
+    return bool(_dark(scene, black + np.float32(_DARK)) and luma.max() > black + _LAMP)
+
+
+@kernel
+def _dark(scene: Levels, limit: np.float32) -> bool:
+    """Whether most of the scene (h, w) is below a limit."""
+    h, w = scene.shape
+    dark = looked_at = 0
+    for y in range(0, h, _EVERY):
+        for x in range(0, w, _EVERY):
+            looked_at += 1
+            dark += scene[y, x] < limit
+    return 2 * dark > looked_at
 
 
 @kernel(error_model="numpy")

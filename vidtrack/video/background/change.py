@@ -48,9 +48,9 @@ class Change:
         share, spread = _shares(mask, *_CELLS)
         changing = self._steady_s < self._time_s
         unseen = time_s - self._time_s > _UNSEEN_S
-        recent = self._recent[self._recent[:, 0] >= time_s - _SUDDEN_S]
-        self._recent = np.concatenate([recent, [[time_s, spread]]])
-        least_recent = float(self._recent[:, 1].min())
+        recent = [row for row in self._recent.tolist() if row[0] >= time_s - _SUDDEN_S] + [[time_s, spread]]
+        self._recent = np.array(recent)
+        least_recent = min(each for _, each in recent)
         least = self._steady_spread if changing or unseen else least_recent
         self._time_s = time_s
         sudden = spread - least > _SUDDEN and time_s - self._start_s > _SETTLED_S

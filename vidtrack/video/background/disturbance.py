@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -119,8 +118,7 @@ class Disturbance:
         elsewhere = anew and self._camera.lost_s > 0
         if anew:
             self._scene = self._start(picture, time_s)
-        foreground = self._view.foreground(mask, strength, place, motion)
-        return replace(foreground, weak=weak, warnings=self._camera.warnings(), elsewhere=elsewhere)
+        return self._view.foreground(mask, strength, place, motion, weak, self._camera.warnings(), elsewhere)
 
     def _rewind(self, time_s: float, picture: Picture) -> None:
         """Begin with this picture, the last of the preview, and the scene learnt from it."""
@@ -161,6 +159,10 @@ class Disturbance:
         if self._is_new_second(dt):
             self._absorb(picture, scene, hit)
         return mask, weak, strength
+
+    def keep(self, mask: Image | None) -> None:
+        """Find no foreground where a mask (h, w) is dark."""
+        self._view.keep = mask
 
     def scene(self) -> Image:
         """(H, W, 3) the learnt scene as the first picture showed it, in source size, blue-green-red."""
@@ -204,18 +206,18 @@ class Disturbance:
         """Strength, hits (1 disturbed, SHADOW, BEAM, or 0), and hits above a lower threshold."""
         s = self._settings
         strength = np.empty(picture.luma.shape, np.float32)
-        weak = np.empty(picture.luma.shape, np.uint8)
+        weak, hit = np.empty((2, *picture.luma.shape), np.uint8)
         seen = picture if s.chroma else picture.grey()
         floor, factor, chroma = self._thresholds
         floor *= self._contrast if s.contrast else np.float32(1)
-        disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak)
+        disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak, hit)
         if s.shadow:
             count = mark_shadow(seen, scene, self._black, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
         if s.beams and lamps_light(seen.luma, scene.luma, black):
             mark_beams(seen.luma, scene.luma, black, weak)
-        hit = strong(strength, weak)
+        strong(weak, hit)
         if s.shadow and s.amid:
             reclaim(hit)
         return strength, hit, weak

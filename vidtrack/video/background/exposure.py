@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.median import median
 from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
 from vidtrack.video.background.picture import Picture
@@ -51,7 +52,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
                 n += 1
     if 10 * n < len(ratio) or _mostly_steady(ratio[:n]):
         return np.float32(1)
-    g = np.float32(np.median(ratio[:n]))
+    g = np.float32(median(ratio[:n]))
     return g if 1 / _LARGEST < g < _LARGEST else np.float32(1)
 
 

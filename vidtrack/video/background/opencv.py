@@ -35,6 +35,10 @@ class OpenCV:
         mask = cv2.medianBlur(np.where(found > _SHADOW, np.uint8(255), np.uint8(0)), _WINDOW)
         return self._view.foreground(np.asarray(mask, np.uint8), (mask > 0).astype(np.float32))
 
+    def keep(self, mask: Image | None) -> None:
+        """Find no foreground where a mask (h, w) is dark."""
+        self._view.keep = mask
+
     def scene(self) -> Image:
         """(H, W, 3) the model's background in source size, blue-green-red."""
         h, w = self._view.shape

@@ -35,6 +35,10 @@ class Paper:
         self._average = (1 - s.weight) * self._average + s.weight * intensity
         return self._view.foreground(np.where(strength > 1, np.uint8(255), np.uint8(0)), strength)
 
+    def keep(self, mask: Image | None) -> None:
+        """Find no foreground where a mask (h, w) is dark."""
+        self._view.keep = mask
+
     def scene(self) -> Image:
         """(H, W, 3) the running average in source size, grey as blue-green-red."""
         none = np.empty((0, 0))

@@ -37,6 +37,7 @@ class View:
 
     step   source pixels per processed pixel; small pictures keep at least 2 x 2
     black  luminance of black
+    keep   where traffic is looked for; None: everywhere
     """
 
     STATE = ("_shape", "step", "black")
@@ -44,7 +45,7 @@ class View:
     def __init__(self, scale: float | None, keep: NDArray | None) -> None:
         """scale: processed over source size, None: by the rows; keep (any size): dark pixels have no foreground."""
         self._scale = scale
-        self._keep = keep
+        self.keep = keep
         self._shape: tuple[int, int] | None = None
         self.step = 1
         self.black = 0
@@ -71,27 +72,29 @@ class View:
         return reduce(frame, self.step)
 
     def foreground(
-        self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY
-    ) -> Foreground:
+        self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY,
+        weak: Image | None = None, warnings: tuple[str, ...] = (), elsewhere: bool = False,
+    ) -> Foreground:  # fmt: skip
         """The Foreground of a mask (h, w), 0 and 255, cleared where `keep` is dark, and its strength (h, w).
 
         place, motion  (2, 3) from the mask to the scene and to the picture [processed px]
+        weak, warnings, elsewhere  of the Foreground
         """
-        if self._keep is not None:
+        if self.keep is not None:
             h, w = self.reduced
-            keep = cv2.resize(self._keep, (w, h), interpolation=cv2.INTER_NEAREST)
-            if keep.shape != mask.shape or not np.array_equal(place, affine.IDENTITY):
+            keep = cv2.resize(self.keep, (w, h), interpolation=cv2.INTER_NEAREST)
+            if keep.shape != mask.shape or not affine.is_identity(place):
                 back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
                 keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
             mask = np.where(keep > 127, mask, np.uint8(0))
-        return Foreground(mask, strength, self.step, *self._views(place, motion))
+        return Foreground(mask, strength, self.step, *self._views(place, motion), weak, warnings, elsewhere)
 
     def _views(self, place: Floats, motion: Floats) -> tuple[Floats | None, Floats | None, Floats]:
         """Maps from mask to scene and from scene to picture, None for the identity, and the picture's left, top, right,
         bottom (4,) in the scene; all in source px.
         """
         h, w = (side * self.step for side in self.reduced)
-        if np.array_equal(place, affine.IDENTITY) and np.array_equal(motion, affine.IDENTITY):
+        if affine.is_identity(place) and affine.is_identity(motion):
             return None, None, np.array([0.0, 0.0, w, h])
         to_scene = affine.rescaled(place, float(self.step))
         to_picture = affine.after(affine.rescaled(motion, float(self.step)), affine.inverse(to_scene))

@@ -61,14 +61,14 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
     for k in range(len(row)):
         y, blob = row[k], label[k]
         area[blob] += stop[k] - start[k]
-        alike = 0
+        alike = np.int32(0)
         for x in range(start[k], stop[k]):
-            alike += abs(np.float32(luma[y, x]) - scene.former[y, x]) < _ALIKE
+            alike += np.int32(abs(np.float32(luma[y, x]) - scene.former[y, x]) < _ALIKE)
         returned[blob] += alike
         if y < _REACH or y >= h - _REACH:
             continue
         for x in range(max(start[k], _REACH), min(stop[k], w - _REACH)):
-            if start[k] < x < stop[k] - 1 and mask[y - 1, x] > 0 and mask[y + 1, x] > 0:
+            if mask[y - 1, x] & mask[y + 1, x] != 0 and start[k] < x < stop[k] - 1:
                 continue
             border[blob] += 1
             in_scene[blob] += _contrast(scene.luma, y, x)

@@ -22,7 +22,7 @@ NEVER = np.float32(-1000)  # unlike any luminance
 UNKNOWN = np.float32(1e4)  # noise of what was never in the picture
 UNSEEN = np.uint8(1)  # value of what is covered by nothing, but outside the picture
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
-_NONE = np.float32(0)
+_NONE, _ALL = np.float32(0), np.float32(1)
 _STEADY = np.float32(10)  # grey levels; what covers the scene is the same as long as it changes by less
 _QUIET = np.float32(1)  # grey levels; noise below it limits deviations as if it were this
 
@@ -83,30 +83,44 @@ def learn(
     luma += weight (Y - luma), chroma alike, noise += noise_weight (|Y - luma| - noise).
     """
     h, w = covered.shape
+    taken = np.zeros(w + w % 2, np.uint8)  # not 0: not learnt
     for y in range(h):
+        free = True
         for x in range(w):
-            free = covered[y, x] | hit[y, x] & RELIT == 0
+            taken[x] = UNSEEN if covered[y, x] == UNSEEN else covered[y, x] | hit[y, x] & RELIT
+            free &= taken[x] == 0
+        for x in range(w):
             noise = scene.noise[y, x]
             d = np.float32(picture.luma[y, x]) - scene.luma[y, x]
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
-            scene.luma[y, x] += (weight if free else _NONE) * d
-            scene.noise[y, x] = noise + (noise_weight if free else _NONE) * (deviation - noise)
-            passed = _NONE if covered[y, x] == UNSEEN else dt
-            scene.covered_s[y, x] = _NONE if free else scene.covered_s[y, x] + passed
-            if free:
-                scene.steady_s[y, x] = _NONE
-            elif covered[y, x] != UNSEEN:
-                change = np.float32(picture.luma[y, x]) - scene.cover[y, x]
-                steady = abs(change) < max(_STEADY, _SURPRISE * noise)
-                scene.cover[y, x] += (weight if steady else np.float32(1)) * change
-                scene.steady_s[y, x] = scene.steady_s[y, x] + dt if steady else _NONE
+            scene.luma[y, x] += (weight if taken[x] == 0 else _NONE) * d
+            scene.noise[y, x] = noise + (noise_weight if taken[x] == 0 else _NONE) * (deviation - noise)
+        if free:
+            scene.covered_s[y], scene.steady_s[y] = _NONE, _NONE
+        else:
+            _count(picture.luma[y], scene, y, taken, weight, dt)
         if len(picture.cb) > 0 and y % 2 == 0:
-            for x in range((w + 1) // 2):
-                right = min(2 * x + 1, w - 1)  # the pixels that share one of chroma
-                taken = covered[y, 2 * x] | covered[y, right] | (hit[y, 2 * x] | hit[y, right]) & RELIT
-                share = weight if taken == 0 else _NONE
+            taken[-1] |= taken[w - 1]
+            for x in range(len(taken) // 2):  # four pixels share one of chroma; the upper two decide
+                share = weight if taken[2 * x] | taken[2 * x + 1] == 0 else _NONE
                 scene.cb[y // 2, x] += share * (np.float32(picture.cb[y // 2, x]) - scene.cb[y // 2, x])
                 scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])
+
+
+@kernel
+def _count(luma: Image, scene: Scene, y: int, taken: Image, weight: np.float32, dt: np.float32) -> None:
+    """Count the seconds of cover in row y, where taken (w,) is not 0, and average the cover."""
+    for x in range(len(luma)):
+        passed = _NONE if taken[x] == UNSEEN else dt
+        scene.covered_s[y, x] = _NONE if taken[x] == 0 else scene.covered_s[y, x] + passed
+    for x in range(len(luma)):
+        change = np.float32(luma[x]) - scene.cover[y, x]
+        steady = abs(change) < max(_STEADY, _SURPRISE * scene.noise[y, x])
+        share = weight if steady else _ALL
+        scene.cover[y, x] += (share if taken[x] > UNSEEN else _NONE) * change
+        lasted = scene.steady_s[y, x] + dt if steady else _NONE
+        known = lasted if taken[x] > UNSEEN else scene.steady_s[y, x]
+        scene.steady_s[y, x] = _NONE if taken[x] == 0 else known
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -70,10 +71,11 @@ class Sunlight:
     @property
     def tolerance(self) -> Tolerance:
         """The limits of the shadow test in this light."""
-        shadow, darkened = self._count[_HARDEST:_MILDEST], self._count[_BINS]
-        pairs = shadow[:-1] + shadow[1:]
-        least = int(pairs.argmax())
-        peak = pairs[least]
+        count: list[float] = self._count.tolist()
+        shadow, darkened = count[_HARDEST:_MILDEST], count[_BINS]
+        pairs = [one + other for one, other in pairwise(shadow)]
+        peak = max(pairs)
+        least = pairs.index(peak)
         if darkened < _LEAST or peak < _PEAK * darkened:
             return SOFT
         while least > 0 and shadow[least - 1] > _TAIL * peak:
@@ -90,6 +92,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     there is structure and less light.
     """
     count = np.zeros(_BINS + 1)
+    darkened = 0
     row, start, stop = find_runs(hit, OBJECTS)
     coloured = len(picture.cb) > 0
     share = tolerance.texture_share if coloured else _GREY_SHARE
@@ -101,17 +104,19 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
             if not r < _LIGHTEST:
                 continue
             missed, structure = _texture(picture.luma, scene.luma, y, x, r)
-            count[_BINS] += structure > _STRUCTURE
+            darkened += structure > _STRUCTURE
             if r * _BINS < _HARDEST:
                 continue
             off, colour = _colour(picture, scene, y // 2, x // 2, r) if coloured else (np.float32(0), np.float32(0))
-            count[int(r * _BINS)] += structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA
+            if structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA:
+                count[int(r * _BINS)] += 1
             if (
                 r >= tolerance.darkest
                 and off < _CHROMA + tolerance.chroma_share * colour
                 and missed < tolerance.texture + share * light
             ):
                 hit[y, x] = SHADOW
+    count[_BINS] = darkened
     return count
 
 

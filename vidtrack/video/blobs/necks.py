@@ -10,7 +10,8 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
 from vidtrack.video.frame import Image
 
-_LEVELS = 8  # per pixel of distance, for sorting
+_LEVELS = np.float32(8)  # per pixel of distance, for sorting
+_INSIDE = np.float32(0.5)  # px; pixels of the region are at least so far from the nearest one outside
 
 
 def half_width(inside: Image, border: tuple[int, int, int, int]) -> NDArray[np.float32]:
@@ -41,19 +42,31 @@ def parts(depth: NDArray[np.float32], neck: float, least: Floats) -> tuple[Ints,
 @kernel
 def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[Ints, int]:
     h, w = depth.shape
-    order = _deepest_first(depth)
-    label = np.full((h, w), -1)
-    parent, peak = [0 for _ in range(0)], [0.0 for _ in range(0)]
+    wide = w + 2  # with a rim on each side no pixel needs a look whether it has neighbours
+    deep, label = np.zeros((h + 2) * wide, np.float32), np.full((h + 2) * wide, np.int32(-1))
+    for y in range(h):
+        for x in range(w):
+            deep[(y + 1) * wide + x + 1] = depth[y, x]
+    order = _deepest_first(deep)
+    parent, peak = np.empty(len(order), np.int64), np.empty(len(order))
     one, other, saddle = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
+    basins = 0
     for p in order:
-        y, x = p // w, p % w
-        d = depth[y, x]
+        d = np.float64(deep[p])
+        lowest, highest = len(order), -1  # of the neighbours' labels; nearly all pixels have one, or none
+        for row in range(p - wide, p + wide + 1, wide):
+            for q in range(row - 1, row + 2):
+                lowest = min(lowest, label[q] if label[q] >= 0 else lowest)
+                highest = max(highest, label[q])
+        if lowest == highest:
+            label[p] = _root(parent, lowest)
+            continue
         best, height = -1, -1.0
-        for j in range(max(y - 1, 0), min(y + 2, h)):
-            for i in range(max(x - 1, 0), min(x + 2, w)):
-                if label[j, i] < 0:
+        for row in range(p - wide, p + wide + 1, wide):
+            for q in range(row - 1, row + 2):
+                if label[q] < 0:
                     continue
-                root = _root(parent, label[j, i])
+                root = _root(parent, np.int64(label[q]))
                 if best >= 0 and root != best:
                     if d > neck * min(peak[root], peak[best]):  # no neck: one part
                         keep, gone = (root, best) if peak[root] > peak[best] else (best, root)
@@ -63,58 +76,73 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
                     one.append(root)
                     other.append(best)
                     saddle.append(d)
-                if depth[j, i] > height:
-                    best, height = root, depth[j, i]
+                if deep[q] > height:
+                    best, height = root, deep[q]
         if best < 0:
-            best = len(parent)
-            parent.append(best)
-            peak.append(d)
-        label[y, x] = best
-    _absorb_small(label, parent, one, other, saddle, least)
-    return _numbered(label, parent)
+            best, basins = basins, basins + 1
+            parent[best], peak[best] = best, d
+        label[p] = best
+    basin, parent = label.reshape(h + 2, wide)[1:-1, 1:-1], parent[:basins]
+    _absorb_small(_extents(basin, len(parent)), parent, one, other, saddle, least)
+    return _numbered(basin, parent)
 
 
 @kernel
 def _deepest_first(depth: NDArray[np.float32]) -> Ints:
-    """Pixels inside the region by decreasing depth; counting sort."""
-    flat = depth.ravel()
-    deepest = 0
-    for d in flat:
-        deepest = max(deepest, int(d * _LEVELS))
-    count = np.zeros(deepest + 2, np.int64)
-    for d in flat:
-        count[deepest - int(d * _LEVELS) + 1] += 1
+    """The pixels of (N,) inside the region by decreasing depth; counting sort."""
+    deepest = np.float32(0)
+    for p in range(len(depth)):
+        deepest = max(deepest, depth[p])
+    most = int(deepest * _LEVELS)
+    count = np.zeros(most + 2, np.int64)
+    for p in range(len(depth)):
+        if depth[p] >= _INSIDE:
+            count[most - int(depth[p] * _LEVELS) + 1] += 1
     for bucket in range(1, len(count)):
         count[bucket] += count[bucket - 1]
-    order = np.empty(len(flat), np.int64)
-    for p in range(len(flat)):
-        bucket = deepest - int(flat[p] * _LEVELS)
-        order[count[bucket]] = p
-        count[bucket] += 1
-    outside = 0
-    while outside < len(order) and flat[order[len(order) - 1 - outside]] < 0.5:
-        outside += 1
-    return order[: len(order) - outside]
+    order = np.empty(count[-1], np.int64)
+    for p in range(len(depth)):
+        if depth[p] >= _INSIDE:
+            bucket = most - int(depth[p] * _LEVELS)
+            order[count[bucket]] = p
+            count[bucket] += 1
+    return order
+
+
+@kernel
+def _extents(basin: Ints, count: int) -> Ints:
+    """(count, 4) left, top, right, bottom of each basin (h, w), last pixels included."""
+    h, w = basin.shape
+    extent = np.empty((count, 4), np.int64)
+    for b in range(count):
+        extent[b, 0], extent[b, 1], extent[b, 2], extent[b, 3] = w, h, -1, -1
+    for y in range(h):
+        x = 0
+        while x < w:
+            b, start = basin[y, x], x
+            while x < w and basin[y, x] == b:
+                x += 1
+            if b >= 0:
+                extent[b, 0], extent[b, 1] = min(extent[b, 0], start), min(extent[b, 1], y)
+                extent[b, 2], extent[b, 3] = max(extent[b, 2], x - 1), y
+    return extent
 
 
 @kernel
 def _absorb_small(
-    label: Ints, parent: list[int], one: list[int], other: list[int], saddle: list[float], least: float
+    extent: Ints, parent: Ints, one: list[int], other: list[int], saddle: list[float], least: float
 ) -> None:
-    """Join parts whose box is smaller than `least` to the neighbour with the widest neck, the smallest first."""
-    h, w = label.shape
-    low, high = np.full((len(parent), 2), 2**31), np.full((len(parent), 2), -1)
-    for y in range(h):
-        for x in range(w):
-            if label[y, x] >= 0:
-                r = _root(parent, label[y, x])
-                low[r, 0], low[r, 1] = min(low[r, 0], x), min(low[r, 1], y)
-                high[r, 0], high[r, 1] = max(high[r, 0], x), max(high[r, 1], y)
+    """Join parts whose box is smaller than `least` to the neighbour with the widest neck, the smallest first.
+
+    extent (N, 4) left, top, right, bottom of each basin, last pixels included.
+    """
+    for basin in range(len(parent)):
+        _widen(extent, _root(parent, basin), basin)
     while True:
         smallest, size, into = -1, least, -1
         for r in range(len(parent)):
-            area = (high[r, 0] - low[r, 0] + 1) * (high[r, 1] - low[r, 1] + 1)
-            if parent[r] != r or high[r, 0] < 0 or area >= size:
+            area = (extent[r, 2] - extent[r, 0] + 1) * (extent[r, 3] - extent[r, 1] + 1)
+            if parent[r] != r or area >= size:
                 continue
             neighbour, widest = -1, -1.0
             for k in range(len(saddle)):
@@ -126,29 +154,39 @@ def _absorb_small(
         if smallest < 0:
             return
         parent[smallest] = into
-        for axis in range(2):
-            low[into, axis] = min(low[into, axis], low[smallest, axis])
-            high[into, axis] = max(high[into, axis], high[smallest, axis])
+        _widen(extent, into, smallest)
+
+
+@kernel(inline="always")
+def _widen(extent: Ints, basin: int, by: int) -> None:
+    """Let the extent of a basin include that of another one."""
+    for axis in range(2):
+        extent[basin, axis] = min(extent[basin, axis], extent[by, axis])
+        extent[basin, 2 + axis] = max(extent[basin, 2 + axis], extent[by, 2 + axis])
 
 
 @kernel
-def _numbered(label: Ints, parent: list[int]) -> tuple[Ints, int]:
-    number = np.full(len(parent), -1)
+def _numbered(basin: Ints, parent: Ints) -> tuple[Ints, int]:
+    """(h, w) part of each pixel, numbered by their first pixels in raster order, and the number of parts."""
+    number, part = np.full(len(parent), -1), np.full(len(parent), -1)  # of a root, of a basin
+    label = np.full(basin.shape, -1)
     count = 0
-    h, w = label.shape
+    h, w = basin.shape
     for y in range(h):
         for x in range(w):
-            if label[y, x] >= 0:
-                r = _root(parent, label[y, x])
-                if number[r] < 0:
-                    number[r] = count
+            b = np.int64(basin[y, x])
+            if b >= 0 and part[b] < 0:
+                root = _root(parent, b)
+                if number[root] < 0:
+                    number[root] = count
                     count += 1
-                label[y, x] = number[r]
+                part[b] = number[root]
+            label[y, x] = part[b] if b >= 0 else -1
     return label, count
 
 
 @kernel
-def _root(parent: list[int], k: int) -> int:
+def _root(parent: Ints, k: int) -> int:
     while parent[k] != k:
         k = parent[k]
     return k

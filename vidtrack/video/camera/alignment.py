@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from vidtrack.arrays import affine
+from vidtrack.arrays.median import median
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
 from vidtrack.video.background.filters import area_average
@@ -192,10 +193,10 @@ def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[floa
             n += 1
     if not n:
         return 0.0, _SIGMA
-    centre = np.median(off[:n])
+    centre = median(off[:n])
     for k in range(n):
         off[k] = abs(off[k] - centre)
-    return centre, max(1.4826 * np.median(off[:n]), _SIGMA)
+    return centre, max(1.4826 * median(off[:n]), _SIGMA)
 
 
 @kernel

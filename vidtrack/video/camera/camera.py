@@ -56,13 +56,13 @@ class Camera:
     def __init__(self, still_s: float) -> None:
         """still_s: a camera counts as still after so long without motion."""
         self._rest_s = still_s
-        self.motion = self.place = affine.IDENTITY.copy()
+        self.motion = self.place = affine.IDENTITY
         self.moves = False
         self.fits = True
         self.lost_s = 0.0
         self._points = no_points()
         self._chosen_s = -np.inf
-        self._still = affine.IDENTITY.copy()  # motion and time of the last rest
+        self._still = affine.IDENTITY  # motion and time of the last rest
         self._still_s = 0.0
         self._tried_s = -np.inf  # last search without success
         self._time_s = 0.0
@@ -80,7 +80,7 @@ class Camera:
     @property
     def at_home(self) -> bool:
         """Whether canvas, scene and picture have the same coordinates, as until the first motion."""
-        return np.array_equal(self.place, affine.IDENTITY) and not self.moves
+        return not self.moves and affine.is_identity(self.place)
 
     def on_canvas(self, box: Floats, step: int) -> Floats:
         """Boxes (K, 4) of the scene [source px] on the canvas [processed px]."""
@@ -90,8 +90,8 @@ class Camera:
 
     def restart(self) -> None:
         """The last picture becomes the scene; after a change of view, with new coordinates."""
-        self.place = affine.IDENTITY.copy() if self._away else affine.after(self.place, affine.inverse(self.motion))
-        self.motion = affine.IDENTITY.copy()
+        self.place = affine.IDENTITY if self._away else affine.after(self.place, affine.inverse(self.motion))
+        self.motion = affine.IDENTITY
         self.moves = self._away = False
         self.lost_s = 0.0
         self._points = no_points()

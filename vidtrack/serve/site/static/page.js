@@ -246,6 +246,8 @@ async function here() {
     const answer = await server.here(EDITOR, true);
     for (const key of ["gone", "here"]) banner(key, null);
     if (answer.digest !== digest && before === digest && !saving) fileChanged(`${opened.file} was ${answer.digest ? "changed" : "deleted"} by somebody else since it was opened here.`);
+    if (answer.shown && answer.shown !== opened.shown) panes.scene.renew(await server.picture("scene"));
+    opened.shown = answer.shown;
     banner("others", answer.others ? "This site is open in another window too; who saves second has to reload first." : null);
   } catch (error) {
     complain("here", error);

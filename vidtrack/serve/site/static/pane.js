@@ -36,6 +36,12 @@ export class Pane {
     this.fit();
   }
 
+  /* The same view of a newer picture. */
+  renew(bitmap) {
+    this.bitmap = bitmap;
+    this.redraw();
+  }
+
   setPaths(paths) {
     this.paths = paths;
     this.layer = null;

@@ -194,12 +194,15 @@ export class Panel {
   }
 
   #zones() {
-    const rows = Object.keys(this.store.now.tree.zones ?? {}).map((name) => {
-      const stays = this.found?.tally?.stays[name];
-      const [chosen, row] = this.#row("zones", name, "zone", stays === undefined ? "" : `${stays} stays`);
+    const rows = Object.entries(this.store.now.tree.zones ?? {}).map(([name, zone]) => {
+      const masks = zone.tracked === false;
+      const stays = masks ? undefined : this.found?.tally?.stays[name];
+      const [chosen, row] = this.#row("zones", name, masks ? "mask" : "zone", stays === undefined ? "" : `${stays} stays`, masks ? "mask" : null);
+      const use = (chosen) => this.store.edit((drawing) => (chosen === "mask" ? (drawing.tree.zones[name].tracked = false) : delete drawing.tree.zones[name].tracked));
       const form = () => element(
         "div", { class: "form" },
         element("label", {}, "Name"), this.#input(`zone name ${name}`, name, (text) => this.#rename("zones", name, text)),
+        element("label", {}, "Use"), this.#choice(`zone use ${name}`, masks ? "mask" : "zone", ["zone", "mask"], use),
         element("div", { class: "wide" }, "", this.#delete()),
       );
       return element("li", {}, row, chosen ? form() : null);

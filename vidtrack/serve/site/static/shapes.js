@@ -83,14 +83,14 @@ function label(pane, parent, name, places) {
   put(parent, "text", { x, y, class: "label", "text-anchor": "middle" }, name);
 }
 
-function zone(pane, svg, name, { polygon }, { chosen, vertex, stays, faulty }) {
-  const parent = group(svg, ["zone", chosen && "chosen", faulty && "fault"], "zones", name);
+function zone(pane, svg, name, { polygon, tracked }, { chosen, vertex, stays, faulty }) {
+  const parent = group(svg, ["zone", tracked === false && "mask", chosen && "chosen", faulty && "fault"], "zones", name);
   const places = shape(pane, parent, polygon, true, chosen, vertex);
   const x = places.reduce((sum, place) => sum + place[0], 0) / places.length;
   const y = places.reduce((sum, place) => sum + place[1], 0) / places.length;
   const place = { x, "text-anchor": "middle" };
   put(parent, "text", { ...place, y, class: "label" }, name);
-  if (stays !== undefined) put(parent, "text", { ...place, y: y + 18, class: "count" }, stays);
+  if (stays !== undefined && tracked !== false) put(parent, "text", { ...place, y: y + 18, class: "count" }, stays);
 }
 
 function cross(parent, [x, y], name) {

@@ -1,0 +1,87 @@
+"""The density of false measurements by place, and states that hold what every station has learnt."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import vidtrack as vt
+from vidtrack.errors import FormatError
+from vidtrack.state import gather, restore
+from vidtrack.tracking.clutter import ClutterMap
+from vidtrack.tracking.rates import Rates
+
+SIDE = 3200.0
+
+
+def new_map():
+    return ClutterMap(np.zeros(2), np.full(2, SIDE))
+
+
+def scans(count, seed=0, patch=20, false=5, station=0):
+    """Scans of clutter alone, with a patch of more in a corner."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        even, more = rng.uniform(0, SIDE, (rng.poisson(false), 2)), rng.uniform(0, SIDE / 4, (rng.poisson(patch), 2))
+        yield vt.Scan(float(k), np.vstack([even, more]), 25.0 * np.eye(2), station=station)
+
+
+def tracker(stations=1):
+    rates = [Rates(0.9, None, SIDE**2, new_map()) for _ in range(stations)]
+    return vt.Tracker(
+        vt.ConstantVelocity(accel=1.0, speed=5.0),
+        gate=vt.LikelihoodGate(detection_probability=None, new_density=None),
+        life=vt.LogRatio(),
+        picture=vt.NoPicture(),
+        stations=[vt.Station(one) for one in rates],
+    )
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(0, 300))
+def test_the_mean_density_is_one_whatever_was_seen(seed, count):
+    learnt, rng = new_map(), np.random.default_rng(seed)
+    learnt.learn(rng.uniform(-SIDE, 2 * SIDE, (count, 2)), rng.random(count))
+    assert learnt.density.mean() == pytest.approx(1.0)
+    assert learnt.density.min() > 0
+
+
+def test_it_is_even_where_nothing_is_known():
+    np.testing.assert_array_equal(new_map().density, np.ones((32, 32)))
+
+
+def test_many_measurements_tell_the_density():
+    many = new_map()
+    for scan in scans(300):
+        many.learn(scan.z, np.ones(len(scan)))
+    share = 25 / (20 / (1 / 16) + 5)  # of the whole's mean density in the patch: (20 x 16 + 5) / 25
+    inside = many.at(np.random.default_rng(1).uniform(50, SIDE / 4 - 50, (200, 2)))
+    outside = many.at(np.random.default_rng(1).uniform(SIDE / 2, SIDE, (200, 2)))
+    assert inside.mean() == pytest.approx(1 / share, rel=0.1)
+    assert outside.mean() == pytest.approx((5 / 25 + 0.1) / 1.1, rel=0.25)
+
+
+def test_a_tracker_expects_more_clutter_where_it_is():
+    own = tracker()
+    for scan in scans(60):
+        own.step(scan)
+    _, density = own.rates.of(np.zeros(2, int), np.array([[300.0, 300.0], [2900.0, 2900.0]]))
+    assert density[0] == pytest.approx((20 * 16 + 5) / SIDE**2, rel=0.3)
+    assert density[1] == pytest.approx(5 / SIDE**2, rel=0.5)
+
+
+def test_a_saved_state_holds_the_rates_and_maps_of_all_stations():
+    first, second = (list(scans(20, seed, station=seed)) for seed in (0, 1))
+    both = sorted([*first, *second], key=lambda scan: scan.t)
+    stopped, resumed = tracker(2), tracker(2)
+    for scan in both[:20]:
+        stopped.step(scan)
+    restore(resumed, gather(stopped))
+    for scan in both[20:]:
+        a, b = stopped.step(scan), resumed.step(scan)
+        np.testing.assert_array_equal(a.x, b.x)
+        np.testing.assert_array_equal(a.existence, b.existence)
+    for one, other in zip(stopped.stations.each, resumed.stations.each, strict=True):
+        assert one.rates.as_dict() == other.rates.as_dict()
+        np.testing.assert_array_equal(one.rates.where.density, other.rates.where.density)
+    with pytest.raises(FormatError, match="other settings or another version"):
+        restore(tracker(1), gather(stopped))

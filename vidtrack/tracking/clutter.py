@@ -1,0 +1,81 @@
+"""Where false measurements are: their density by place, learnt while tracking."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints
+
+_LEVELS = 5
+"""The map has 2^5 cells along each of its two axes."""
+_WEIGHT = 16.0
+"""Measurements; weight of the prior at the first level. With 1, slow targets at the beginning of a recording are taken
+for clutter at their places before they are confirmed."""
+_NEW = 0.1
+"""Measurements of new targets per false one, as in LogRatio and LikelihoodGate; they begin anywhere."""
+
+
+class ClutterMap:
+    """The density of measurements of no known target at a place, over its mean in the whole box.
+
+    New targets begin anywhere; false measurements are distributed by a Polya tree. The box is quartered, each quarter
+    again, and so on. How the false measurements of a part at level k divide among its quarters has a Dirichlet prior
+    with the weight of 16 k^2 measurements, evenly: where they are few, a place has the density of what surrounds it.
+    With k^2 the density has no steps that the data do not show (M. Lavine, "Some aspects of Polya tree distributions
+    for statistical modelling", Annals of Statistics 20(3), 1992).
+
+    low, high  (2,) corners of the box, on the first two axes of the measurements; what lies outside counts at its edge
+    polar      whether these are range and azimuth, and not positions
+    """
+
+    STATE = ("count",)
+
+    def __init__(self, low: Floats, high: Floats, polar: bool = False) -> None:
+        self.low, self.high = np.asarray(low, float), np.asarray(high, float)
+        self.polar = polar
+        self.count: Floats = np.zeros((2**_LEVELS, 2**_LEVELS))
+        """False measurements remembered in each cell."""
+
+    @property
+    def density(self) -> Floats:
+        """(32, 32) relative density in each cell, along the first axis and the second; its mean is one."""
+        density, whole = np.ones((1, 1)), np.full((1, 1), self.count.sum())
+        for level in range(1, _LEVELS + 1):
+            side = 2 ** (_LEVELS - level)
+            part = self.count.reshape(2**level, side, 2**level, side).sum(axis=(1, 3))
+            density, whole = (each.repeat(2, axis=0).repeat(2, axis=1) for each in (density, whole))
+            density, whole = density * (4 * part + _WEIGHT * level**2) / (whole + _WEIGHT * level**2), part
+        return (density + _NEW) / (1 + _NEW)
+
+    def at(self, z: Floats) -> Floats:
+        """(N,) relative density at measurements (N, m)."""
+        return np.asarray(self.density[self._cells(z)])
+
+    def forget(self, fade: float) -> None:
+        """Keep this share of what is remembered."""
+        self.count *= fade
+
+    def learn(self, z: Floats, false: Floats) -> None:
+        """Take measurements (N, m) that are false with probabilities (N,)."""
+        np.add.at(self.count, self._cells(z), false)
+
+    def _cells(self, z: Floats) -> tuple[Ints, Ints]:
+        share = (z[:, :2] - self.low) / (self.high - self.low)
+        row, column = np.clip((share * len(self.count)).astype(np.int64), 0, len(self.count) - 1).T
+        return row, column
+
+
+class EvenClutter:
+    """The same density everywhere."""
+
+    STATE = ()
+
+    def at(self, z: Floats) -> Floats:
+        """Ones."""
+        return np.ones(len(z))
+
+    def forget(self, fade: float) -> None:
+        """Nothing is remembered."""
+
+    def learn(self, z: Floats, false: Floats) -> None:
+        """Nothing is learnt."""
