@@ -233,6 +233,23 @@ def test_tracks_that_change_vehicles_are_broken_and_joined(tmp_path, swapped):
     assert {row["tracks"] for row in rows} == ({2} if swapped else {1})
 
 
+def test_who_brakes_hard_is_the_same_vehicle(tmp_path):
+    """From 20 m/s by 8 m/s^2, and on by 3 m/s^2."""
+    t = np.arange(2.0, 14.0, 0.04)
+    slowing, faster = np.clip(t - 3, 0, 2.5), np.clip(t - 8, 0, None)
+    x = 50 + 200 * np.minimum(t - 2, 1) + 200 * slowing - 40 * slowing**2 + 15 * faster**2
+    found = measured([write_run(tmp_path / "run", [along(1, t, x, 240.0)], metres=True)], site(PLACE))
+    assert [(row["complete"], row["tracks"]) for row in found.tables["trips"].to_pylist()] == [(True, 1)]
+    assert found.report["joins"] == 0
+
+
+def test_nobody_is_taken_to_drive_out_over_an_entry(tmp_path):
+    """A track that ends a little before the western entry, on its way out."""
+    outwards = straight(1, 10.0, 300, 240, -100, 1.8)
+    found = measured([write_run(tmp_path / "run", [outwards], metres=True)], site(PLACE))
+    assert [row["gate"] for row in found.tables["crossings"].to_pylist() if row["gate"] == "west"] == []
+
+
 def test_a_gate_just_before_a_track_began_is_inferred(tmp_path):
     late = [straight(k, 10.0 * k, 115 + 70 * (k == 3), 240, 100, 4.8 - 0.8 * (k == 3)) for k in (1, 2, 3)]
     found = measured([write_run(tmp_path / "run", late, metres=True)], site(PLACE))

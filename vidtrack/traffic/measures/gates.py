@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -55,12 +55,6 @@ class Gates:
         (dx, dy), (x, y) = (ends[1] - ends[0]).T, (middle - ends[0]).T
         return (dx * y - dy * x >= 0).astype(np.int64)
 
-    @property
-    def length(self) -> Floats:
-        """(G,) in the unit of positions."""
-        last = self.first[1:] - 1
-        return np.asarray(self.begin[last] + np.linalg.norm(self.segment[last, 2:] - self.segment[last, :2], axis=1))
-
     def place(self, gate: Ints, along: Floats) -> Floats:
         """(N, 2) the places on gates (N,) so far along them (N,)."""
         owner = np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
@@ -69,30 +63,6 @@ class Gates:
         start, end = self.segment[s, :2], self.segment[s, 2:]
         ahead = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
         return np.asarray(start + (along - self.begin[s])[:, None] * ahead)
-
-    def widened(self, most: float) -> Gates:
-        """The same gates, longer at both ends by `most`, and by no more than half of the way to another gate."""
-        begin, end = self.first[:-1], self.first[1:] - 1
-        ends = np.stack([self.segment[begin, :2], self.segment[end, 2:]], axis=1)
-        owner = np.repeat(np.arange(len(self)), np.diff(self.first))
-        segment = self.segment.copy()
-        by = np.minimum(most, self._room(ends, owner) / 2)
-        for side, at in ((0, begin), (1, end)):
-            piece = self.segment[at]
-            ahead = (piece[:, 2:] - piece[:, :2]) * (2 * side - 1)
-            ahead *= (by[:, side] / np.linalg.norm(ahead, axis=1))[:, None]
-            segment[at, 2 * side : 2 * side + 2] += ahead
-        shift = np.zeros(len(segment))
-        shift[begin] = by[:, 0]
-        return replace(self, segment=segment, begin=self.begin - shift)
-
-    def _room(self, ends: Floats, owner: Ints) -> Floats:
-        """(G, 2) distances of both ends (G, 2, 2) of each gate from the nearest other one; `owner` (S,) of segments."""
-        a, way = self.segment[:, :2], self.segment[:, 2:] - self.segment[:, :2]
-        from_a = ends[:, :, None] - a
-        share = np.clip((from_a * way).sum(axis=-1) / (way**2).sum(axis=-1), 0, 1)
-        far = np.linalg.norm(from_a - share[..., None] * way, axis=-1)
-        return np.where((owner == np.arange(len(self))[:, None])[:, None], np.inf, far).min(axis=-1)
 
     def role(self, *wanted: str) -> Mask:
         """(G,) whether a gate has one of these roles."""

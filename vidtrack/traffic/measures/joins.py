@@ -19,17 +19,15 @@ Aerospace and Electronic Systems 50(4), 2014). At most one pair of an end is lik
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
 from vidtrack.traffic.measures.rows import Rows, off_road
 from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M_S, STANDING_JOLT, End, Lives
 
-LONGEST_S = 20.0
+LONGEST_S = 8.0
 _ROUNDS, _PASSES = 4, 30
 """In which the rate of chance is found, and of belief propagation"""
 _LOST_S = 2.0
@@ -41,8 +39,6 @@ _HIDDEN_S, _HIDDEN_SIGMA = 5.0, 0.7
 """s, and standard deviation of the logarithm; for how long others hide a vehicle that stands or crawls"""
 _AHEAD_M, _ASIDE_M = 30.0, 1.5
 """m; how far ahead it is found, and the standard deviation of how far to the side"""
-_BESIDE_M = 4.0
-"""m; the way between two states is taken to be straight"""
 _ONWARD, _PACE_M_S = 0.5, 8.0
 """Least cosine of its velocity and of where it has gone; m/s, the standard deviation of its velocity per axis"""
 _FREEDOM = 4.0
@@ -148,14 +144,6 @@ def hidden(tail: End, head: End, a: Ints, b: Ints) -> Floats:
 
 def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.sum(a * b, axis=1))
-
-
-def passed_by(gates: Gates, rows: Rows) -> Passed:
-    """The gates that steps pass. Where a vehicle was between two states is known to _BESIDE_M to the side."""
-    passing = Passing(gates.widened(_BESIDE_M), REACH_M)
-    passing.add(rows)
-    found = passing.passed()
-    return replace(found, along=np.clip(found.along, 0, gates.length[found.gate]))
 
 
 def gap_rows(lives: Lives, joins: Joins) -> Rows:

@@ -11,8 +11,8 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined, passed_by
-from vidtrack.traffic.measures.passing import Passed
+from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing, lasting
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, trips_of
 
@@ -47,12 +47,13 @@ def journeys(
     allowed  pairs of legs; none: all but turning back
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
+    passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     may = _may(gates, allowed)
     if metres:
         passed = passed.only(~_of_others(gates, passed, lives, may))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
-    across = _across(gates, lives, joins)
+    across = _across(gates, lives, joins, passed)
     probability = np.concatenate([confidence(passed), joins.probability[across.track]])
     reason = [*reasons(passed), *(["joined"] * len(across))]
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
@@ -114,9 +115,17 @@ def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask)
     return joined(lives, ends, begins, float(np.diff(spans).sum()), possible)
 
 
-def _across(gates: Gates, lives: Lives, joins: Joins) -> Passed:
-    """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
-    return passed_by(gates, gap_rows(lives, joins))
+def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
+    """Gates that vehicles passed only while their track was broken; `track` is the number of the join."""
+    passing = Passing(gates, REACH_M)
+    passing.add(gap_rows(lives, joins))
+    found = passing.passed()
+    vehicle = joins.vehicles(len(lives.track))
+    ways = [
+        (vehicle[stretch] * len(gates) + one.gate) * 2 + one.side
+        for one, stretch in ((found, joins.before[found.track]), (passed, passed.track))
+    ]
+    return found.only(~np.isin(*ways))
 
 
 def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:

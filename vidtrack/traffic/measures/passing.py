@@ -144,7 +144,7 @@ class Passing:
         real, whole = self._real[: self._count], self._whole[: self._count]
         kept = np.flatnonzero((whole[:, GATE] >= 0) & (whole[:, SEEN] > 0))
         kept = kept[np.lexsort((kept, real[kept, TIME]))]
-        kept = kept[_lasting(whole[kept, TRACK], whole[kept, GATE], real[kept, TIME])]
+        kept = kept[lasting(whole[kept, TRACK], whole[kept, GATE], whole[kept, SIDE], real[kept, TIME])]
         _, first = np.unique(whole[kept][:, [TRACK, GATE, SIDE]], axis=0, return_index=True)
         kept = kept[np.sort(first)]
         real, whole = real[kept], whole[kept]
@@ -173,10 +173,11 @@ class Passing:
         return np.asarray(np.nan_to_num(way[:, 2] + rest))
 
 
-def _lasting(track: Ints, gate: Ints, t: Floats) -> Mask:
-    """(P,) passings in order of time, but for pairs of a track to and fro over a gate within _BACK_S."""
+def lasting(track: Ints, gate: Ints, side: Ints, t: Floats) -> Mask:
+    """(P,) whether passings are none of a pair of a track, to and fro over a gate within _BACK_S."""
     order = np.lexsort((t, gate, track))
     same = (np.diff(track[order]) == 0) & (np.diff(gate[order]) == 0) & (np.diff(t[order]) < _BACK_S)
+    same &= np.diff(side[order]) != 0
     number = np.arange(len(same))
     begin = np.maximum.accumulate(np.where(same, -1, number))  # the last one that is no such pair
     first = np.flatnonzero(same & ((number - begin) % 2 == 1))

@@ -34,7 +34,7 @@ _CHECKS, _CHECK_S, _CHECK_ROWS = 3, 0.6, 4
 """Checks that go on at a time, one begun after the other; s and rows that each takes"""
 _FAR = 25.0
 """Squared distance beyond which a row is of something else"""
-_OTHER = 20.0
+_OTHER = 30.0
 """Squared distance of two states, beyond which they are of two vehicles: of one, one in 200,000"""
 _DRIVES_M_S, _KNOWN_M_S = 3.0, 1.5
 """m/s; from which on a vehicle has a direction, if its velocity is known so well"""
