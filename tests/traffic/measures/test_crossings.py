@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from vidtrack.traffic.measures.crossings import confidence, following
 from vidtrack.traffic.measures.gates import gates_of
 from vidtrack.traffic.measures.measure import measured
-from vidtrack.traffic.measures.passing import Passed, Passing
+from vidtrack.traffic.measures.passing import Passed, Passing, lasting
 from vidtrack.traffic.measures.rows import Rows, off_road
 
 
@@ -94,6 +94,14 @@ def test_csv_and_parquet_give_the_same(tmp_path):
     assert all(first[name].equals(second[name]) for name in first)
 
 
+def test_to_and_fro_within_two_seconds_is_not_passed():
+    track, gate = np.array([1, 1, 1, 2, 1]), np.array([0, 0, 0, 0, 5])
+    side, t = np.array([1, 0, 1, 0, 0]), np.array([3.0, 3.5, 4.0, 4.1, 4.2])
+    assert lasting(track, gate, side, t).tolist() == [False, False, True, True, True]
+    assert lasting(track[:2], gate[:2], side[:2], np.array([3.0, 5.5])).tolist() == [True, True]
+    assert lasting(track[:2], gate[:2], np.array([1, 1]), t[:2]).tolist() == [True, True]
+
+
 POINT = st.tuples(st.floats(0, 640), st.floats(0, 480))
 
 
@@ -107,7 +115,7 @@ def test_passings_are_those_of_brute_force(paths, size):
     count, margin = len(rows), 8.0
     unknown = np.full(count, np.nan)
     yes = np.ones(count, bool)
-    t = np.array([float(k) for k, _ in rows])
+    t = np.array([1000.0 * k for k, _ in rows])  # nobody is back within 2 s
     number = np.array([track for _, track in rows])
     state = xy, unknown, np.full(count, margin), np.zeros((count, 2))
     whole = Rows(number, t, yes, ~yes, *state, *off_road(count))
@@ -118,7 +126,7 @@ def test_passings_are_those_of_brute_force(paths, size):
     expected = [
         event for track, path in enumerate(paths) for event in brute_force(np.array(path), gates, margin, track)
     ]
-    got = zip(found.track.tolist(), found.side.tolist(), found.t.round(6).tolist(), strict=True)
+    got = zip(found.track.tolist(), found.side.tolist(), (found.t / 1000).round(6).tolist(), strict=True)
     assert sorted(got) == sorted((track, side, round(when, 6)) for track, side, when in expected)
 
 

@@ -14,11 +14,13 @@ ZONES = {"zones": {"box": {"polygon": [[200, 100], [400, 100], [400, 400], [200,
 
 
 def stopping(track, start_s, stop_px, wait_s, y=240.0):
-    """Drives at 100 px/s to a place, stands, and drives on."""
-    arrive = start_s + (stop_px - 50) / 100
-    leave = arrive + wait_s
-    t = np.arange(round(start_s * 25), round((leave + (580 - stop_px) / 100) * 25)) / 25
-    return along(track, t, np.interp(t, [start_s, arrive, leave, leave + 9], [50, stop_px, stop_px, stop_px + 900]), y)
+    """Drives at 100 px/s (10 m/s) to a place, stands, and drives on; brakes and accelerates by 50 px/s^2 (5 m/s^2)."""
+    brakes = start_s + (stop_px - 50) / 100 - 1  # 2 s, in which it goes half as far as without
+    leave = brakes + 2 + wait_s
+    t = np.arange(round(start_s * 25), round((leave + 1 + (580 - stop_px) / 100) * 25)) / 25
+    slowing, faster = np.clip(t - brakes, 0, 2), np.clip(t - leave, 0, 2)
+    driven = np.where(t < brakes, 100 * (t - start_s), 100 * (brakes - start_s) + 100 * slowing - 25 * slowing**2)
+    return along(track, t, 50 + driven + 25 * faster**2 + 100 * np.clip(t - leave - 2, 0, None), y)
 
 
 def test_a_stay_has_its_times_and_how_long_the_vehicle_stood(tmp_path):
@@ -27,8 +29,8 @@ def test_a_stay_has_its_times_and_how_long_the_vehicle_stood(tmp_path):
     assert len(rows) == 1
     assert (rows[0]["zone"], rows[0]["came"], rows[0]["left"]) == ("box", True, True)
     assert rows[0]["begin_s"] == pytest.approx(3.5, abs=0.03)
-    assert rows[0]["stay_s"] == pytest.approx(7.0, abs=0.05)
-    assert rows[0]["standing_s"] == pytest.approx(5.0, abs=0.1)
+    assert rows[0]["stay_s"] == pytest.approx(9.0, abs=0.05)
+    assert rows[0]["standing_s"] == pytest.approx(5.0 + 2 * 0.278, abs=0.1)  # 0.278 s from 5 km/h to 0
 
 
 def test_without_a_calibration_standing_is_not_known(tmp_path):
@@ -50,8 +52,8 @@ def test_three_wait_one_behind_the_other(tmp_path):
     rows = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()
     assert len(rows) == 1
     assert (rows[0]["leg"], rows[0]["vehicles"]) == ("west", 3)
-    assert rows[0]["begin_s"] == pytest.approx(4.5, abs=0.1)
-    assert rows[0]["end_s"] == pytest.approx(17.1, abs=0.1)
+    assert rows[0]["begin_s"] == pytest.approx(5.5 - 0.278, abs=0.1)
+    assert rows[0]["end_s"] == pytest.approx(18.1 + 0.278, abs=0.1)
     assert rows[0]["length_m"] == pytest.approx(14 + 4, abs=0.2)  # from the front of the first to the rear of the last
 
 

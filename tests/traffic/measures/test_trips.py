@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from drawn_runs import CALIBRATED, along, site, straight, write_run
+from hypothesis import given
+from hypothesis import strategies as st
 
-from vidtrack.traffic.measures.joins import LONGEST_S, joined, odds
+from vidtrack.traffic.measures.joins import LONGEST_S, driving, hidden, joined, marginals
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.stretches import End, Lives
 
@@ -60,8 +62,22 @@ def test_who_comes_in_where_a_track_left_is_another_vehicle(tmp_path):
 def test_at_most_one_trip_a_vehicle(tmp_path):
     t = np.arange(0, 25, 0.04)
     to_and_fro = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20))
-    found = measured([write_run(tmp_path / "run", [to_and_fro], metres=True)], site(PLACE))
+    plane = site({"site": PLACE["site"], "gates": PLACE["gates"]})
+    found = measured([write_run(tmp_path / "run", [to_and_fro])], plane)
     assert len(found.tables["trips"]) == 1
+
+
+def test_a_track_that_drives_back_without_room_to_turn_is_of_two_vehicles(tmp_path):
+    t = np.arange(0, 20, 0.04)
+    back = along(1, t, 300 - 250 * np.cos(2 * np.pi * t / 20))
+    round_ = along(2, t, 300 - 250 * np.cos(2 * np.pi * t / 20), 240 - 200 * np.sin(2 * np.pi * t / 20))
+    tracks = []
+    for number, rows in enumerate((back, round_)):
+        found = measured([write_run(tmp_path / str(number), [rows], metres=True)], site(PLACE))
+        tracks.append([(row["entry_gate"], row["exit_gate"]) for row in found.tables["trips"].to_pylist()])
+    assert ("west", "east") in tracks[0]
+    assert len(tracks[0]) > 1
+    assert len(tracks[1]) == 1
 
 
 def test_an_impossible_movement_is_told(tmp_path):
@@ -113,11 +129,15 @@ def lives(tail, head):
     return Lives(head, tail, np.full(n, 4.0), np.arange(n), np.full(n, np.inf))
 
 
+def anywhere(a, b):
+    return np.ones(len(a), bool)
+
+
 def test_of_two_that_fit_alike_neither_is_joined():
     tail, head = end([1.0, 0, 0], [0.0, 0, 0], [10.0] * 3), end([0.0, 1.5, 1.5], [0.0, 5.0, 5.0], [10.0] * 3)
     one, two = np.array([True, False, False]), np.array([False, True, True])
-    assert len(joined(lives(tail, head), one, two, 3600.0).before) == 0
-    alone = joined(lives(tail, head), one, np.array([False, True, False]), 3600.0)
+    assert len(joined(lives(tail, head), one, two, 3600.0, anywhere).before) == 0
+    alone = joined(lives(tail, head), one, np.array([False, True, False]), 3600.0, anywhere)
     assert (alone.before.tolist(), alone.after.tolist()) == ([0], [1])
     assert alone.probability[0] > 0.9
 
@@ -125,12 +145,56 @@ def test_of_two_that_fit_alike_neither_is_joined():
 def test_one_that_comes_back_is_another():
     """At the place where the first one was heading for, but with the opposite velocity."""
     tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [-10.0] * 2)
-    assert len(joined(lives(tail, head), np.array([True, False]), np.array([False, True]), 60.0).before) == 0
+    assert len(joined(lives(tail, head), np.array([True, False]), np.array([False, True]), 60.0, anywhere).before) == 0
+
+
+def test_a_movement_that_is_not_allowed_is_not_joined():
+    tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [10.0] * 2)
+    ends, begins = np.array([True, False]), np.array([False, True])
+    assert len(joined(lives(tail, head), ends, begins, 60.0, anywhere).before) == 1
+    assert len(joined(lives(tail, head), ends, begins, 60.0, lambda a, b: np.zeros(len(a), bool)).before) == 0
+
+
+@given(st.integers(0, 10_000))
+def test_marginals_are_those_of_all_ways_to_join(seed):
+    """Of two ends and two beginnings each way can be counted: none, four of one pair, two of two pairs."""
+    R = np.exp(np.random.default_rng(seed).normal(0, 1.5, (2, 2)))
+    total = 1 + R.sum() + R[0, 0] * R[1, 1] + R[0, 1] * R[1, 0]
+    exact = R * (1 + R[::-1, ::-1]) / total
+    a, b = np.array([0, 0, 1, 1]), np.array([2, 3, 2, 3])
+    found = marginals(R.ravel(), a, b, 4)
+    np.testing.assert_allclose(found, exact.ravel(), atol=0.12)
+    assert (np.bincount(a, found) <= 1).all()
+    assert (np.bincount(b, found) <= 1 + 1e-6).all()
+
+
+def test_where_one_must_go_elsewhere_the_other_stays():
+    """Alone each of two would be found here as likely as there; one of them can be here only."""
+    R, a, b = np.array([20.0, 20.0, 20.0]), np.array([0, 0, 1]), np.array([2, 3, 2])
+    assert (marginals(R, a, b, 4) > 0.5).tolist() == [False, True, True]
+
+
+def test_a_hidden_vehicle_is_found_somewhere_ahead():
+    """The sum over all places and velocities is the density of the time that it is hidden for."""
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(-3, 33, 0.25), np.arange(-8, 8, 0.25)))
+    vx, vy = (grid.ravel() for grid in np.meshgrid(np.arange(-40, 40, 1.0), np.arange(-40, 40, 1.0)))
+    tail, nothing = end([0.0], [0.0], [60.0]), np.zeros(len(x), int)
+    places = End(np.full(len(x), 5.0), np.column_stack([x, y]), np.tile([5.0, 0.0], (len(x), 1)), np.ones((len(x), 3)))
+    paces = End(
+        np.full(len(vx), 5.0), np.tile([9.0, 0.5], (len(vx), 1)), np.column_stack([vx, vy]), np.ones((len(vx), 3))
+    )
+    everywhere = hidden(tail, places, nothing, np.arange(len(x)))
+    anyhow = hidden(tail, paces, np.zeros(len(vx), int), np.arange(len(vx)))
+    here = np.flatnonzero((x == 9.0) & (y == 0.5))[0]
+    there = np.flatnonzero((vx == 5.0) & (vy == 0.0))[0]
+    assert everywhere[here] == pytest.approx(anyhow[there])
+    total = everywhere.sum() * 0.25**2 * anyhow.sum() / anyhow[there]
+    assert total == pytest.approx(1 / (5.0 * 0.7 * np.sqrt(2 * np.pi)), rel=0.03)
 
 
 def test_odds_are_a_density_over_time_place_and_velocity():
-    """The sum over all states, drawn around the likely ones, is the chance to be found again: a half, less what is
-    later than LONGEST_S."""
+    """The sum over all states, drawn around the likely ones, is the chance to be found again, less what is later than
+    LONGEST_S."""
     rng = np.random.default_rng(1)
     n = 200_000
     gap = rng.uniform(0, LONGEST_S, n)
@@ -139,8 +203,8 @@ def test_odds_are_a_density_over_time_place_and_velocity():
     weight = LONGEST_S * (2 * np.pi) ** 2 * np.exp(np.sum(drawn**2, axis=(0, 2)) / 2) * np.prod(wide, axis=0) ** 2
     xy, v = (np.vstack([[0, 0], values]) for values in wide[:, :, None] * drawn)
     head = End(np.append(0.0, gap), xy, v, np.tile([1.0, 0.0, 1.0], (n + 1, 1)))
-    pairs = odds(head, head, np.full(n + 1, 4.0), np.zeros(n, int), np.arange(1, n + 1))
-    assert np.mean(pairs * weight) == pytest.approx(0.5 * (1 - np.exp(-LONGEST_S / 2)), rel=0.06)
+    pairs = driving(head, head, np.zeros(n, int), np.arange(1, n + 1))
+    assert np.mean(pairs * weight) == pytest.approx(1 - np.exp(-LONGEST_S / 2), rel=0.06)
 
 
 def met(tmp_path, swapped):
@@ -158,7 +222,8 @@ def met(tmp_path, swapped):
 @pytest.mark.parametrize("swapped", [False, True])
 def test_tracks_that_change_vehicles_are_broken_and_joined(tmp_path, swapped):
     gates = PLACE["gates"] | {name: PLACE["gates"][name] | {"role": "both"} for name in ("west", "east")}
-    found = measured([met(tmp_path, swapped)], site(PLACE | {"gates": gates}))
+    allowed = {"allowed": [["west", "east"], ["east", "west"]]}
+    found = measured([met(tmp_path, swapped)], site(PLACE | {"gates": gates, "movements": allowed}))
     rows = found.tables["trips"].to_pylist()
     assert sorted((row["entry_gate"], row["exit_gate"], row["complete"]) for row in rows) == [
         ("east", "west", True),
@@ -166,6 +231,23 @@ def test_tracks_that_change_vehicles_are_broken_and_joined(tmp_path, swapped):
     ]
     assert found.report["joins"] == (2 if swapped else 0)
     assert {row["tracks"] for row in rows} == ({2} if swapped else {1})
+
+
+def test_who_brakes_hard_is_the_same_vehicle(tmp_path):
+    """From 20 m/s by 8 m/s^2, and on by 3 m/s^2."""
+    t = np.arange(2.0, 14.0, 0.04)
+    slowing, faster = np.clip(t - 3, 0, 2.5), np.clip(t - 8, 0, None)
+    x = 50 + 200 * np.minimum(t - 2, 1) + 200 * slowing - 40 * slowing**2 + 15 * faster**2
+    found = measured([write_run(tmp_path / "run", [along(1, t, x, 240.0)], metres=True)], site(PLACE))
+    assert [(row["complete"], row["tracks"]) for row in found.tables["trips"].to_pylist()] == [(True, 1)]
+    assert found.report["joins"] == 0
+
+
+def test_nobody_is_taken_to_drive_out_over_an_entry(tmp_path):
+    """A track that ends a little before the western entry, on its way out."""
+    outwards = straight(1, 10.0, 300, 240, -100, 1.8)
+    found = measured([write_run(tmp_path / "run", [outwards], metres=True)], site(PLACE))
+    assert [row["gate"] for row in found.tables["crossings"].to_pylist() if row["gate"] == "west"] == []
 
 
 def test_a_gate_just_before_a_track_began_is_inferred(tmp_path):

@@ -15,15 +15,16 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
-from vidtrack.traffic.lengths import class_of, length_sums, mean_length
+from vidtrack.output.export.whole_tracks import WholeTracks
+from vidtrack.traffic.lengths import length_sums, mean_length
+from vidtrack.traffic.measures.rows import EDGE_COLUMNS
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
+from vidtrack.traffic.vehicles.classes import UNKNOWN
 
 _BATCH = 1 << 16
 """Rows in memory at a time."""
 _NEEDED = ("frame", "time_s", "track_id", "status", "x_m", "y_m", "speed_kmh", "heading_deg", "length_m", "width_m")
-UNKNOWN = "unknown"
-"""Class of a vehicle whose length is in none of the site's classes, or not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +87,8 @@ class Vehicles:
 
     track    (T,)
     until    (T,) the last frame in which the track was seen; what follows is a guess that nothing confirmed
-    length   (T,) m, mean over the track, weighted by the inverse variances; NaN where it is not known
-    kind     (T,) class by the length, from the site's classes
+    length   (T,) m; NaN where it is not known
+    kind     (T,) class of the whole track, as `vidtrack measure` has it
     """
 
     track: Ints
@@ -160,14 +161,17 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
     summary = _summary(folder)
     _check_columns(folder)
     drawn = read_site(_site_of(summary, folder) if site is None else site)
+    whole = WholeTracks(_of_size(drawn, summary))
     look = _FirstLook()
-    for table in _batches(folder, (*_NEEDED[2:6], "frame", "length_m", "length_sigma_m")):
+    edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= _column_names(folder) else ()
+    for table in _batches(folder, (*_NEEDED[:6], "length_m", "length_sigma_m", *edges)):
+        whole.add(table)
         look.add(table)
     if not look.positions:
         raise SourceError(
             f"{folder} has no positions in metres: no vehicle was found inside the points of the site's calibration"
         )
-    vehicles = look.vehicles(drawn)
+    vehicles = look.vehicles(whole)
     return RoadRun(
         folder, drawn, summary.get("fps"), vehicles, look.low, look.high - look.low, look.rows, look.positions
     )
@@ -197,15 +201,15 @@ class _FirstLook:
         sums = length_sums(index, table["length_m"].to_numpy(), table["length_sigma_m"].to_numpy(), len(track))
         self._parts.append(np.column_stack([track, until, sums]))
 
-    def vehicles(self, site: Site) -> Vehicles:
+    def vehicles(self, whole: WholeTracks) -> Vehicles:
         """Those of all batches."""
         parts = np.concatenate(self._parts)
         track, index = np.unique(parts[:, 0].astype(np.int64), return_inverse=True)
         until = np.full(len(track), -1)
         np.maximum.at(until, index, parts[:, 1].astype(np.int64))
         length = mean_length(np.column_stack([np.bincount(index, parts[:, k]) for k in (2, 3)]))
-        kind = np.array([name or UNKNOWN for name in class_of(length, site.classes)])
-        return Vehicles(track, until, length, kind)
+        named = whole.named(track, length)
+        return Vehicles(track, until, named.length, np.array([name or UNKNOWN for name in named.kind]))
 
 
 def _known(table: pa.Table) -> Mask:
@@ -242,13 +246,24 @@ def _check_columns(folder: Path) -> None:
     path = folder / "tracks.parquet"
     if not path.is_file():
         raise FormatError(f"{folder} has no tracks.parquet; vidtrack repair {folder} makes it from tracks.csv")
-    try:
-        names = set(pq.read_schema(path).names)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
+    names = _column_names(folder)
     if not set(_NEEDED) <= names:
         what = "is a run of radar plots" if "scan" in names else "has no positions in metres"
         raise ConfigError(f"{folder} {what}; only runs of vidtrack track --site with a [calibration] can be exported")
+
+
+def _column_names(folder: Path) -> set[str]:
+    path = folder / "tracks.parquet"
+    try:
+        return set(pq.read_schema(path).names)
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
+
+
+def _of_size(site: Site, summary: dict[str, Any]) -> Site:
+    """The site drawn for the run's pictures."""
+    size = summary.get("width"), summary.get("height")
+    return site.scaled(*size) if all(size) else site
 
 
 def _site_of(summary: dict[str, Any], folder: Path) -> Path:

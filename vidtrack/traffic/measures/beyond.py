@@ -38,7 +38,7 @@ def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floa
     found = parts[0].and_also(parts[1])
     ends = np.where(found.t < lives.head.t[found.track], lives.head.t[found.track], lives.tail.t[found.track])
     sure = confidence(found) * np.exp(-np.abs(found.t - ends) / _ELSEWHERE_S)
-    likely = (sure > _LIKELY) & gates.role("entry", "exit", "both")[found.gate] & (found.t <= lives.until[found.track])
+    likely = (sure > _LIKELY) & _as_meant(gates, found)
     found, sure = found.only(likely), sure[likely]
     alone = _alone(found, passed)
     return found.only(alone), sure[alone]
@@ -58,6 +58,13 @@ def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Pa
     passing.add(step_rows(far, known) if way < 0 else step_rows(known, far))
     found = passing.passed()
     return found.of(who[found.track]).nowhere()
+
+
+def _as_meant(gates: Gates, found: Passed) -> Mask:
+    """(F,) whether passings are in over an entry or out over an exit: nobody is taken to drive against them unseen."""
+    inwards = gates.inward[found.gate] == found.side
+    entry, exit_, both = (gates.role(role)[found.gate] for role in ("entry", "exit", "both"))
+    return np.asarray(both | (entry & inwards) | (exit_ & ~inwards))
 
 
 def _alone(found: Passed, passed: Passed) -> Mask:

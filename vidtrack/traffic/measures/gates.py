@@ -42,6 +42,11 @@ class Gates:
         return len(self.names)
 
     @property
+    def leg(self) -> Ints:
+        """(G,) numbers of the legs."""
+        return np.unique(np.array(self.legs, dtype=str), return_inverse=True)[1]
+
+    @property
     def inward(self) -> Ints:
         """(G,) the side of each gate on which the middle of all entries and exits lies, as `Passed` has it."""
         ends = np.stack([self.segment[self.first[:-1], :2], self.segment[self.first[1:] - 1, 2:]])

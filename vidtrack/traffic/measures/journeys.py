@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from vidtrack.traffic.measures.beyond import beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
-from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
+from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing, lasting
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, trips_of
 
@@ -35,17 +36,24 @@ class Journeys:
     trips: Trips
 
 
-def journeys(gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool) -> Journeys:
+def journeys(
+    gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: bool, allowed: Sequence[tuple[str, str]]
+) -> Journeys:
     """The journeys of T stretches of tracks.
 
     passed   passings of stretches
     spans    (S, 2) s; what was watched
     metres   positions are on the road; else broken tracks are not joined
+    allowed  pairs of legs; none: all but turning back
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
-    joins = _joins(gates, passed, lives, spans) if metres else _NONE
+    passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
+    may = _may(gates, allowed)
+    if metres:
+        passed = passed.only(~_of_others(gates, passed, lives, may))
+    joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
-    across = _across(gates, lives, joins)
+    across = _across(gates, lives, joins, passed)
     probability = np.concatenate([confidence(passed), joins.probability[across.track]])
     reason = [*reasons(passed), *(["joined"] * len(across))]
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
@@ -66,22 +74,58 @@ def journeys(gates: Gates, passed: Passed, lives: Lives, spans: Floats, metres: 
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 
-def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats) -> Joins:
-    """Joins of stretches that end before an exit, and of those that begin after an entry."""
-    left, entered = np.zeros((2, len(lives.track)), bool)
+def _may(gates: Gates, allowed: Sequence[tuple[str, str]]) -> Mask:
+    """(L + 1, L + 1) whether a trip may go from a leg to another; the last ones are not known, which may be any."""
+    legs = sorted(set(gates.legs))
+    may = np.ones((len(legs) + 1, len(legs) + 1), bool)
+    may[:-1, :-1] = [[(one, other) in allowed if allowed else one != other for other in legs] for one in legs]
+    return may
+
+
+def _ways(gates: Gates, passed: Passed) -> tuple[Mask, Mask]:
+    """(P,) whether a passing enters, and whether it leaves."""
     both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
-    left[passed.track[gates.role("exit")[passed.gate] | (both & ~inwards)]] = True
-    entered[passed.track[gates.role("entry")[passed.gate] | (both & inwards)]] = True
-    ends = ~left & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
-    begins = ~entered & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
-    return joined(lives, ends, begins, float(np.diff(spans).sum()))
+    return gates.role("entry")[passed.gate] | (both & inwards), gates.role("exit")[passed.gate] | (both & ~inwards)
 
 
-def _across(gates: Gates, lives: Lives, joins: Joins) -> Passed:
-    """Gates that vehicles passed while their track was broken; `track` is the number of the join."""
+def _of_others(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
+    """(P,) exits of a movement that may not be, passed after the stretch was seen alone for the last time."""
+    enters, leaves = _ways(gates, passed)
+    leg = gates.leg[passed.gate]
+    came = np.full(len(lives.track), -1)
+    entry = np.flatnonzero(enters)[::-1]
+    came[passed.track[entry]] = leg[entry]
+    return np.asarray(leaves & (passed.t > lives.tail.t[passed.track]) & ~may[came[passed.track], leg])
+
+
+def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:
+    """Joins of stretches that end after an entry or before an exit, and of those that begin so."""
+    enters, leaves = _ways(gates, passed)
+    event = np.flatnonzero(enters | leaves)
+    event = event[np.argsort(passed.t[event], kind="stable")]
+    first, last = np.full((2, len(lives.track)), -1)
+    first[passed.track[event[::-1]]], last[passed.track[event]] = event[::-1], event
+    ends = ~np.append(leaves, False)[last] & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
+    begins = ~np.append(enters, False)[first] & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
+    leg = np.append(gates.leg[passed.gate], -1)
+
+    def possible(a: Ints, b: Ints) -> Mask:
+        return np.asarray(may[leg[last[a]], leg[first[b]]])
+
+    return joined(lives, ends, begins, float(np.diff(spans).sum()), possible)
+
+
+def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
+    """Gates that vehicles passed only while their track was broken; `track` is the number of the join."""
     passing = Passing(gates, REACH_M)
     passing.add(gap_rows(lives, joins))
-    return passing.passed()
+    found = passing.passed()
+    vehicle = joins.vehicles(len(lives.track))
+    ways = [
+        (vehicle[stretch] * len(gates) + one.gate) * 2 + one.side
+        for one, stretch in ((found, joins.before[found.track]), (passed, passed.track))
+    ]
+    return found.only(~np.isin(*ways))
 
 
 def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
@@ -107,7 +151,7 @@ def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floa
 
 def _comes_again(gates: Gates, passed: Passed, vehicle: Ints) -> Mask:
     """(P,) whether a vehicle passes an entry of the leg whose exit it passed last, another gate."""
-    legs = np.unique(np.array(gates.legs), return_inverse=True)[1]
+    legs = gates.leg
     role = np.flatnonzero(gates.role("entry", "exit")[passed.gate])
     order = role[np.lexsort((passed.t[role], vehicle[role]))]
     gate, who = passed.gate[order], vehicle[order]

@@ -13,7 +13,6 @@ from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.lengths import class_of
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
@@ -29,7 +28,7 @@ from vidtrack.traffic.measures.stretches import Lives, Stretches
 from vidtrack.traffic.measures.tables import stamps, table
 from vidtrack.traffic.measures.trip_speeds import TripSpeeds, trip_speeds
 from vidtrack.traffic.site import Site
-from vidtrack.traffic.vehicles.classes import named, named_by_length
+from vidtrack.traffic.vehicles.naming import whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles
 
 
@@ -91,21 +90,15 @@ class _Figures:
         sessions, track_ids = reader.names
         self.tracks = len(track_ids)
         self.session, self.track_id = sessions[lives.track], track_ids[lives.track]
-        length = self.length = lives.length
-        self.kind: list[str | None] = class_of(length, site.classes)
-        self.kind_probability = np.full(len(length), np.nan)
-        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres)
+        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres, site.movements.allowed)
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
         self.scale = None if found is None else found.scale
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
-            self.length = np.where(np.isnan(found.classes.size[:, 0]), length, found.classes.size[:, 0])
-            if site.classes:
-                self.kind, self.kind_probability = named_by_length(self.length, found.classes.sigma[:, 0], site.classes)
-            else:
-                self.kind, self.kind_probability = named(found.classes)
+        whole = whole_tracks(None if found is None else found.classes, lives.length, site.classes)
+        self.length, self.kind, self.kind_probability = whole.length, whole.kind, whole.probability
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
         zone = site.camera.start

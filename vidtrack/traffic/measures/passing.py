@@ -19,6 +19,8 @@ from vidtrack.traffic.measures.rows import Rows
 REACH_M, REACH_PX = 10.0, 100.0
 """How far from a gate distances are looked at: many times what positions are off."""
 
+_BACK_S = 2.0
+"""s; who passes a gate and comes back so soon jitters, or others hide a part of it"""
 _CORNER = 2.0
 """Distance of the corners along which ways are measured: jitter of positions lengthens them by little."""
 
@@ -135,10 +137,14 @@ class Passing:
             )  # fmt: skip
 
     def passed(self) -> Passed:
-        """All passings so far, each track once per gate and side. What is not seen beyond the gate does not count."""
+        """All passings so far, each track once per gate and side.
+
+        What is not seen beyond the gate does not count, nor does what is taken back within _BACK_S.
+        """
         real, whole = self._real[: self._count], self._whole[: self._count]
         kept = np.flatnonzero((whole[:, GATE] >= 0) & (whole[:, SEEN] > 0))
         kept = kept[np.lexsort((kept, real[kept, TIME]))]
+        kept = kept[lasting(whole[kept, TRACK], whole[kept, GATE], whole[kept, SIDE], real[kept, TIME])]
         _, first = np.unique(whole[kept][:, [TRACK, GATE, SIDE]], axis=0, return_index=True)
         kept = kept[np.sort(first)]
         real, whole = real[kept], whole[kept]
@@ -165,6 +171,19 @@ class Passing:
         state = _longer(self._state, max(tracks, len(self._state)), np.nan)[:tracks]
         rest = np.hypot(state[:, _X] - way[:, 0], state[:, _Y] - way[:, 1])
         return np.asarray(np.nan_to_num(way[:, 2] + rest))
+
+
+def lasting(track: Ints, gate: Ints, side: Ints, t: Floats) -> Mask:
+    """(P,) whether passings are none of a pair of a track, to and fro over a gate within _BACK_S."""
+    order = np.lexsort((t, gate, track))
+    same = (np.diff(track[order]) == 0) & (np.diff(gate[order]) == 0) & (np.diff(t[order]) < _BACK_S)
+    same &= np.diff(side[order]) != 0
+    number = np.arange(len(same))
+    begin = np.maximum.accumulate(np.where(same, -1, number))  # the last one that is no such pair
+    first = np.flatnonzero(same & ((number - begin) % 2 == 1))
+    lasting = np.ones(len(t), bool)
+    lasting[order[first]] = lasting[order[first + 1]] = False
+    return lasting
 
 
 def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:

@@ -75,7 +75,8 @@ class Recount:
         vehicle, counts, moved, trips = np.arange(len(self._lives.track)), {}, [], 0
         if gates:
             all_gates = gates_of(site.model_copy(update={"gates": gates}), ground)
-            found = journeys(all_gates, self._passings(gates), self._lives, self._day.spans, ground is not None)
+            passed, metres, allowed = self._passings(gates), ground is not None, site.movements.allowed
+            found = journeys(all_gates, passed, self._lives, self._day.spans, metres, allowed)
             vehicle, trips = found.vehicle, len(found.trips.vehicle)
             ways = np.bincount(2 * found.passed.gate + found.passed.side, minlength=2 * len(gates)).reshape(-1, 2)
             counts = {

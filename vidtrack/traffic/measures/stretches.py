@@ -1,9 +1,10 @@
 """Tracks are broken into stretches where their motion on the road cannot be that of one vehicle.
 
 Where vehicles meet in one blob, or one hides the other, a track may go on as the other vehicle. A Kalman filter of
-nearly constant velocity follows each track through the rows in which the picture shows it alone. After rows that it
-shared, and where a row is far from the prediction, a second filter begins. If its state after _CHECK_S is not where
-the first one leads to, the rest of the track is another stretch: of which vehicle is decided by `joins`.
+nearly constant velocity follows each track through the rows in which the picture shows it alone. Again and again
+another filter begins, also after rows that the track shared, and where a row is far from the prediction. If its state
+after _CHECK_S is not where the first one led to when it began, the rest of the track is another stretch: of which
+vehicle is decided by `joins`. So it is where a track drives back the way that it came, without room to turn.
 
 The noise of the two axes is the same and independent, so a filter has six numbers beside its time: position,
 velocity, and for each axis the variances of both and their covariance. Errors of footprints last, so the variance of
@@ -28,12 +29,17 @@ _FIRST_M_S = 15.0
 STANDING_JOLT, JOLT_PER_M_S = 1.0, 0.3
 """m2/s3 and m/s2; by how much the variance of a velocity grows in a second, at rest and with the speed"""
 _PAUSE_S = 0.15
-"""s; after so long in a shared blob the second filter begins"""
-_CHECK_S, _CHECK_ROWS = 0.4, 4
+"""s; after so long in a shared blob all checks begin anew"""
+_CHECKS, _CHECK_S, _CHECK_ROWS = 3, 0.6, 4
+"""Checks that go on at a time, one begun after the other; s and rows that each takes"""
 _FAR = 25.0
 """Squared distance beyond which a row is of something else"""
 _OTHER = 30.0
 """Squared distance of two states, beyond which they are of two vehicles: of one, one in 200,000"""
+_DRIVES_M_S, _KNOWN_M_S = 3.0, 1.5
+"""m/s; from which on a vehicle has a direction, if its velocity is known so well"""
+_BACK, _ROOM_M = -0.7, 6.0
+"""Cosine of directions that are opposite; m to the side that a vehicle needs to turn round"""
 MODEL_M_S = 1.0
 """m/s; standard deviation of the difference of two velocities beside what they say"""
 T, X, Y, VX, VY, PXX, PXV, PVV, LASTING = range(9)
@@ -81,8 +87,10 @@ class Stretches:
 
     def __init__(self, metres: bool) -> None:
         self._metres = metres
-        self._state = np.full((0, 2, 9), np.nan)
-        self._since = np.full((0, 4), np.nan)
+        self._state = np.full((0, 1 + 2 * _CHECKS, 9), np.nan)
+        self._since = np.full((0, 2 + 2 * _CHECKS), np.nan)
+        self._onward = np.full((0, 4), np.nan)
+        self._turned = np.full((0, 9), np.nan)
         self._current = np.empty(0, np.int64)
         self._head, self._tail = np.full((2, 0, 9), np.nan)
         self._track, self._until = np.empty(0, np.int64), np.empty(0)
@@ -98,8 +106,8 @@ class Stretches:
         number = np.empty(len(rows), np.int64)
         values = np.column_stack([rows.t, rows.xy, rows.sigma**2 + _PLACE_M**2])
         self._count = _follow(
-            rows.track, values, alone & rows.seen, self._metres, self._state, self._since, self._current,
-            self._head, self._tail, self._track, self._until, number, self._count,
+            rows.track, values, alone & rows.seen, self._metres, self._state, self._since, self._onward,
+            self._turned, self._current, self._head, self._tail, self._track, self._until, number, self._count,
         )  # fmt: skip
         self._sums[: self._count] += length_sums(number, rows.length, rows.length_sigma, self._count)
         return replace(rows, track=number)
@@ -114,8 +122,10 @@ class Stretches:
         """For tracks (K), and for as many stretches as these rows can have: one begins with some rows of its own."""
         if tracks > len(self._current):
             more = max(tracks, 2 * len(self._current)) - len(self._current)
-            self._state = np.concatenate([self._state, np.full((more, 2, 9), np.nan)])
-            self._since = np.concatenate([self._since, np.full((more, 4), np.nan)])
+            self._state = np.concatenate([self._state, np.full((more, *self._state.shape[1:]), np.nan)])
+            self._since = np.concatenate([self._since, np.full((more, self._since.shape[1]), np.nan)])
+            self._onward = np.concatenate([self._onward, np.full((more, 4), np.nan)])
+            self._turned = np.concatenate([self._turned, np.full((more, 9), np.nan)])
             self._current = np.concatenate([self._current, np.full(more, -1)])
         stretches = self._count + tracks + rows // _CHECK_ROWS
         if stretches > len(self._track):
@@ -134,15 +144,19 @@ def _end(states: Floats) -> End:
 
 @kernel
 def _follow(
-    track: Ints, values: Floats, alone: Mask, metres: bool, state: Floats, since: Floats, current: Ints,
-    head: Floats, tail: Floats, of_track: Ints, until: Floats, number: Ints, count: int,
+    track: Ints, values: Floats, alone: Mask, metres: bool, state: Floats, since: Floats, onward: Floats,
+    turned: Floats, current: Ints, head: Floats, tail: Floats, of_track: Ints, until: Floats, number: Ints, count: int,
 ) -> int:  # fmt: skip
     """Number rows by stretches; returns how many there are.
 
     values  (N, 4) t, x, y and the variance of a position
-    state   (K, 2, 9) the two filters of each track
-    since   (K, 4) when they began, the rows of the second one, and 1 after rows in which the track was not alone
+    state   (K, 1 + 2 _CHECKS, 9) of each track the long filter, then for each check what this was when the check began,
+            and the filter that began with it
+    onward, turned   (K, 4), (K, 9) as in `_backs`
+    since   (K, 2 + 2 _CHECKS) when the long filter began, and 1 after rows in which the track was not alone; then of
+            each check when it began (NaN: it has not) and how many rows it has
     """
+    begun = np.empty(9)
     for i in range(len(track)):
         k, t = track[i], values[i, 0]
         if current[k] < 0:
@@ -151,50 +165,96 @@ def _follow(
             count += 1
         number[i] = current[k]
         if not alone[i]:
-            since[k, 3] = 1
+            since[k, 1] = 1
             continue
-        first, second = state[k, 0], state[k, 1]
-        shared = since[k, 3] == 1
-        since[k, 3] = 0
-        if np.isnan(first[T]):
-            _begin(first, values[i])
-            since[k, 0] = t
-            head[current[k]] = tail[current[k]] = first
-            continue
-        if not metres:
+        first = state[k, 0]
+        if np.isnan(first[T]) or not metres:
+            new = np.isnan(first[T])
             _begin(first, values[i])
             tail[current[k]] = first
+            if new:
+                head[current[k]] = first
+                since[k, 0], since[k, 1] = t, 0
             continue
-        if np.isnan(since[k, 1]):
-            if not (shared and t - first[T] > _PAUSE_S) and _step(first, values[i]) <= _FAR:
-                tail[current[k]] = first
-                if t - since[k, 0] <= _CHECK_S:
-                    _write_back(first, since[k, 0], head[current[k]])
+        shared = since[k, 1] == 1 and t - first[T] > _PAUSE_S
+        since[k, 1] = 0
+        latest = -np.inf
+        for c in range(_CHECKS):
+            if shared:
+                since[k, 2 + 2 * c] = np.nan
+            elif since[k, 2 + 2 * c] > latest:
+                latest = since[k, 2 + 2 * c]
+        broken = -1
+        for c in range(_CHECKS):
+            before, after = state[k, 1 + 2 * c], state[k, 2 + 2 * c]
+            if np.isnan(since[k, 2 + 2 * c]):
+                if t - latest >= _CHECK_S / _CHECKS:
+                    latest = t
+                    before[:] = first
+                    _begin(after, values[i])
+                    since[k, 2 + 2 * c], since[k, 3 + 2 * c] = t, 1
                 continue
-            _begin(second, values[i])
-            since[k, 1], since[k, 2] = t, 1
-            continue
-        if (shared and t - second[T] > _PAUSE_S) or _step(second, values[i]) > _FAR:
-            _begin(second, values[i])
-            since[k, 1], since[k, 2] = t, 1
-            continue
-        since[k, 2] += 1
-        if t - since[k, 1] < _CHECK_S or since[k, 2] < _CHECK_ROWS:
-            continue
-        begun = np.empty(9)
-        _write_back(second, since[k, 1], begun)
-        if _apart(first, begun) > _OTHER:
-            until[current[k]] = first[T]
-            _renumber(track, values, number, i, k, since[k, 1], count)
+            if _step(after, values[i]) > _FAR:
+                before[:] = first
+                _begin(after, values[i])
+                since[k, 2 + 2 * c], since[k, 3 + 2 * c] = t, 1
+                continue
+            since[k, 3 + 2 * c] += 1
+            if t - since[k, 2 + 2 * c] < _CHECK_S or since[k, 3 + 2 * c] < _CHECK_ROWS:
+                continue
+            _write_back(after, since[k, 2 + 2 * c], begun)
+            if _apart(before, begun) > _OTHER:
+                broken = c
+                break
+            if first[T] <= since[k, 2 + 2 * c]:
+                first[:] = after  # which all these rows were far from, until now
+            since[k, 2 + 2 * c] = np.nan
+        begin = np.nan
+        if broken >= 0:
+            begin, tail[current[k]] = since[k, 2 + 2 * broken], state[k, 1 + 2 * broken]
+            first[:] = state[k, 2 + 2 * broken]
+        elif first[T] == t or _step(first, values[i]) <= _FAR:
+            tail[current[k]] = first
+            if t - since[k, 0] <= _CHECK_S:
+                _write_back(first, since[k, 0], head[current[k]])
+            if _backs(first, onward[k], turned[k]):
+                begin, tail[current[k]] = turned[k, T], turned[k]
+                _write_back(first, begin, begun)
+        if not np.isnan(begin):
+            until[current[k]] = tail[current[k], T]
+            _renumber(track, values, number, i, k, begin, count)
             current[k] = count
             of_track[count] = k
-            head[count] = begun
+            head[count], tail[count] = begun, first
             count += 1
-            since[k, 0] = since[k, 1]
-        first[:] = second
-        tail[current[k]] = first
-        since[k, 1] = np.nan
+            since[k, 0] = begin
+            since[k, 2:] = np.nan
+            onward[k], turned[k] = np.nan, np.nan
     return count
+
+
+@kernel
+def _backs(state: Floats, onward: Floats, turned: Floats) -> bool:
+    """Whether a track drives back the way that it came, without room to turn: then it is of another vehicle.
+
+    onward  (4,) place and unit vector of its last driving
+    turned  (9,) its last state before it began to drive back; both are kept up here
+    """
+    speed = np.hypot(state[VX], state[VY])
+    along = (state[VX] * onward[2] + state[VY] * onward[3]) / max(speed, 1e-9)
+    if not along < 0:
+        turned[:] = np.nan
+    elif np.isnan(turned[T]):
+        turned[:] = state
+    if speed < _DRIVES_M_S or state[PVV] > _KNOWN_M_S**2:
+        return False
+    if along < _BACK:
+        sideways = abs((state[X] - onward[0]) * onward[3] - (state[Y] - onward[1]) * onward[2])
+        if sideways < _ROOM_M:
+            return True
+    onward[0], onward[1], onward[2], onward[3] = state[X], state[Y], state[VX] / speed, state[VY] / speed
+    turned[:] = np.nan
+    return False
 
 
 @kernel

@@ -49,16 +49,26 @@ class Trips:
 def trips_of(passed: Passed, gates: Gates, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
     """The trip of each vehicle: from its first entry to the last exit after it.
 
+    Who is not known to enter, or to leave, by a gate for this may pass one of another leg the wrong way: in over an
+    exit, or out over an entry, as a place that is a lane off has it.
+
     vehicle      (P,) of each passing
     begin, end   (T,) s; first and last row of vehicles by number
     spans        (S, 2) s; what was watched
     """
-    enters = gates.role("entry", "both")[passed.gate]
+    leg = np.append(gates.leg[passed.gate], -1)
+    inwards = gates.inward[passed.gate] == passed.side
+    enters, leaves = (gates.role(role, "both")[passed.gate] for role in ("entry", "exit"))
     entry = _first(vehicle, np.flatnonzero(enters), len(begin))
     t = np.append(passed.t, np.nan)
+    exit_ = _first(vehicle, np.flatnonzero(leaves & ~(passed.t <= t[entry][vehicle]))[::-1], len(begin))
+    wrong_in = _first(vehicle, np.flatnonzero(gates.role("exit")[passed.gate] & inwards), len(begin))
+    left = (entry < 0) & (exit_ >= 0) & (t[wrong_in] < t[exit_]) & (leg[wrong_in] != leg[exit_])
+    entry = np.where(left, wrong_in, entry)
     entered = t[entry]  # NaN without an entry
-    leaves = gates.role("exit", "both")[passed.gate] & ~(passed.t <= entered[vehicle])
-    exit_ = _first(vehicle, np.flatnonzero(leaves)[::-1], len(begin))
+    wrong_out = gates.role("entry")[passed.gate] & ~inwards & (passed.t > entered[vehicle])
+    wrong_out &= leg[:-1] != leg[entry][vehicle]
+    exit_ = np.where(exit_ < 0, _first(vehicle, np.flatnonzero(wrong_out)[::-1], len(begin)), exit_)
     who = np.flatnonzero((entry >= 0) | (exit_ >= 0))
     from_s = np.where(entry[who] >= 0, entered[who], begin[who])
     to_s = np.where(exit_[who] >= 0, t[exit_[who]], end[who])

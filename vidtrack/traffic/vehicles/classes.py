@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.lengths import class_of
 
 UNKNOWN = "unknown"
@@ -51,6 +51,10 @@ class Classified:
     probability: Floats
     size: Floats
     sigma: Floats
+
+    def of(self, vehicle: Ints) -> Classified:
+        """Those of some vehicles (N,)."""
+        return Classified(self.probability[vehicle], self.size[vehicle], self.sigma[vehicle])
 
 
 def named(found: Classified) -> tuple[list[str | None], Floats]:

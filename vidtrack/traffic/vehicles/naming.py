@@ -1,16 +1,40 @@
-"""The class of a vehicle while it is tracked: by the lengths of its track so far, and by nothing that comes later."""
+"""The class of a vehicle: of a whole track, and while it is tracked, by the lengths of its track so far."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.traffic.vehicles.classes import SURE, UNKNOWN, classified, named, named_by_length
+from vidtrack.traffic.lengths import class_of
+from vidtrack.traffic.vehicles.classes import SURE, UNKNOWN, Classified, classified, named, named_by_length
 
 _LEAST_SIGMA_M = 0.01
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Named:
+    """T whole tracks: length (T,) m, their classes, None where nothing tells one, and how likely these are (T,)."""
+
+    length: Floats
+    kind: list[str | None]
+    probability: Floats
+
+
+def whole_tracks(found: Classified | None, length: Floats, bounds: dict[str, tuple[float, float]]) -> Named:
+    """The classes of whole tracks by what was fitted to them, else by the mean length of their rows (T,) [m].
+
+    bounds  low and high length of each class of the site [m]; empty: those of `classes.CLASSES`
+    """
+    if found is None:
+        return Named(length, class_of(length, bounds), np.full(len(length), np.nan))
+    length = np.where(np.isnan(found.size[:, 0]), length, found.size[:, 0])
+    if bounds:
+        return Named(length, *named_by_length(length, found.sigma[:, 0], bounds))
+    return Named(length, *named(found))
 
 
 class Naming:
