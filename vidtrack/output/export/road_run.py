@@ -262,8 +262,8 @@ def _column_names(folder: Path) -> set[str]:
 
 def _of_size(site: Site, summary: dict[str, Any]) -> Site:
     """The site drawn for the run's pictures."""
-    size = summary.get("width"), summary.get("height")
-    return site.scaled(*size) if all(size) else site
+    width, height = summary.get("width"), summary.get("height")
+    return site.scaled(width, height) if width and height else site
 
 
 def _site_of(summary: dict[str, Any], folder: Path) -> Path:

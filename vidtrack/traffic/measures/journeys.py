@@ -121,11 +121,11 @@ def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
     passing.add(gap_rows(lives, joins))
     found = passing.passed()
     vehicle = joins.vehicles(len(lives.track))
-    ways = [
-        (vehicle[stretch] * len(gates) + one.gate) * 2 + one.side
-        for one, stretch in ((found, joins.before[found.track]), (passed, passed.track))
-    ]
-    return found.only(~np.isin(*ways))
+
+    def ways(passed: Passed, stretch: Ints) -> Ints:
+        return (vehicle[stretch] * len(gates) + passed.gate) * 2 + passed.side
+
+    return found.only(~np.isin(ways(found, joins.before[found.track]), ways(passed, passed.track)))
 
 
 def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
