@@ -45,18 +45,14 @@ class Decision:
 
     def joined(self, other: Decision) -> Decision:
         """The union of two decisions about disjoint sets of rows."""
-        row = np.concatenate([self.row, other.row])
-        order = np.argsort(row, kind="stable")
-        return Decision(
-            self.parent,
-            row.take(order),
-            np.concatenate([self.measurement, other.measurement]).take(order),
-            np.concatenate([self.beta, other.beta]).take(order),
-            self.beta0 + other.beta0 - 1.0,
-            _chosen(other.row, other.inflation, self.inflation),
-            self.spread,
-            _chosen(other.row, other.approximate, self.approximate),
+        from vidtrack.arrays.rows import merged  # loads the compiler
+
+        row, measurement, beta, beta0 = merged(
+            self.row, self.measurement, self.beta, self.beta0, other.row, other.measurement, other.beta, other.beta0
         )
+        inflation = _chosen(other.row, other.inflation, self.inflation)
+        approximate = _chosen(other.row, other.approximate, self.approximate)
+        return Decision(self.parent, row, measurement, beta, beta0, inflation, self.spread, approximate)
 
 
 def _chosen(theirs: Ints, other: Any, own: Any) -> Any:

@@ -95,7 +95,7 @@ def test_numbers_for_each_run_stay_with_their_run_when_tracks_die():
     assert tracks.run.tolist() == [1, 2]
     given = Rates(detection, 1e-3).of(tracks.run, tracks.xy)
     np.testing.assert_array_equal(given[0], [0.5, 0.9])
-    assert given[1] == 1e-3
+    np.testing.assert_array_equal(given[1], 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
-from vidtrack.arrays.rows import starts
+from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
 from vidtrack.compiled import kernel, specialised
@@ -106,14 +106,14 @@ class Gate:
 
     def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
         """(T,) largest admitted squared distance of each row; P_D (T,) and clutter density (T,) do not count."""
-        return np.full(len(cov), self.limit(cov.shape[1]))
+        return each(self.limit(cov.shape[1]), len(cov))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
         """(T,) P_G, the share of a target's own measurements that gates of these limits admit: `probability`.
 
         The axes of a box are taken as independent.
         """
-        return np.full(len(limit), self.probability ** (dim if self.distance == "box" else 1))
+        return each(self.probability ** (dim if self.distance == "box" else 1), len(limit))
 
     def pairs(
         self,
@@ -133,7 +133,7 @@ class Gate:
         the number of pairs and not with T times M.
         """
         rows = len(zhat)
-        limit = self.limits(cov, scan, np.full(rows, detection), np.full(rows, clutter))
+        limit = self.limits(cov, scan, each(detection, rows), each(clutter, rows))
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run

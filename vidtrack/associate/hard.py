@@ -69,10 +69,10 @@ class GNN:
         """Optimal assignment, cluster by cluster."""
         pairs = problem.pairs
         cardinal = self.convention == "maximum-cardinality"
-        taken = _assigned(
+        chosen = _assigned(
             pairs.row, pairs.start, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, len(problem.scan), cardinal
         )
-        return one_hot(taken)
+        return Decision(*chosen)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,13 +150,13 @@ def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measuremen
 def _assigned(
     row: Ints, start: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats,
     measurements: int, cardinal: bool,
-) -> Ints:  # fmt: skip
-    """(T,) measurement of each row, -1 for none; `cardinal`: with as few unassigned rows as possible."""
+) -> tuple[Ints, Ints, Ints, Floats, Floats]:  # fmt: skip
+    """The decision of least cost; `cardinal`: with as few unassigned rows as possible."""
     if cardinal:
         miss = np.full(len(limit), _never(cost, len(limit)))
     else:
         miss = _edge(row, measurement, d2, cost, limit, measurements)
-    return assign(start, measurement, cost, miss, measurements)
+    return _one_hot(assign(start, measurement, cost, miss, measurements))
 
 
 @kernel

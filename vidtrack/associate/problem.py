@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from vidtrack.arrays.rows import each
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Gate, Pairs
 from vidtrack.associate.mixture import mixture_pairs
@@ -59,6 +61,8 @@ class Problem:
         where both classes are known. angles: components of z that wrap. modes: the predicted measurements are a
         mixture of these, with moments zhat and cov.
         """
+        rows, dim = zhat.shape
+        detection, clutter = each(detection, rows), each(clutter, rows)
         if modes is None:
             pairs = gate.pairs(zhat, cov, scan, run, angles, detection, clutter)
         else:
@@ -66,9 +70,7 @@ class Problem:
         if label is not None and scan.label is not None:
             mine, theirs = label[pairs.row], scan.label[pairs.measurement]
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))
-        rows, dim = zhat.shape
-        inside = gate.inside(pairs.limit, dim)
-        return cls(pairs, scan, cov, np.full(rows, detection), np.full(rows, clutter), inside)
+        return cls(pairs, scan, cov, detection, clutter, gate.inside(pairs.limit, dim))
 
     @property
     def rows(self) -> int:
@@ -100,9 +102,7 @@ class Problem:
 
     @cached_property
     def _logs(self) -> tuple[Floats, Floats]:
-        with np.errstate(divide="ignore"):
-            missed, detection, clutter = np.log(self.missed), np.log(self.detection), np.log(self.clutter)
-        return _bounded(missed, detection, clutter, self.pairs.row, self.pairs.log_l)
+        return _logs(self.detection, self.inside, self.clutter, self.pairs.row, self.pairs.log_l)
 
     def only(self, mask: Mask) -> Problem:
         """The problem with the pairs of a mask (N,)."""
@@ -137,12 +137,16 @@ class Problem:
         )
 
 
-@kernel
-def _bounded(missed: Floats, detection: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
-    """(T,) log_missed and (N,) log_ratio from the logarithms of the factors (T,); VANISHING for ln 0."""
-    most = 0.0
+@kernel(error_model="numpy")
+def _logs(detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
+    """(T,) log_missed and (N,) log_ratio from the factors (T,); VANISHING for ln 0."""
+    missed, density, ratio, most = np.empty(len(inside)), np.empty(len(inside)), np.empty(len(row)), 0.0
     for k in range(len(log_l)):
         most = max(most, abs(log_l[k]))
     least = -VANISHING - 4 * most
-    density = detection - np.maximum(clutter, least)
-    return np.maximum(missed, least), density[row] + log_l
+    for t in range(len(inside)):
+        missed[t] = max(math.log(1.0 - detection[t] * inside[t]), least)
+        density[t] = math.log(detection[t]) - max(math.log(clutter[t]), least)
+    for k in range(len(row)):
+        ratio[k] = density[row[k]] + log_l[k]
+    return missed, ratio

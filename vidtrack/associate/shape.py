@@ -41,36 +41,38 @@ class Shape:
         overlap enough.
         """
         most = pairs.limit + quantile(self.probability, 2)
-        size2, stays = _compare(
-            pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma, self.overlap
-        )
-        weighed = Pairs(
-            pairs.row, pairs.measurement, pairs.d2, pairs.nis, pairs.log_s,
-            pairs.log_l - 0.5 * size2, pairs.cost + size2, pairs.limit, pairs.start,
+        log_l, cost, stays = _compare(
+            pairs.row, pairs.measurement, pairs.d2, pairs.log_l, pairs.cost, most,
+            predicted, boxes, self.sigma, self.overlap,
         )  # fmt: skip
+        weighed = Pairs(
+            pairs.row, pairs.measurement, pairs.d2, pairs.nis, pairs.log_s, log_l, cost, pairs.limit, pairs.start
+        )
         return weighed.only(stays)
 
 
 @kernel(error_model="numpy")
 def _compare(
-    row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
-    sigma: float, overlap: float,
-) -> tuple[Floats, Mask]:  # fmt: skip
-    """(N,) the pairs' size distances, and which of them stay.
+    row: Ints, measurement: Ints, d2: Floats, log_l: Floats, cost: Floats, most: Floats,
+    predicted: Floats, boxes: Floats, sigma: float, overlap: float,
+) -> tuple[Floats, Floats, Mask]:  # fmt: skip
+    """(N,) the pairs' log_l and cost with their size distances, and which of them stay.
 
     A track without a box admits any size; a box of size zero is never admitted.
     """
-    size2, stays = np.zeros(len(row)), np.ones(len(row), np.bool_)
+    log_l, cost, stays = log_l.copy(), cost.copy(), np.ones(len(row), np.bool_)
     for k in range(len(row)):
         mine, theirs = predicted[row[k]], boxes[measurement[k]]
         if np.isnan(mine[0]):
             continue
-        common = 1.0
+        common, size2 = 1.0, 0.0
         for axis in range(2):
             near = max(mine[axis], theirs[axis])
             far = min(mine[axis] + mine[axis + 2], theirs[axis] + theirs[axis + 2])
             common *= max(0.0, far - near)
-            size2[k] += (np.log(theirs[axis + 2] / mine[axis + 2]) / sigma) ** 2
+            size2 += (np.log(theirs[axis + 2] / mine[axis + 2]) / sigma) ** 2
         union = mine[2] * mine[3] + theirs[2] * theirs[3] - common
-        stays[k] = common >= overlap * union and d2[k] + size2[k] <= most[row[k]]
-    return size2, stays
+        stays[k] = common >= overlap * union and d2[k] + size2 <= most[row[k]]
+        log_l[k] -= 0.5 * size2
+        cost[k] += size2
+    return log_l, cost, stays

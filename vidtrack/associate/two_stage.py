@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.types import Mask
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.hard import Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision
@@ -25,12 +25,28 @@ class TwoStage:
 
     def sure(self, scan: Scan) -> Mask:
         """(M,) the scan's sure detections."""
-        return np.ones(len(scan), bool) if scan.score is None else scan.score >= self.least
+        if scan.score is None or self._single(scan):
+            return np.ones(len(scan), bool)
+        return scan.score >= self.least
 
-    def decide(self, associate: Associator, problem: Problem, rows: Mask, sure: Mask) -> Decision:
-        """The decision about rows (T,): measurements that are `sure` (M,) in the first stage, others in the second."""
+    def surely(self, scan: Scan, taken: Ints) -> Mask:
+        """(T,) rows that have `taken` (T,) a sure detection; -1: none."""
+        took = taken >= 0
+        if not self._single(scan):
+            took[took] = self.sure(scan)[taken[took]]
+        return took
+
+    def _single(self, scan: Scan) -> bool:
+        """Whether all detections of a scan are sure."""
+        return scan.score is None or self.least == -np.inf
+
+    def decide(self, associate: Associator, problem: Problem, rows: Mask) -> Decision:
+        """The decision about rows (T,): sure measurements in the first stage, others in the second."""
         pairs = problem.pairs
-        asked, first_round = rows[pairs.row], sure[pairs.measurement]
+        asked = rows.take(pairs.row)
+        if self._single(problem.scan):
+            return associate.decide(problem.only(asked))
+        first_round = self.sure(problem.scan)[pairs.measurement]
         first = associate.decide(problem.only(asked & first_round))
         second_round = asked & ~first_round
         if not np.count_nonzero(second_round):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class Confirmed:
                 held.proven |= held.undecided & proven
                 held.undecided -= decided
         self._undecided = undecided
-        self._held.append(_Held(replace(step, frame=None, foreground=None), set(undecided)))
+        self._held.append(_Held(step.having(step.tracks), undecided.copy()))
         while self._held and (not self._held[0].undecided or step.time_s - self._held[0].step.time_s > self._hold_s):
             self._release(self._held.popleft())
 
@@ -67,6 +67,6 @@ class Confirmed:
         if not keep.all():
             if held.proven:
                 keep |= np.isin(tracks.id, list(held.proven))
-            held.step = replace(held.step, tracks=tracks.only(keep))
+            held.step = held.step.having(tracks.only(keep))
         for sink in self._sinks:
             sink.step(held.step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # radar runs must not load OpenCV
 
 _HALF_PX = 0.5
 """Pixel 0 covers -0.5 to 0.5."""
+_UNLIMITED = (-np.inf, -np.inf, np.inf, np.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,30 +50,44 @@ class Step:
         """The tracks in pixels of this picture."""
         return _moved(self.tracks, self.motion)
 
-    @property
-    def seen(self) -> Floats:
-        """(T, 4) left, top, right and lower edges of what the tracks were measured by [px of the scene].
-
-        NaN where a track has no measurement of its own, and where the edge of what is surveyed cuts it. By what the
-        outlines of blobs are too wide, they are moved in.
-        """
-        scan, tracks, edge = self.scan, self.tracks, np.full((len(self.tracks), 4), np.nan)
-        own = np.flatnonzero((tracks.measurement >= 0) & (tracks.group < 0))
-        if scan.box is None or len(own) == 0:
-            return edge
-        box, taken = scan.box, tracks.measurement[own]
-        low, high = (scan.z + box[:, :2])[taken], (scan.z + box[:, :2] + box[:, 2:])[taken]
-        if scan.surveyed is not None:
-            low = np.where(low < scan.surveyed[:2] + scan.pixel, np.nan, low)
-            high = np.where(high > scan.surveyed[2:] - scan.pixel, np.nan, high)
-        edge[own] = np.hstack([low + scan.rim, high - scan.rim]) - _HALF_PX
-        return edge
+    def having(self, tracks: Tracks) -> Step:
+        """The step with these tracks, and without pictures."""
+        return Step(self.index, self.time_s, self.scan, tracks, None, None, self.stage_s, self.motion, self.warnings)
 
     def in_picture(self) -> Step:
         """The step with scan and tracks in pixels of this picture."""
         if self.motion is None:
             return self
         return replace(self, scan=_seen(self.scan, self.motion), tracks=self.shown, motion=None)
+
+
+def seen(steps: Sequence[Step]) -> Floats:
+    """(N, 4) left, top, right and lower edges of what all tracks were measured by, step by step [px of the scene].
+
+    NaN where a track has no measurement of its own, and where the edge of what is surveyed cuts it. By what the
+    outlines of blobs are too wide, they are moved in.
+    """
+    tracks = np.repeat(np.arange(len(steps)), [len(step.tracks) for step in steps])  # step of each track
+    edge = np.full((len(tracks), 4), np.nan)
+    taken = np.concatenate([step.tracks.measurement for step in steps])
+    alone = np.concatenate([step.tracks.group for step in steps]) < 0
+    boxed = np.array([step.scan.box is not None for step in steps], bool)
+    own = np.flatnonzero((taken >= 0) & alone & boxed[tracks])
+    if len(own) == 0:
+        return edge
+    of, scans = tracks[own], [step.scan for step in steps]
+    start = np.cumsum([0, *(len(scan) for scan in scans)])
+    row = start[of] + taken[own]
+    z = np.concatenate([scan.z for scan in scans])[row]
+    box = np.concatenate([np.zeros((len(scan), 4)) if scan.box is None else scan.box for scan in scans])[row]
+    rim, pixel = (np.array([getattr(scan, name) for scan in scans])[of, None] for name in ("rim", "pixel"))
+    limits = np.array([_UNLIMITED if scan.surveyed is None else scan.surveyed for scan in scans])[of]
+    low = z + box[:, :2]
+    high = low + box[:, 2:]
+    low = np.where(low < limits[:, :2] + pixel, np.nan, low)
+    high = np.where(high > limits[:, 2:] - pixel, np.nan, high)
+    edge[own] = np.hstack([low + rim, high - rim]) - _HALF_PX
+    return edge
 
 
 class Sink(Protocol):

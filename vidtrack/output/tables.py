@@ -15,7 +15,7 @@ import pyarrow.csv
 from vidtrack.arrays.types import Floats
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.parquet import ParquetParts
-from vidtrack.output.sink import Step
+from vidtrack.output.sink import Step, seen
 from vidtrack.tracks import Status
 
 if TYPE_CHECKING:  # loads SciPy; needed only at calibrated sites
@@ -136,8 +136,8 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
     """
     counts = [len(step.tracks) for step in steps]
     position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
-    seen = np.concatenate([step.seen for step in steps])
-    on_road = {} if road is None else _road_values(steps, seen, road)
+    edge = seen(steps)
+    on_road = {} if road is None else _road_values(steps, edge, road)
     steps = [step.in_picture() for step in steps]
     x, P, box = (stacked(steps, name) for name in ("x", "P", "box"))
     cov = P[:, position][:, :, position]
@@ -165,7 +165,7 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
         values[f"corr_{name}"] = P[:, i, j] / np.sqrt(P[:, i, i] * P[:, j, j])
     values |= on_road
     values |= zip(("left_px", "top_px", "width_px", "height_px"), box.T, strict=True)
-    values |= zip(_SEEN, seen.T, strict=True)
+    values |= zip(_SEEN, edge.T, strict=True)
     return pa.Table.from_arrays([_array(c, values[c.name]) for c in columns], schema=schema(columns))
 
 

@@ -48,18 +48,20 @@ def absolute(box: Floats, xy: Floats) -> Floats:
 
 
 @kernel
-def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, share: Floats) -> None:
-    """Move boxes (T, 4), in place, by a share (T,) towards the boxes seen (M, 4) that they have `taken` (T,); -1: none.
+def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, least: float, hits: Ints) -> None:
+    """Move boxes (T, 4), in place, by a share towards the boxes seen (M, 4) that they have `taken` (T,); -1: none.
 
+    The share is that of a mean of all boxes of the track, after so many hits (T,), and not below `least`.
     at_once  (M,) boxes that are copied unchanged, as the first one of a track is
     """
     for t in range(len(box)):
         j = taken[t]
         if j < 0:
             continue
-        jump = np.isnan(box[t, 0]) or at_once[j] or share[t] == 1.0
+        share = max(least, 1.0 / hits[t])
+        jump = np.isnan(box[t, 0]) or at_once[j] or share == 1.0
         for side in range(4):
-            box[t, side] = seen[j, side] if jump else box[t, side] + share[t] * (seen[j, side] - box[t, side])
+            box[t, side] = seen[j, side] if jump else box[t, side] + share * (seen[j, side] - box[t, side])
 
 
 def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
@@ -27,11 +29,10 @@ def evidence(problem: Problem, decision: Decision, taken: Ints) -> tuple[Floats,
     that choice; the choice used is the measurement `taken` (T,), or the miss where that is -1.
     """
     pairs = problem.pairs
-    ratio, share, nis = _of_taken(
+    return _of_taken(
         taken, pairs.row, pairs.measurement, pairs.nis, problem.log_ratio, problem.log_missed,
         decision.row, decision.measurement, decision.beta, decision.beta0,
     )  # fmt: skip
-    return ratio - np.log(share), nis
 
 
 @kernel
@@ -43,12 +44,12 @@ def _heaviest(row: Ints, measurement: Ints, beta: Floats, beta0: Floats) -> Ints
     return best
 
 
-@kernel
+@kernel(error_model="numpy")
 def _of_taken(
     taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_ratio: Floats, log_missed: Floats,
     chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,
-) -> tuple[Floats, Floats, Floats]:  # fmt: skip
-    """(T,) log-likelihood ratio, share and NIS of the measurement taken by each row; pairs and weights in row order."""
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """(T,) log-likelihood ratio and NIS of the measurement taken by each row; pairs and weights in row order."""
     ratio, share, nis = log_missed.copy(), np.ones(len(taken)), np.full(len(taken), np.nan)
     for t in range(len(taken)):
         if taken[t] < 0:
@@ -59,7 +60,9 @@ def _of_taken(
     for b in range(len(chooser)):
         if choice[b] == taken[chooser[b]]:
             share[chooser[b]] = beta[b]
-    return ratio, share, nis
+    for t in range(len(taken)):
+        ratio[t] -= math.log(share[t])
+    return ratio, nis
 
 
 def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices:

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.types import Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.two_stage import TwoStage
-from vidtrack.decision import Decision, Event
+from vidtrack.compiled import kernel
+from vidtrack.decision import Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.choices import heaviest
@@ -47,19 +48,18 @@ class Immediate:
         problem, unresolved = whole.apart(shared), shared
         pairs, count = problem.pairs, problem.measurements
         confirmed = register.status != TENTATIVE
-        sure = self.two_stage.sure(problem.scan)
-        decision = self.two_stage.decide(self.rule, problem, confirmed, sure)
+        decision = self.two_stage.decide(self.rule, problem, confirmed)
         shared, hides = self.sharing.claim(view, decision, confirmed, count)
         decision = decision.without(shared >= 0)
-        free = hides & ~_claimed(decision, count)
-        free[unresolved[unresolved >= 0]] = False
-        open_to_all = free[pairs.measurement] & ~confirmed[pairs.row]
+        free = _unclaimed(hides, decision.measurement, decision.beta, unresolved)
+        tentative = ~confirmed
+        open_to_all = free.take(pairs.measurement) & tentative.take(pairs.row)
         if np.count_nonzero(open_to_all):
-            second = self.two_stage.decide(self._starter, problem.only(open_to_all), ~confirmed, sure)
-            free &= ~_claimed(second, count)
+            second = self.two_stage.decide(self._starter, problem.only(open_to_all), tentative)
+            free = _unclaimed(free, second.measurement, second.beta, unresolved)
             decision = decision.joined(second)
         shared, free = self.sharing.catch(view, decision, np.maximum(shared, unresolved), free)
-        free &= sure & self.births
+        free &= self.two_stage.sure(problem.scan) & self.births
         if not self.rule.gated_births:
             free[whole.pairs.measurement] = False
         return Association(whole, decision, heaviest(decision), shared, hides, distinct(problem.scan, free))
@@ -96,6 +96,16 @@ class Immediate:
         """Nothing is remembered of a row."""
 
 
-def _claimed(decision: Decision, measurements: int) -> Mask:
-    """(M,) measurements that tracks claim."""
-    return np.bincount(decision.measurement, decision.beta, measurements) > CLAIMED
+@kernel
+def _unclaimed(free: Mask, measurement: Ints, beta: Floats, unresolved: Ints) -> Mask:
+    """(M,) those of the free measurements (M,) that the weights (B,) leave, and that no row (T,) shares."""
+    claim = np.zeros(len(free))
+    for b in range(len(measurement)):
+        claim[measurement[b]] += beta[b]
+    for t in range(len(unresolved)):
+        if unresolved[t] >= 0:
+            claim[unresolved[t]] = np.inf
+    left = np.empty(len(free), np.bool_)
+    for j in range(len(free)):
+        left[j] = free[j] and claim[j] <= CLAIMED
+    return left

@@ -107,32 +107,29 @@ class LifeCycle:
         """(T,) rows that never travelled and no longer move: errors of the scene, not vehicles."""
         if self.idle_s is None:
             return np.zeros(len(register), bool)
-        near = register.travelled < self.idle_travel * np.fmax(register.box[:, 2], register.box[:, 3])
-        return near & (t - register.rest_s > self.idle_s)
+        return _idle(register.travelled, register.box, register.rest_s, t, self.idle_travel, float(self.idle_s))
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""
-        known = register.status != TENTATIVE
-        return (known & missed(register, self.coast_scans)) | unseen(register, t, self.coast_s, self.hidden_s)
+        return unseen(register, t, self.coast_s, self.hidden_s, self.coast_scans, tentative=False)
 
 
 def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
     """(T,) tentative rows that are old enough and whose travel (T,) is at least `least` (T,)."""
-    return _grown(register.status, t - register.born_s, travel, age_s * (1 - 1e-9), least)
+    return _grown(register.status, register.born_s, travel, t, age_s * (1 - 1e-9), least)
 
 
-def missed(register: Register, scans: int | None) -> Mask:
-    """(T,) rows without a hit in the last `scans` scans; None: no limit."""
-    if scans is None:
-        return np.zeros(len(register), bool)
-    return register.history & ((1 << scans) - 1) == 0
-
-
-def unseen(register: Register, t: float, coast_s: float | None, hidden_s: float) -> Mask:
-    """(T,) rows without evidence for coast_s, on shared blobs for hidden_s if that is longer; None: no limit."""
-    if coast_s is None:
-        return np.zeros(len(register), bool)
-    return _unseen(register.status, t - register.updated_s, coast_s, max(hidden_s, coast_s))
+def unseen(
+    register: Register, t: float, coast_s: float | None, hidden_s: float, scans: int | None, *, tentative: bool
+) -> Mask:
+    """(T,) rows without evidence for coast_s, on shared blobs for hidden_s if that is longer, or without a hit in
+    the last `scans` scans; None: no limit. The number of scans counts for tentative rows only if `tentative`.
+    """
+    alone = inf if coast_s is None else float(coast_s)
+    return _unseen(
+        register.status, register.updated_s, register.history, t, alone, max(float(hidden_s), alone),
+        scans or 0, tentative,
+    )  # fmt: skip
 
 
 def refuse_immortal(coast_s: float | None, coast_scans: int | None) -> None:
@@ -160,19 +157,34 @@ def scans_to_false_deletion(misses: int, detection: float) -> float:
 
 
 @kernel
-def _grown(status: np.ndarray, age: Floats, travel: Floats, old: float, least: Floats) -> Mask:
+def _grown(status: np.ndarray, born_s: Floats, travel: Floats, now: float, old: float, least: Floats) -> Mask:
     grown = np.zeros(len(status), np.bool_)
     for t in range(len(status)):
-        grown[t] = status[t] == TENTATIVE and age[t] >= old and travel[t] >= least[t]
+        grown[t] = status[t] == TENTATIVE and now - born_s[t] >= old and travel[t] >= least[t]
     return grown
 
 
 @kernel
-def _unseen(status: np.ndarray, since: Floats, alone: float, hidden: float) -> Mask:
+def _unseen(
+    status: np.ndarray, updated_s: Floats, history: Ints, now: float, alone: float, hidden: float,
+    scans: int, tentative: bool,
+) -> Mask:  # fmt: skip
+    """scans: 0 for no limit."""
     unseen = np.zeros(len(status), np.bool_)
     for t in range(len(status)):
-        unseen[t] = since[t] > (hidden if status[t] == MERGED else alone)
+        missed = scans > 0 and history[t] & ((1 << scans) - 1) == 0
+        counts = tentative or status[t] != TENTATIVE
+        unseen[t] = now - updated_s[t] > (hidden if status[t] == MERGED else alone) or (missed and counts)
     return unseen
+
+
+@kernel
+def _idle(travelled: Floats, box: Floats, rest_s: Floats, now: float, near: float, long: float) -> Mask:
+    """(T,) rows that travelled less than `near` of their sizes and have rested for `long` seconds."""
+    idle = np.zeros(len(rest_s), np.bool_)
+    for t in range(len(rest_s)):
+        idle[t] = travelled[t] < near * max(box[t, 2], box[t, 3]) and now - rest_s[t] > long
+    return idle
 
 
 @kernel

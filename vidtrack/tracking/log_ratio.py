@@ -9,7 +9,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.tracking.lifecycle import grown, missed, refuse_immortal, unseen
+from vidtrack.tracking.lifecycle import grown, refuse_immortal, unseen
 from vidtrack.tracking.register import Register
 
 LEAST = 1e-8
@@ -87,4 +87,4 @@ class LogRatio:
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long."""
-        return missed(register, self.coast_scans) | unseen(register, t, self.coast_s, self.hidden_s)
+        return unseen(register, t, self.coast_s, self.hidden_s, self.coast_scans, tentative=True)

@@ -85,9 +85,7 @@ class Register:
 
     def move(self, xy: Floats, t: float) -> None:
         """Note where the rows are at t: xy (T, d)."""
-        self.travelled = np.maximum(self.travelled, self.travel(xy))
-        moved = _distance(xy, self.rest) > REST * np.fmax(self.box[:, 2], self.box[:, 3])
-        self.rest[moved], self.rest_s[moved] = xy[moved], t
+        _move(xy, self.start, self.travelled, self.box, self.rest, self.rest_s, t)
 
     def record_hits(self, hit: Mask, sure: Mask, looked: Mask, station: int, t: float, dt: float) -> None:
         """Note which rows (T,) the scan of a station at t shows, dt seconds after the last, and which of them for sure.
@@ -95,16 +93,15 @@ class Register:
         Only sure ones keep a row alive, and confirm a tentative one. Rows at which the station does not look (T,) are
         neither seen nor missed.
         """
-        _see(self.history, self.alone_s, self.updated_s, self.status, hit, sure, looked, t, dt)
-        self.missed[:, station] += looked
+        _see(self.history, self.alone_s, self.updated_s, self.status, self.missed, hit, sure, looked, station, t, dt)
 
-    def seen(self, rows: Mask) -> None:
-        """Begin to count misses anew for rows (T,) that have been seen."""
-        self.missed[rows] = 0
+    def seen(self, looked: Mask) -> None:
+        """Begin to count misses anew for the rows that were looked at (T,) and seen."""
+        _begin_anew(self.missed, self.history, looked)
 
-    def add_evidence(self, log_ratio: Floats) -> None:
-        """Add evidence (T,) to the log-odds of existence: Bayes' rule."""
-        _believe(self.score, self.best, self.status, log_ratio)
+    def add_evidence(self, log_ratio: Floats, alone: Mask, weight: float) -> None:
+        """Add evidence (T,) of a weight to the log-odds of existence of rows that are alone (T,): Bayes' rule."""
+        _believe(self.score, self.best, self.status, log_ratio, alone, weight)
 
     def settle(self) -> None:
         """Set the status of confirmed rows by this scan: confirmed, coasting or merged."""
@@ -168,8 +165,8 @@ class Register:
 
 @kernel
 def _see(
-    history: Ints, alone_s: Floats, updated_s: Floats, status: np.ndarray, hit: Mask, sure: Mask, looked: Mask,
-    t: float, dt: float,
+    history: Ints, alone_s: Floats, updated_s: Floats, status: np.ndarray, missed: Ints,
+    hit: Mask, sure: Mask, looked: Mask, station: int, t: float, dt: float,
 ) -> None:  # fmt: skip
     for i in range(len(hit)):
         alone_s[i] += dt * hit[i]
@@ -178,12 +175,22 @@ def _see(
         counts = hit[i] and (sure[i] or status[i] != TENTATIVE)
         if looked[i]:
             history[i] = (history[i] << 1 | counts) & SCANS
+            missed[i, station] += 1
 
 
 @kernel
-def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats) -> None:
+def _begin_anew(missed: Ints, history: Ints, looked: Mask) -> None:
+    for i in range(len(looked)):
+        if looked[i] and history[i] & 1:
+            for station in range(missed.shape[1]):
+                missed[i, station] = 0
+
+
+@kernel
+def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats, alone: Mask, weight: float) -> None:
     for i in range(len(score)):
-        score[i] = min(max(score[i] + log_ratio[i], -BELIEF), BELIEF)
+        told = log_ratio[i] * weight if alone[i] else 0.0
+        score[i] = min(max(score[i] + told, -BELIEF), BELIEF)
         if status[i] != TENTATIVE:
             best[i] = max(best[i], score[i])
 
@@ -195,6 +202,17 @@ def _settle(status: np.ndarray, history: Ints, merged: Ints) -> None:
             status[i] = CONFIRMED if history[i] & 1 else COASTING
         if merged[i] >= 0:
             status[i] = MERGED
+
+
+@kernel
+def _move(xy: Floats, start: Floats, travelled: Floats, box: Floats, rest: Floats, rest_s: Floats, t: float) -> None:
+    farthest, moved = _distance(xy, start), _distance(xy, rest)
+    for i in range(len(xy)):
+        travelled[i] = max(travelled[i], farthest[i])
+        if moved[i] > REST * max(box[i, 2], box[i, 3]):
+            rest_s[i] = t
+            for axis in range(xy.shape[1]):
+                rest[i, axis] = xy[i, axis]
 
 
 @kernel

@@ -26,15 +26,6 @@ class Coverage(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Everywhere:
-    """No limit."""
-
-    def share(self, xy: Floats, v: Floats) -> Floats:
-        """Ones."""
-        return np.ones(len(xy))
-
-
-@dataclass(frozen=True, slots=True)
 class Visibility:
     """Targets that a station cannot see for a while: behind others, in the dark, too slow for Doppler.
 
@@ -63,14 +54,14 @@ class Station:
     """One of the sensors of a tracker. A scan names its station; the measurement model is the scan's own.
 
     rates       detection probability of a visible target, and clutter density; given or estimated
-    coverage    a target outside is neither seen nor missed
+    coverage    a target outside is neither seen nor missed; None: there is no outside
     visibility  None: targets inside are always visible
     lasting_s   s; what looks like a target goes on to do so for this time: scans within it are together the evidence of
                 one. 0: each scan counts
     """
 
     rates: Rates = field(default_factory=Rates)
-    coverage: Coverage = field(default_factory=Everywhere)
+    coverage: Coverage | None = None
     visibility: Visibility | None = None
     lasting_s: float = 0.0
 
@@ -80,7 +71,8 @@ class Station:
 class Stations:
     """The stations of a tracker by number, and when each made its last scan.
 
-    last_s  (S,) s; NaN before the first
+    last_s    (S,) s; NaN before the first
+    estimate  whether the rates of any of them are estimated
     """
 
     STATE = ("last_s", "each")
@@ -88,6 +80,7 @@ class Stations:
     def __init__(self, each: Sequence[Station]) -> None:
         self.each = tuple(each)
         self.last_s = np.full(len(self.each), np.nan)
+        self.estimate = any(station.rates.estimated for station in self.each)
 
     def __len__(self) -> int:
         return len(self.each)
@@ -100,6 +93,8 @@ class Stations:
     def share(self, scan: Scan, x: Floats, model: Motion) -> Floats:
         """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""
         coverage = self.each[scan.station].coverage
+        if coverage is None:
+            return np.ones(len(x))
         return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
 
     def take(self, scan: Scan) -> float:
@@ -155,4 +150,3 @@ class Stations:
                 station.rates.learn_clutter(found.decision, found.shared, known, register.existence, problem.scan, runs)
             missed = register.missed[count, number] - now  # this scan is counted, and was none
             station.rates.learn_detection(missed, problem.inside[count], seen=now)
-        register.seen(seen)

@@ -9,6 +9,7 @@ import numpy as np
 
 from vidtrack.amplitude.threshold import ThresholdController
 from vidtrack.arrays.checks import check_states
+from vidtrack.arrays.rows import each, no_index
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.adaptive import thresholded
 from vidtrack.associate.gate import Gate
@@ -57,8 +58,11 @@ class Outcome(NamedTuple):
 
     def after(self, kept: Mask, born: Ints) -> Outcome:
         """The outcome of the tracks kept (T,), then of those born from measurements (B,)."""
-        measurement = np.concatenate([self.measurement[kept], born])
-        nis = np.concatenate([self.nis[kept], np.full(len(born), np.nan)])
+        measurement, nis = self.measurement, self.nis
+        if not kept.all():
+            measurement, nis = measurement[kept], nis[kept]
+        if len(born):
+            measurement, nis = np.concatenate([measurement, born]), np.concatenate([nis, each(np.nan, len(born))])
         return Outcome(measurement, nis, self.choices)
 
 
@@ -148,7 +152,7 @@ class Tracker:
     def predict(self, t: float) -> Tracks:
         """All tracks predicted to time t; the tracker does not change. Raises ScanError for a time in the past."""
         x, P = self.bank.ahead(self._since_last(t))
-        return self._snapshot(t, x, P, np.full(len(x), -1), np.full(len(x), np.nan))
+        return self._snapshot(t, x, P, no_index(len(x)), each(np.nan, len(x)))
 
     def remove(self, ids: Ints) -> None:
         """Delete the tracks with these ids."""
@@ -261,13 +265,11 @@ class Tracker:
         """
         register = self.register
         self.bank.update(found.decision, for_update(scan, since), scan.sensor or POSITION)
-        hit = found.taken >= 0
-        rows = hit.nonzero()[0]
-        sure = hit.copy()
-        sure[rows] = self.two_stage.sure(scan)[found.taken[rows]]
+        hit, sure = found.taken >= 0, self.two_stage.surely(scan, found.taken)
         share = self.stations.share(scan, self.bank.x, self.model)
         looked = self.stations.record(scan, register, share, hit, sure, found.problem.detection, dt)
         if scan.label is not None:
+            rows = hit.nonzero()[0]
             told = scan.label[found.taken[rows]]
             register.label[rows] = np.where(told < 0, register.label[rows], told)
         self.picture.follow(view, found.taken, register, self.bank, dt)
@@ -281,9 +283,10 @@ class Tracker:
         """
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
-        log_ratio[~alone] = 0.0
-        self.register.add_evidence(log_ratio * self.stations.weight(problem.scan, since))
-        self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
+        self.register.add_evidence(log_ratio, alone, self.stations.weight(problem.scan, since))
+        if self.stations.estimate:
+            self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
+        self.register.seen(looked)
         return nis
 
     def _why(self, found: Association) -> Choices | None:
@@ -302,7 +305,9 @@ class Tracker:
         idle = self.life.idle(register, t)
         parts = self.sharing.parts(register, t)
         going = hopeless | left | parts | idle
+        shared = found.shared
         if np.count_nonzero(going):
+            shared = shared[~going]
             for gone, why in (
                 (hopeless & ~left, self.life.ends),
                 (left, "left the picture"),
@@ -311,7 +316,7 @@ class Tracker:
             ):
                 events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))
             self._keep(~going)
-        self.sharing.merge(found.shared[~going], register, t, events)
+        self.sharing.merge(shared, register, t, events)
         return ~going
 
     def _register(self, found: Association, scan: Scan, view: View | None, events: list[Event]) -> Ints:
@@ -345,7 +350,8 @@ class Tracker:
             xy = self._xy()
             ready = self.life.confirmed(register, t, register.travel(xy), self.picture.size(register.box, xy))
             ready = self.timing.confirm(ready, register)
-            events.extend(Event.each(t, register.id[ready], "confirmed", self.life.confirms))
+            if np.count_nonzero(ready):
+                events.extend(Event.each(t, register.id[ready], "confirmed", self.life.confirms))
         register.settle()
 
     def _tracks(self, t: float, outcome: Outcome, events: list[Event]) -> Tracks:

@@ -91,9 +91,11 @@ def test_a_road_is_saved_and_restored():
         drive(each.learn, lambda y: (50.0, 25.0), vehicles=2, first=7)
     np.testing.assert_array_equal(other.sizes.typical(box), road.sizes.typical(box))
     np.testing.assert_array_equal(other.restless.starts, road.restless.starts)
+    np.testing.assert_array_equal(other.swarm.births, road.swarm.births)
 
 
 PLACE = np.array([[55.0, 45.0]])
+SIDE = np.array([30.0])
 LEAF = [50.0, 40.0, 10.0, 10.0]
 
 
@@ -108,10 +110,10 @@ def flutter(learn, times, box=LEAF, travel=1.0, known=()):
 
 def test_false_starts_make_a_place_restless_until_they_are_forgotten():
     road = Road(WIDTH, HEIGHT)
-    assert road.travel_factor(PLACE).tolist() == [1.0]
+    assert road.travel_factor(PLACE, SIDE).tolist() == [1.0]
     flutter(road.learn, 4)
-    assert road.travel_factor(PLACE).tolist() == [3.0]
-    assert road.travel_factor(np.array([[300.0, 200.0], [-50.0, 900.0]])).tolist() == [1.0, 1.0]
+    assert road.travel_factor(PLACE, SIDE).tolist() == [3.0]
+    assert road.travel_factor(np.array([[300.0, 200.0], [-50.0, 900.0]]), SIDE.repeat(2)).tolist() == [1.0, 1.0]
     before = road.restless.starts.sum()
     road.learn(tracks_of(0.7 + 30.0))
     assert road.restless.starts.sum() == pytest.approx(before / np.e, rel=1e-9)
@@ -123,6 +125,46 @@ def test_tracks_that_travelled_or_are_part_of_a_vehicle_are_no_false_starts():
     flutter(restless.learn, 10, travel=50.0)
     flutter(restless.learn, 10, known=[[40.0, 30.0, 60.0, 40.0]])
     assert not restless.starts.any()
+
+
+def fall(learn, per_s, side, seconds=10.0, rate=10.0, first=0.0):
+    """Flakes of one size that begin at `per_s`; each is seen once."""
+    each = round(per_s / rate)
+    for k in range(round(seconds * rate)):
+        boxes = [[10.0 * i, 100.0, side, side / 2] for i in range(each)]
+        learn(tracks_of(first + k / rate, boxes, status=TENTATIVE, age_s=0.0))
+
+
+def test_what_is_as_small_as_a_swarm_is_no_vehicle_while_it_lasts():
+    road = Road(WIDTH, HEIGHT)
+    places = np.array([[200.0, 100.0]] * 3)
+    sizes = np.array([6.0, 8.0, 30.0])
+    fall(road.learn, 100, 8.0)
+    fall(road.learn, 10, 4.0, first=10.0, seconds=1.0)
+    assert road.travel_factor(places, sizes).tolist() == [np.inf, np.inf, 1.0]
+    road.learn(tracks_of(40.0))
+    assert road.travel_factor(places, sizes).tolist() == [1.0, 1.0, 1.0]
+    fall(road.learn, 100, 8.0, first=50.0)
+    assert Road(WIDTH, HEIGHT, careful=False).travel_factor(places, sizes).tolist() == [1.0, 1.0, 1.0]
+
+
+def test_dense_traffic_is_no_swarm():
+    road = Road(WIDTH, HEIGHT)
+    fall(road.learn, 20, 40.0, seconds=60.0)
+    assert road.swarm.size == 0.0
+
+
+def test_flakes_that_drift_are_not_confirmed_and_a_vehicle_among_them_is():
+    from blob_scene import confirmed_ids, default_tracker, play
+
+    def snow(t):
+        flakes = [[20.0 * x, 20 * t + 5 * (x % 3), 6, 6] for x in range(15)]
+        return [*flakes, [20 + 60 * t, 150, 30, 20]]
+
+    assert len(confirmed_ids(play(default_tracker(), snow, 3.0))) == 16
+    tracker = default_tracker()
+    fall(tracker.road.learn, 200, 6.0, first=-10.0)
+    assert len(confirmed_ids(play(tracker, snow, 3.0))) == 1
 
 
 def test_a_restless_place_asks_for_more_travel_before_a_track_is_confirmed():

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
 
 
@@ -60,12 +62,18 @@ class Columns:
     @property
     def position(self) -> tuple[int, ...]:
         """Columns of the state that are positions."""
-        return tuple(range(0, 2 * self.dim, 2))
+        return _columns(0, self.dim)
 
     @property
     def velocity(self) -> tuple[int, ...]:
         """Columns of the state that are velocities."""
-        return tuple(range(1, 2 * self.dim, 2))
+        return _columns(1, self.dim)
+
+
+@lru_cache
+def _columns(first: int, dim: int) -> tuple[int, ...]:
+    """Every other column from `first` on, one per axis."""
+    return tuple(range(first, 2 * dim, 2))
 
 
 def check(model: Columns, dims: tuple[int, ...], *names: str) -> None:
@@ -80,13 +88,16 @@ def check(model: Columns, dims: tuple[int, ...], *names: str) -> None:
             raise ConfigError(f"{kind}: {name} is {value}; it must be above zero")
 
 
+@kernel
 def at_rest(position: Floats, cov: Floats, sigma: Floats) -> tuple[Floats, Floats]:
     """x (B, n), P (B, n, n): position (B, d) with cov (B, d, d), all else zero with deviations sigma (B, n)."""
-    dim = position.shape[1]
-    x = np.zeros(sigma.shape)
-    P = np.zeros((*sigma.shape, sigma.shape[1]))
-    columns = np.arange(sigma.shape[1])
-    P[:, columns, columns] = sigma**2
-    x[:, : 2 * dim : 2] = position
-    P[:, : 2 * dim : 2, : 2 * dim : 2] = cov
+    (rows, n), dim = sigma.shape, position.shape[1]
+    x, P = np.zeros((rows, n)), np.zeros((rows, n, n))
+    for b in range(rows):
+        for k in range(n):
+            P[b, k, k] = sigma[b, k] ** 2
+        for i in range(dim):
+            x[b, 2 * i] = position[b, i]
+            for j in range(dim):
+                P[b, 2 * i, 2 * j] = cov[b, i, j]
     return x, P

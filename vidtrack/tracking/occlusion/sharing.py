@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from vidtrack.arrays.rows import no_index
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
@@ -58,11 +59,11 @@ class Exclusive:
 
     def unresolved(self, problem: Problem, shown: Mask, register: Register, bank: Estimator, dt: float) -> Ints:
         """(T,) none."""
-        return np.full(problem.rows, -1)
+        return no_index(problem.rows)
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """No track shares a measurement, and all measurements may be of new targets."""
-        return np.full(len(confirmed), -1), np.ones(count, bool)
+        return no_index(len(confirmed)), np.ones(count, bool)
 
     def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """No track continues on what its gate does not hold."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
 from vidtrack.scan import Scan
 
+FAR = 6.0
+"""erf of this is one in double precision."""
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
 SPECK = 1 / 30
@@ -59,13 +61,9 @@ class Border:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""
         return _cut(box, self._edges, self._reach)
 
-    def in_view(self, xy: Floats, var: Floats) -> Floats:
-        """(N,) probability that positions with means (N, d) and variances (N, d) are within the border."""
-        if np.isinf(self.width):
-            return np.ones(len(xy))
-        edges, sigma = np.array(self._edges) - 0.5, np.sqrt(var[:, :2])  # a pixel is a unit square around its position
-        below, above = (ndtr((edge - xy[:, :2]) / sigma) for edge in (edges[:2], edges[2:]))
-        return np.asarray((above - below).prod(axis=1))
+    def in_view(self, x: Floats, P: Floats) -> Floats:
+        """(N,) probability that positions are within the border: states [x, vx, y, vy, ...] (N, n), P (N, n, n)."""
+        return _in_view(x, P, self._edges)
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) extended to the border on the given sides (N, 4)."""
@@ -82,6 +80,22 @@ def _sides(box: Floats, edges: tuple[float, float, float, float], reach: float) 
             sides[i, axis] = box[i, axis] < edges[axis] + reach
             sides[i, axis + 2] = box[i, axis] + box[i, axis + 2] > edges[axis + 2] - reach
     return sides
+
+
+@kernel(error_model="numpy")
+def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float]) -> Floats:
+    """(N,) product of both axes' normal probabilities between the edges; a pixel is a unit square around its place."""
+    inside = np.ones(len(x))
+    if np.isinf(edges[2]):
+        return inside
+    for i in range(len(x)):
+        for axis in range(2):
+            sigma, at = math.sqrt(2 * P[i, 2 * axis, 2 * axis]), x[i, 2 * axis] + 0.5
+            below, above = (edges[axis] - at) / sigma, (edges[axis + 2] - at) / sigma
+            if below < -FAR and above > FAR:
+                continue
+            inside[i] *= (math.erfc(-above) - math.erfc(-below)) / 2
+    return inside
 
 
 @kernel

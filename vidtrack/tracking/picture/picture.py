@@ -162,22 +162,20 @@ class Picture:
         """Move the boxes of tracks towards those that they have taken (T,); one that the border cuts is copied."""
         if view is None:
             return
-        share = np.maximum(-np.expm1(-dt / self.box_s), 1.0 / bank.hits)
-        follow(register.box, view.relative, taken, self.border.cut(view.blobs), share)
+        least = -float(np.expm1(-dt / self.box_s))
+        follow(register.box, view.relative, taken, self.border.cut(view.blobs), least, bank.hits)
         if bank.model.per_size:
-            rows = (taken >= 0).nonzero()[0]
-            bank.scale[rows] = longer(register.box)[rows]
+            np.copyto(bank.scale, longer(register.box), where=taken >= 0)
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is within the border of the last scan."""
-        position = bank.model.position
-        var = bank.P.diagonal(axis1=1, axis2=2)
-        return self.border.in_view(bank.x.take(position, axis=1), var.take(position, axis=1))
+        return self.border.in_view(bank.x, bank.P)
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) longer sides, of specks that of the least object; more where the picture is restless."""
-        size = np.fmax(longer(box), self.border.speck)  # NaN where there is no box
-        return size * self.road.travel_factor(xy) if self.road else size
+        side = longer(box)
+        size = np.fmax(side, self.border.speck)  # NaN where there is no box
+        return size * self.road.travel_factor(xy, side) if self.road else size
 
     def learn(self, tracks: Tracks) -> None:
         """Update the road with the tracks of a scan."""

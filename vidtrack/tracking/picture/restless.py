@@ -8,6 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import located
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
 from vidtrack.tracking.boxes import best_cover, longer
 from vidtrack.tracks import TENTATIVE, Tracks
 
@@ -38,26 +39,43 @@ class RestlessMap:
 
     def restless(self, xy: Floats) -> np.ndarray:
         """(N,) whether places (N, 2) saw false starts lately."""
-        return self.starts[self._cells(xy)] > _RESTLESS
+        return _at(self.starts, self._cell, xy) > _RESTLESS
 
     def learn(self, tracks: Tracks) -> None:
         """Count the tracks that ended since the last scan without having travelled, apart from known vehicles."""
         self.starts *= math.exp(-max(tracks.t - self._time_s, 0.0) / _FORGET_S)
         self._time_s = tracks.t
-        alive = located(tracks.id, self._id)
-        ended = np.ones(len(self._id), bool)
-        ended[alive[alive >= 0]] = False
-        if np.count_nonzero(ended):
-            np.add.at(self.starts, self._cells(self._xy[ended]), 1.0)
-        young = (tracks.status == TENTATIVE) & (tracks.travel < longer(tracks.box))
-        if np.count_nonzero(young):
-            known = tracks.box[tracks.status != TENTATIVE]
-            young[young] = best_cover(tracks.box[young], known)[1] < 0.3
-        rows = young.nonzero()[0]
-        rows = rows[tracks.id[rows].argsort()]
+        if len(self._id):
+            _count_ended(self.starts, self._cell, located(tracks.id, self._id), self._xy)
+        tentative = tracks.status == TENTATIVE
+        rows = (tentative & (tracks.travel < longer(tracks.box))).nonzero()[0]
+        if len(rows):
+            rows = rows[best_cover(tracks.box[rows], tracks.box[~tentative])[1] < 0.3]
+            rows = rows[tracks.id[rows].argsort()]
         self._id, self._xy = tracks.id[rows], tracks.xy[rows]
 
-    def _cells(self, xy: Floats) -> tuple[Ints, Ints]:
-        rows, columns = self.starts.shape
-        x = np.clip((xy[:, 0] / self._cell).astype(np.int64), 0, columns - 1)
-        return np.clip((xy[:, 1] / self._cell).astype(np.int64), 0, rows - 1), x
+
+@kernel
+def _at(starts: Floats, cell: float, xy: Floats) -> Floats:
+    """(N,) starts at places (N, 2); those outside the picture are in the nearest cell."""
+    found = np.empty(len(xy))
+    for i in range(len(xy)):
+        found[i] = starts[_cell(xy[i, 1], cell, starts.shape[0]), _cell(xy[i, 0], cell, starts.shape[1])]
+    return found
+
+
+@kernel
+def _count_ended(starts: Floats, cell: float, alive: Ints, xy: Floats) -> None:
+    """Add one where each track at xy (N, 2) was that is not among those `alive` (T,), indices or -1."""
+    ended = np.ones(len(xy), np.bool_)
+    for t in range(len(alive)):
+        if alive[t] >= 0:
+            ended[alive[t]] = False
+    for i in range(len(xy)):
+        if ended[i]:
+            starts[_cell(xy[i, 1], cell, starts.shape[0]), _cell(xy[i, 0], cell, starts.shape[1])] += 1.0
+
+
+@kernel
+def _cell(place: float, cell: float, count: int) -> int:
+    return min(max(int(place / cell), 0), count - 1)

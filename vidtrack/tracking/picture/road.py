@@ -1,4 +1,4 @@
-"""Maps learnt from traffic: the size of vehicles at each place, and places with motion but no vehicles."""
+"""Learnt from traffic: the size of vehicles at each place, and the places and sizes of what is no vehicle."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.sizes import SizeField
+from vidtrack.tracking.picture.swarm import Swarm
 from vidtrack.tracks import Tracks
 
 _CAUTION = 3.0  # times as far must a track travel to be confirmed where the picture is restless
@@ -18,10 +19,10 @@ _EDGE = 2.0  # px; a box this close to the border is cut by it
 class Road:
     """Learnt from tracks, scan by scan; used to explain the blobs of the next one."""
 
-    STATE = ("sizes", "restless")
+    STATE = ("sizes", "restless", "swarm")
 
     def __init__(self, width: float, height: float, *, careful: bool = True) -> None:
-        """width, height of the picture [px]; careful: tracks must travel farther where others began in vain."""
+        """width, height of the picture [px]; careful: doubt tracks where others began in vain, or of a swarm."""
         self._wary = careful
         self._width, self._height = width, height
         self.forget()
@@ -30,11 +31,13 @@ class Road:
         """Reset all maps after a change of the camera's view."""
         self.sizes = SizeField(self._width, self._height)
         self.restless = RestlessMap(self._width, self._height)
+        self.swarm = Swarm()
 
     def learn(self, tracks: Tracks) -> None:
         """Take in the tracks of a scan."""
         self.sizes.learn(tracks, _whole(tracks.box, self._width - _EDGE, self._height - _EDGE))
         self.restless.learn(tracks)
+        self.swarm.learn(tracks)
 
     def growth(self, before: Floats, after: Floats) -> Floats:
         """(N, 4) factors by which boxes (N, 4) grow on their way, about a point in them: far vehicles look small."""
@@ -42,9 +45,13 @@ class Road:
             return np.ones((len(before), 4))
         return _growth(self.sizes.typical(before), self.sizes.typical(after))
 
-    def travel_factor(self, xy: Floats) -> Floats:
-        """(N,) how much farther than elsewhere a track at xy (N, 2) must travel to be believed."""
-        return np.where(self._wary & self.restless.restless(xy), _CAUTION, 1.0)
+    def travel_factor(self, xy: Floats, size: Floats) -> Floats:
+        """(N,) how much farther than elsewhere tracks at xy (N, 2) of sizes (N,) must travel to be believed."""
+        if not self._wary:
+            return np.ones(len(xy))
+        factor = np.where(self.restless.restless(xy), _CAUTION, 1.0)
+        factor[size <= self.swarm.size] = np.inf
+        return factor
 
 
 @kernel

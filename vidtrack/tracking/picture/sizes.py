@@ -7,7 +7,6 @@ import numpy as np
 from vidtrack.arrays.rows import located
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.tracking.boxes import longer
 from vidtrack.tracks import CONFIRMED, Tracks
 
 _SAMPLES = 400  # kept, the newest
@@ -56,14 +55,9 @@ class SizeField:
 
     def learn(self, tracks: Tracks, whole: Mask) -> None:
         """Take samples of tracks (T,) that are alone, `whole` (T,) and have driven; refit once a second."""
-        longest = longer(tracks.box)
-        good = (tracks.status == CONFIRMED) & (tracks.group < 0) & (tracks.travel > longest) & whole
-        last = located(tracks.id, self._id)
-        xy, moved = _since(last, self._xy, tracks.xy, good, _STRIDE * longest)
-        rows = moved.nonzero()[0]
-        sampled = (moved | (last >= 0)).nonzero()[0]
-        sampled = sampled[tracks.id[sampled].argsort()]
-        self._id, self._xy = tracks.id[sampled], xy[sampled]
+        rows, self._id, self._xy = _sampled(
+            tracks.id, tracks.status, tracks.group, tracks.travel, tracks.box, tracks.xy, whole, self._id, self._xy
+        )
         if len(rows):
             self._place = np.concatenate([self._place, _places(tracks.box[rows], self._extent)])[-_SAMPLES:]
             self._size = np.concatenate([self._size, tracks.box[rows, 2:]])[-_SAMPLES:]
@@ -116,13 +110,35 @@ def _fitted(place: Floats, fit: Floats, floor: Floats) -> Floats:
 
 
 @kernel
-def _since(last: Ints, before: Floats, xy: Floats, good: Mask, stride: Floats) -> tuple[Floats, Mask]:
-    """(T, 2) where each track was sampled last, and (T,) whether it is now: if good, and a stride (T,) farther."""
-    where, moved = np.empty((len(last), 2)), good.copy()
-    for t in range(len(last)):
+def _sampled(
+    name: Ints, status: np.ndarray, group: Ints, travel: Floats, box: Floats, xy: Floats, whole: Mask,
+    known: Ints, before: Floats,
+) -> tuple[Ints, Ints, Floats]:  # fmt: skip
+    """(N,) rows of the tracks (T,) that are sampled now, names (K,) of all sampled so far, ascending, and where (K, 2).
+
+    A track is sampled if it is whole (T,), alone, has driven, and is a stride farther than `before` (., 2), where the
+    one of its name in `known` was sampled last. Tracks that have ended are forgotten.
+    """
+    last = located(name, known)
+    rows, n = np.empty(len(name), np.int64), 0
+    names, where, count = np.empty(len(name), np.int64), np.empty((len(name), 2)), 0
+    for t in range(len(name)):
+        longest = max(box[t, 2], box[t, 3])
+        now = status[t] == CONFIRMED and group[t] < 0 and travel[t] > longest and whole[t]
         if last[t] >= 0:
             dx, dy = xy[t, 0] - before[last[t], 0], xy[t, 1] - before[last[t], 1]
-            moved[t] &= np.sqrt(dx * dx + dy * dy) > stride[t]
+            now = now and np.sqrt(dx * dx + dy * dy) > _STRIDE * longest
+        if now:
+            rows[n] = t
+            n += 1
+        if not (now or last[t] >= 0):
+            continue
+        k = count
+        while k > 0 and names[k - 1] > name[t]:  # by name
+            names[k], where[k, 0], where[k, 1] = names[k - 1], where[k - 1, 0], where[k - 1, 1]
+            k -= 1
+        names[k] = name[t]
         for axis in range(2):
-            where[t, axis] = xy[t, axis] if moved[t] or last[t] < 0 else before[last[t], axis]
-    return where, moved
+            where[k, axis] = xy[t, axis] if now else before[last[t], axis]
+        count += 1
+    return rows[:n], names[:count], where[:count]
