@@ -4,6 +4,7 @@ import contextlib
 import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import pytest
 from page_client import HANG_S, MadeUp, connect, get, page_over, wait_for
@@ -146,7 +147,47 @@ def test_health_is_answered_whoever_holds_connections_open(monkeypatch):
             held.append(connect(page.url, b"GET / HTTP/1.1\r\n"))
             assert get(page.url + "healthz")[0] == 200
         assert connections_of(page) <= connection.MOST_EACH
-        streams = [connect(page.url, ASK % b"tracks") for _ in range(60)]
-        assert get(page.url + "healthz")[0] == 200
-        for client in [*held, *streams]:
+        for client in held:
+            client.close()
+
+
+def test_health_is_answered_whoever_streams(monkeypatch):
+    """All connections of an address are being answered: the oldest one gives way, not the one that asks."""
+    monkeypatch.setattr("vidtrack.serve.connection.MOST_EACH", 8)
+    with page_over({"gate": MadeUp()}) as url:
+        streams = [connect(url, ASK % b"tracks") for _ in range(8)]
+        for client in streams:
+            assert client.recv(5) == b"HTTP/"
+        for _ in range(3):
+            assert answers(url)
+        wait_for(lambda: sum(map(is_open_stream, streams)) == 7)  # an answered request has left its place to the next
+        assert is_open_stream(streams[-1])
+        for client in streams:
+            client.close()
+
+
+def is_open_stream(client):
+    """Whether the server has not closed it; what has come is read."""
+    with contextlib.suppress(BlockingIOError, ConnectionError):
+        while client.recv(65536, socket.MSG_DONTWAIT):
+            pass
+    return is_open(client)
+
+
+def test_a_request_is_read_before_its_connection_may_give_way(monkeypatch):
+    """While the page is busy, a request comes, and then as many connections as there may be."""
+    monkeypatch.setattr("vidtrack.serve.connection.MOST_EACH", 8)
+    with Page("0") as page:
+        page.show({"gate": MadeUp().camera()})
+        assert answers(page.url)
+        busy, free = Event(), Event()
+        loop = page._server._server.servers[0].get_loop()
+        loop.call_soon_threadsafe(lambda: (busy.set(), free.wait(HANG_S)))
+        assert busy.wait(HANG_S)
+        asks = connect(page.url, ASK % b"healthz")
+        held = [connect(page.url) for _ in range(12)]
+        free.set()
+        asks.settimeout(HANG_S)
+        assert asks.recv(15) == b"HTTP/1.1 200 OK"
+        for client in [asks, *held]:
             client.close()

@@ -98,7 +98,7 @@ def test_uninstalling_what_is_not_there_is_refused_and_a_dry_run_says_what_it_wo
 
 
 def test_the_container_file_copies_what_there_is_and_runs_what_the_program_takes():
-    """It is not built here: that needs a builder."""
+    """It is not built here: that takes minutes, and a base image."""
     root = Path(__file__).parents[2]
     lines = (root / "tools" / "Containerfile").read_text().replace("\\\n", "").splitlines()
     orders = [line.split(maxsplit=1) for line in lines if line and not line.startswith("#")]

@@ -19,8 +19,9 @@ ASK_S = 5.0
 class Connection(H11Protocol):
     """A connection that is closed without a whole request in ASK_S.
 
-    Beyond MOST, or MOST_EACH from one address, the oldest one that waits for a request is closed: a client that asks at
-    once is answered, whatever others hold open.
+    Beyond MOST, or MOST_EACH from one address, the oldest one that waits for a request is closed, and where all are
+    being answered the oldest of these, but never the newest one: a client that asks at once is answered, whatever
+    others hold open.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -28,11 +29,7 @@ class Connection(H11Protocol):
         self.address = "" if self.client is None else self.client[0]
         self.since_s = self.loop.time()
         self._deadline = self.loop.call_later(ASK_S, transport.abort)
-        own = [other for other in self._others() if other.address == self.address]
-        if len(own) > MOST_EACH:
-            _first_to_go(own).transport.abort()
-        elif len(self.connections) > MOST:
-            _first_to_go(self._others()).transport.abort()
+        self.loop.call_later(0, self._make_room)  # when requests that have come together with connections are read
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._deadline.cancel()
@@ -53,9 +50,14 @@ class Connection(H11Protocol):
         """Whether a response is being sent."""
         return self.cycle is not None and not self.cycle.response_complete
 
-    def _others(self) -> list[Connection]:
-        """All connections that are not closing, with this one."""
-        return [other for other in self.connections if isinstance(other, Connection) and not other.is_closing]
+    def _make_room(self) -> None:
+        """Close a connection if there are too many."""
+        every = [one for one in self.connections if isinstance(one, Connection) and not one.is_closing]
+        own = [other for other in every if other.address == self.address]
+        if len(own) > MOST_EACH:
+            _first_to_go(own).transport.abort()
+        elif len(every) > MOST:
+            _first_to_go(every).transport.abort()
 
     @property
     def is_closing(self) -> bool:
@@ -64,7 +66,7 @@ class Connection(H11Protocol):
 
 
 def _first_to_go(connections: Iterable[Connection]) -> Connection:
-    """The oldest one without a response, of the address that has most."""
-    connections = list(connections)
-    held = Counter(connection.address for connection in connections)
-    return min(connections, key=lambda one: (one.is_answered, -held[one.address], one.since_s))
+    """The oldest one without a response, else the oldest, of the address that has most; never the newest."""
+    *older, _ = sorted(connections, key=lambda one: one.since_s)
+    held = Counter(connection.address for connection in older)
+    return min(older, key=lambda one: (one.is_answered, -held[one.address], one.since_s))

@@ -2,6 +2,7 @@
 
 import csv
 import errno
+import gc
 import itertools
 import json
 import os
@@ -17,9 +18,12 @@ from vidtrack.config.load import load
 from vidtrack.errors import StoppedEarly
 from vidtrack.output.intervals.book import totals
 from vidtrack.output.intervals.day import day_folders, read_day
+from vidtrack.output.plot import TrajectoryPlot
+from vidtrack.output.summary import Summary
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Limits, Retention, parts_of
 from vidtrack.run.live.counting import counting_of
+from vidtrack.run.live.part import Part
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.sinks import Subject, line_counter
 
@@ -268,3 +272,19 @@ def test_recordings_leave_more_room_than_tracks(tmp_path, monkeypatch):
     monkeypatch.undo()
     with pytest.raises(StoppedEarly, match="No such file"):
         reserve.check_tracks(tmp_path / "gone")
+
+
+def test_finished_parts_leave_nothing_in_memory(tmp_path, clock):
+    """Not even until Python looks for cycles, which may be after hundreds of parts with a picture each."""
+    gc.collect()
+    gc.disable()
+    try:
+        station = Station(tmp_path, clock)
+        station.drive(0, 45)
+        station.parts.finish()
+        del station
+        left = [one for one in gc.get_objects() if isinstance(one, (Part, TrajectoryPlot, Summary))]
+    finally:
+        gc.enable()
+    assert len(parts_of(tmp_path)) == 5
+    assert left == []

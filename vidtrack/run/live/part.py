@@ -19,21 +19,40 @@ from vidtrack.output.summary import Summary
 from vidtrack.output.tables import ROAD, VIDEO, Column
 from vidtrack.run.live.track_files import TRACK_FILES, write_lines
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.lines import Crossing
+from vidtrack.traffic.lines import Crossing, Line
+
+
+class Counted:
+    """Counts of a part by line and direction."""
+
+    def __init__(self, lines: Iterable[Line]) -> None:
+        self._counts = Counter({(line.name, way): 0 for line in lines for way in line.directions})
+
+    def add(self, crossings: Iterable[Crossing]) -> None:
+        """Count crossings."""
+        self._counts.update((crossing.line, crossing.direction) for crossing in crossings)
+
+    def totals(self) -> dict[str, dict[str, int]]:
+        """The counts; 0 for a line that nobody crossed."""
+        found: dict[str, dict[str, int]] = {}
+        for (line, way), count in self._counts.items():
+            found.setdefault(line, {})[way] = count
+        return found
 
 
 class Part:
     """One part: with output.level = all the same files as those of a run over a video.
 
+    Nothing that it owns refers to it: in a cycle, its pictures would stay until Python looks for cycles, which may be
+    after hundreds of parts.
     Raises StoppedEarly on a write error.
     """
 
     def __init__(self, folder: Path, subject: Subject, decisions: bool) -> None:
         self.subject = subject
-        self._ways = [(line.name, way) for line in subject.lines for way in line.directions]
-        self._counted: Counter[tuple[str, str]] = Counter()
+        self._counted = Counted(subject.lines)
         with ExitStack() as stack:  # on a full disk, files already open are closed
-            self._summary = subject.summary(folder, self._totals)
+            self._summary = subject.summary(folder, self._counted.totals)
             self._counts = self._decisions = self._site = None
             if subject.site is not None:
                 self._site = SiteCopy(folder, subject.site)
@@ -50,7 +69,7 @@ class Part:
         """Write and synchronise rows of counts.csv."""
         assert self._counts is not None
         write_lines(self._counts, crossing_lines(crossings))
-        self._counted.update((crossing.line, crossing.direction) for crossing in crossings)
+        self._counted.add(crossings)
 
     def write(self, steps: Sequence[Step], chosen: Sequence[Step], rows: pa.Table | None) -> None:
         """Write and synchronise the chosen ones of these steps, and the rows of their confirmed tracks."""
@@ -79,13 +98,6 @@ class Part:
             if self._counts is not None:
                 stack.callback(sort_rows, self._counts.path, columns=1, header=True)
             stack.push(self._files)
-
-    def _totals(self) -> dict[str, dict[str, int]]:
-        """The part's counts by line and direction."""
-        found: dict[str, dict[str, int]] = {}
-        for line, way in self._ways:
-            found.setdefault(line, {})[way] = self._counted[line, way]
-        return found
 
 
 def columns_of(subject: Subject) -> Sequence[Column]:
