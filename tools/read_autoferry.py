@@ -2,7 +2,7 @@
 
     python tools/read_autoferry.py autoferry/scenario16 -o DIR
 
-The radar (sensor 2) of a slow boat sees two boats with GNSS receivers that manoeuvre, and other things; 48 to 91 scans,
+The radar (sensor 2) of a slow boat sees two boats with GNSS receivers that manoeuvre, and other things; 48 to 83 scans,
 1.7 s apart (Helgesen, Vasstein, Brekke, Stahl, "Heterogeneous multi-sensor tracking for an autonomous surface vehicle
 in a littoral environment", Ocean Engineering 252, 2022; CC0). In the files positions are north and east, of plots from
 the own boat; here x is east and y north from a point at rest, in metres, and times are seconds from the first scan.

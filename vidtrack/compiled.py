@@ -27,7 +27,7 @@ if sys.platform != "win32":
 log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parent
-_TURN_S, _LOOK_S = 60.0, 0.02  # no kernel takes longer to compile: another process that does hangs
+_TURN_S, _LOOK_S = 60.0, 0.02  # a process that takes longer for a kernel is taken to hang
 
 
 def _writable(folder: Path) -> bool:
@@ -111,7 +111,7 @@ class KernelCache(FunctionCache):
             self._lock.parent.mkdir(parents=True, exist_ok=True)
             self._turn = os.open(self._lock, os.O_RDWR | os.O_CREAT)
             until_s = monotonic() + _TURN_S
-            while monotonic() < until_s:
+            while monotonic() < until_s and not _signals.waiting:
                 try:
                     fcntl.flock(self._turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     return
@@ -121,9 +121,7 @@ class KernelCache(FunctionCache):
     def _end_turn(self) -> None:
         """Let others have the function; who waits for it finds the kernel."""
         if self._turn is not None:
-            with suppress(OSError):
-                self._lock.unlink()
-            os.close(self._turn)
+            os.close(self._turn)  # the file stays: others may wait for it
             self._turn = None
 
 
@@ -168,6 +166,11 @@ class SignalsWait(Listener):
         self._handlers: dict[int, Any] = {}  # handlers outside the compiler; empty: not compiling
         self._caught: list[int] = []
 
+    @property
+    def waiting(self) -> bool:
+        """Whether a signal has come meanwhile."""
+        return bool(self._caught)
+
     def on_start(self, event: Event) -> None:
         """The main thread enters the compiler, possibly nested."""
         if not self._handlers and current_thread() is main_thread():
@@ -197,6 +200,7 @@ def compiling() -> bool:
     return not free
 
 
-register("numba:compiler_lock", SignalsWait())
+_signals = SignalsWait()
+register("numba:compiler_lock", _signals)
 if IN_TREE:
     forget_stale(PACKAGE)

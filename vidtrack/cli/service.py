@@ -76,8 +76,9 @@ def install(options: InstallOptions) -> int:
         click.echo(unit.text(), nl=False)
         return 0
     _check_user(unit)
-    if Path(sys.executable).is_relative_to("/tmp"):
-        raise ConfigError(f"{sys.executable} lies in /tmp, of which a service has one of its own; install it elsewhere")
+    for folder in ("/tmp", "/var/tmp"):
+        if Path(sys.executable).is_relative_to(folder):
+            raise ConfigError(f"{sys.executable} lies in {folder}; a service has one of its own: install it elsewhere")
     try:
         Path(unit.path).write_text(unit.text(), encoding="utf-8")
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +17,8 @@ from vidtrack.output.sink import Step
 
 _MOST_PLOTS = 200_000
 """Plots on the page; of more, every second, third, ... is left in, so that a browser can draw them."""
+_MOST_SCANS = 20_000
+"""Scans on the page: the last ones of a feed that does not end."""
 
 Map = dict[str, Any]
 
@@ -34,8 +37,8 @@ class RadarPage:
         self._path = path
         self._radars = radars
         self._clutter = clutter
-        self._plots: list[np.ndarray] = []
-        self._scans: list[dict[str, Any]] = []
+        self._plots: deque[np.ndarray] = deque(maxlen=_MOST_SCANS)
+        self._scans: deque[dict[str, Any]] = deque(maxlen=_MOST_SCANS)
 
     def step(self, step: Step) -> None:
         """Store the plots and tracks of one scan, in whole metres."""
@@ -47,9 +50,11 @@ class RadarPage:
 
     def close(self) -> None:
         """Write the page."""
-        stride = max(1, -(-sum(map(len, self._plots)) // _MOST_PLOTS))
+        ends = np.cumsum([0, *map(len, self._plots)])
+        stride = max(1, -(-int(ends[-1]) // _MOST_PLOTS))
         scans = [
-            scan | {"plots": plots[::stride].tolist()} for scan, plots in zip(self._scans, self._plots, strict=True)
+            scan | {"plots": plots[-first % stride :: stride].tolist()}
+            for scan, plots, first in zip(self._scans, self._plots, ends[:-1].tolist(), strict=True)
         ]
         data = {"radars": [[float(x), float(y)] for x, y in self._radars], "scans": scans}
         data["clutter"] = None if self._clutter is None else self._clutter()

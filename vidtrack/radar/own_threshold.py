@@ -35,6 +35,10 @@ def controller(settings: RadarSettings, found: Measurements, gate: float) -> Thr
         raise ConfigError(f"radar.snr_db needs the size of a resolution cell; give {names}")
     volume = math.prod(side if k == 0 else math.radians(side) for k, side in enumerate(sides) if side is not None)
     weakest = float(RAYLEIGH.survival(found.amplitude.min()))
+    if weakest <= 0:
+        raise ConfigError(
+            f"radar.snr_db needs amplitudes in deviations of the noise; the least is {found.amplitude.min():.4g}"
+        )
     origin = None if found.sensor.angles else settings.position[: found.dim]
     p_fa_max = weakest if settings.pfa_max is None else settings.pfa_max
     return ThresholdController(linear(settings.snr_db), volume, gate, p_fa_max, origin=origin)

@@ -245,6 +245,11 @@ class Site(Group):
         return self
 
     @property
+    def tracked_zones(self) -> dict[str, Zone]:
+        """The zones in which vehicles are tracked."""
+        return {name: zone for name, zone in self.zones.items() if zone.tracked}
+
+    @property
     def masked(self) -> tuple[tuple[Point, ...], ...]:
         """The zones in which nothing is tracked."""
         return tuple(zone.polygon for zone in self.zones.values() if not zone.tracked)

@@ -265,3 +265,11 @@ def test_a_gate_that_is_drawn_during_the_day_was_not_watched_before(tmp_path):
     assert covered == {"gate": [1, 1, 0.667, 0.667], "ramp": [0, 0.667, 1, 1]}
     counts = [row["count"] for row in quarters if (row["gate"], row["direction"]) == ("ramp", "up")]
     assert counts == [None, 1, 0, 0]
+
+
+def test_a_gate_that_was_turned_was_not_watched_in_its_new_directions():
+    turned = Plan({"gate": ("up", "down")}, {}, BERLIN).after(Plan({"gate": ("left", "right")}, {}, BERLIN), NOON)
+    assert turned.spans == {"gate": ((None, NOON), (NOON, None))}
+    day = np.array([[NOON - 60.0, NOON + 60.0]])
+    assert turned.after(turned, NOON + 9).spans == turned.spans
+    assert turned.watched("gate", day).tolist() == [[NOON - 60, NOON], [NOON, NOON + 60]]

@@ -72,6 +72,7 @@ def test_every_crossing_and_zone_entry_is_told_once_to_both(camera, tmp_path):
         def story(seen):
             yield lambda _: len(of_kind(server.taken(), "crossing")) >= 2
             yield lambda _: listener.texts("vidtrack/yard-1/entry")
+            yield lambda _: run.board.now().reading["events"]["mqtt"]["sent"]
 
         receivers = Receivers(broker.url(), server.url("/geheim"), "sesame", "yard-1")
         with LiveRun(camera.url(), chosen, folder, LiveExtras(receivers=receivers)) as run:

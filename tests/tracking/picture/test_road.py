@@ -154,6 +154,12 @@ def test_dense_traffic_is_no_swarm():
     assert road.swarm.size == 0.0
 
 
+def test_a_picture_that_changes_all_at_once_is_no_swarm():
+    road = Road(WIDTH, HEIGHT)
+    fall(road.learn, 4000, 40.0, seconds=0.1)
+    assert road.swarm.size == 0.0
+
+
 def test_flakes_that_drift_are_not_confirmed_and_a_vehicle_among_them_is():
     from blob_scene import confirmed_ids, default_tracker, play
 

@@ -69,6 +69,9 @@ def test_what_lies_above_the_horizon_counts_nothing_and_the_rest_goes_on(run):
     tally = Recount([run]).of(place, calibrated(place))
     assert [fault.key for fault in tally.faults] == [("gates", "sky"), ("zones", "clouds")]
     assert all("above the horizon" in fault.words for fault in tally.faults)
+    sky["zones"]["clouds"]["tracked"] = False
+    masked = site(SITE | sky, calibration=tilted, gates=low)
+    assert not Recount([run]).of(masked, calibrated(masked)).faults
     alone = site(SITE, calibration=tilted, gates=low)
     assert tally.counts == tallied(run, alone)[0]
     assert sum(tally.counts["west"].values()) > 0

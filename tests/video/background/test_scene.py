@@ -23,7 +23,7 @@ def drawn(shape, seed):
     return Picture(luma, cb, cr), scene, covered, hit
 
 
-@pytest.mark.parametrize("shape", [(6, 8), (7, 9), (33, 70)])
+@pytest.mark.parametrize("shape", [(6, 8), (7, 9), (33, 70), (40, 71)])
 def test_free_pixels_are_averaged_and_covered_ones_are_counted(shape):
     picture, scene, covered, hit = drawn(shape, seed=sum(shape))
     before = Scene(*(plane.copy() for plane in scene))

@@ -58,11 +58,12 @@ class Plan:
     def after(self, before: Plan, now_s: float) -> Plan:
         """This plan from now on [Unix s], with what is known of the time before it."""
         spans = dict(before.spans)
-        for name in before.gates.keys() - self.gates.keys():
+        same = {name for name, ways in self.gates.items() if before.gates.get(name) == ways}
+        for name in before.gates.keys() - same:
             *earlier, (begin_s, _) = before.spans.get(name, ((None, None),))
             spans[name] = (*earlier, (begin_s, now_s))
-        for name in self.gates.keys() - before.gates.keys():
-            spans[name] = (*before.spans.get(name, ()), (now_s, None))
+        for name in self.gates.keys() - same:
+            spans[name] = (*spans.get(name, ()), (now_s, None))
         return replace(self, spans=spans)
 
     def watched(self, gate: str, watched: Floats) -> Floats:

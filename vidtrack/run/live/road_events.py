@@ -36,7 +36,7 @@ class RoadEvents:
         height, width = subject.shape
         site = parse_site(subject.site, Path(SITE_COPY)).scaled(width, height)
         self._ground = None if subject.road is None else subject.road.ground
-        self._zones = ZoneEntries(dict(zip(site.zones, outlines_of(site, self._ground), strict=True)))
+        self._zones = ZoneEntries(dict(zip(site.tracked_zones, outlines_of(site, self._ground), strict=True)))
         self._gap_s = gap_s
         self._meeting = Meeting()
         self._unseen: list[pa.Table] = []

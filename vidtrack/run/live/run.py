@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -42,6 +43,8 @@ from vidtrack.video.live.source import LiveSource
 from vidtrack.video.live.stats import LiveStats
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.span import Span
+
+log = logging.getLogger(__name__)
 
 _HOUR_S = 3600.0
 _END_S = 1.3  # from `stop` to the end of the run
@@ -271,10 +274,16 @@ class LiveRun:
     def _use(self, site: UsedSite, place: Place) -> None:
         """Track at another site: with other masks from the next part of the recording on, which has the site's text."""
         was = () if self._at is None else self._at.masked
-        if site.masked == was or self._recorder.may_change(place):
-            mask = kept(self._settings, site.masked, self._source.width, self._source.height)
-            self._checkpoint.detector.keep(mask)
+        if site.masked == was:
             self._at = site
+        elif self._recorder.may_change(place):
+            self._at = site
+            try:
+                mask = kept(self._settings, site.masked, self._source.width, self._source.height)
+            except ConfigError as error:
+                log.warning("%s; masks stay as they were", error)
+                return
+            self._checkpoint.detector.keep(mask)
 
     def _reading(self) -> Mapping[str, Any]:
         """The run's counters, for the summary and the page."""

@@ -13,6 +13,7 @@ from vidtrack.tracks import Tracks
 _SWARM_PER_S = 30.0  # births in the whole picture, more than traffic has anywhere
 _FEW_PER_S = 12.0  # with a swarm, larger ones that may be traffic
 _FORGET_S = 10.0
+_AT_ONCE = 30  # births of one scan that count: the picture may change all at once
 _LEAST_PX, _STEPS, _BINS = 1.0, 4, 48  # sizes from 1 px to 4096 px, four bins to a factor of two
 
 
@@ -43,4 +44,5 @@ class Swarm:
         new = tracks.age_s <= 0
         if np.count_nonzero(new):
             bins = _STEPS * np.log2(np.maximum(longer(tracks.box[new]), _LEAST_PX) / _LEAST_PX)
-            np.add.at(self.births, np.minimum(bins.astype(np.int64), _BINS - 1), 1.0)
+            share = min(1.0, _AT_ONCE / len(bins))
+            np.add.at(self.births, np.minimum(bins.astype(np.int64), _BINS - 1), share)

@@ -245,7 +245,7 @@ class _Figures:
         )
 
     def _stays(self) -> pa.Table:
-        stays, names = self.staying.in_zones(self.vehicle), list(self.site.zones)
+        stays, names = self.staying.in_zones(self.vehicle), list(self.site.tracked_zones)
         return table(
             {
                 "zone": ("", [names[zone] for zone in stays.zone.tolist()]),

@@ -84,8 +84,8 @@ class Recount:
                 for name, names, way in zip(all_gates.names, all_gates.directions, ways.tolist(), strict=True)
             }
             moved = [(*legs, n) for legs, n in sorted(movements(found.trips, found.passed, all_gates).items())]
-        zones = {name: self._stays[zone.polygon] for name, zone in site.zones.items() if zone.polygon in self._stays}
-        stays = {name: len(staying.in_zones(vehicle).zone) for name, staying in zones.items()}
+        zones = {name: self._stays.get(zone.polygon) for name, zone in site.tracked_zones.items()}
+        stays = {name: len(staying.in_zones(vehicle).zone) for name, staying in zones.items() if staying is not None}
         return Tally(counts, stays, moved, trips, faults)
 
     def _passings(self, gates: dict[str, Gate]) -> Passed:
@@ -159,7 +159,7 @@ class Recount:
 
     def _look_into_zones(self, site: Site, ground: Ground | None) -> list[Fault]:
         before, self._stays, faults = self._stays, {}, []
-        for name, zone in site.zones.items():
+        for name, zone in site.tracked_zones.items():
             if zone.polygon not in before:
                 try:
                     outline = outlines_of(site.model_copy(update={"zones": {name: zone}}), ground)

@@ -117,9 +117,9 @@ class Staying:
 
 
 def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
-    """(V, 2) outlines of the zones where vehicles are. Raises ConfigError for one that is not on the road."""
+    """(V, 2) outlines of the zones where vehicles are tracked. Raises ConfigError for one that is not on the road."""
     outlines = []
-    for name, zone in site.zones.items():
+    for name, zone in site.tracked_zones.items():
         outline = np.array(zone.polygon)
         if ground is not None:
             if ground.lens is not None:

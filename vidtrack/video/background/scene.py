@@ -100,7 +100,7 @@ def learn(
         else:
             _count(picture.luma[y], scene, y, taken, weight, dt)
         if len(picture.cb) > 0 and y % 2 == 0:
-            taken[-1] |= taken[w - 1]
+            taken[-1] = taken[w - 1]  # beyond the last pixel of an odd row
             for x in range(len(taken) // 2):  # four pixels share one of chroma; the upper two decide
                 share = weight if taken[2 * x] | taken[2 * x + 1] == 0 else _NONE
                 scene.cb[y // 2, x] += share * (np.float32(picture.cb[y // 2, x]) - scene.cb[y // 2, x])
