@@ -109,7 +109,7 @@ class TrackerSettings(Group):
     idle_travel: float = Field(1.2, ge=0)
     """object sizes; a track that was this far from its start has travelled, and may then stand without limit"""
     restless: bool = True
-    """where tracks recently failed, new ones must travel three times as far; what is as small as snow is not confirmed"""
+    """where tracks recently failed, new ones must travel three times as far; none as small as snow is confirmed"""
     blob_overlap: float = Field(0.3, gt=0, le=1)
     """intersection over union with a blob outside the gate that keeps a track on it; 1: never"""
     merged_blobs: bool = True
