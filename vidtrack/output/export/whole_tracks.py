@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.footprint import uncut
-from vidtrack.traffic.measures.rows import EDGE_COLUMNS
+from vidtrack.traffic.measures.rows import EDGE_COLUMNS, edges, numbers
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.naming import Named, whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles
@@ -30,11 +28,9 @@ class WholeTracks:
         """Look at rows; those of runs of earlier versions have no edges, and tell nothing."""
         if not set(EDGE_COLUMNS) <= set(table.column_names):
             return
-        edge = np.column_stack([_numbers(table, name) for name in EDGE_COLUMNS])
-        xy = np.column_stack([_numbers(table, "x_m"), _numbers(table, "y_m")])
-        with np.errstate(invalid="ignore"):
-            edge = uncut(edge, self._size)
-        self._vehicles.add(table["track_id"].to_numpy(), table["time_s"].to_numpy(), xy, edge)
+        column = {name: numbers(table, name) for name in ("time_s", "x_m", "y_m", *EDGE_COLUMNS)}
+        xy = np.column_stack([column["x_m"], column["y_m"]])
+        self._vehicles.add(table["track_id"].to_numpy(), column["time_s"], xy, edges(column, self._size))
 
     def named(self, track: Ints, length: Floats) -> Named:
         """Of tracks (T,), with the mean lengths of their rows (T,) m."""
@@ -42,7 +38,3 @@ class WholeTracks:
         nothing = np.empty(0, np.int64)
         found = self._vehicles.fitted(np.arange(tracks), nothing, np.empty(0))
         return whole_tracks(None if found is None else found.classes.of(track), length, self._classes)
-
-
-def _numbers(table: pa.Table, name: str) -> Floats:
-    return np.asarray(pc.cast(table[name], pa.float64()).to_numpy())

@@ -32,9 +32,9 @@ class Swarm:
     @property
     def size(self) -> float:
         """Longer side [px] up to which objects are of the swarm; larger ones begin seldom. Zero without a swarm."""
-        rate = self.births[::-1].cumsum()[::-1] / _FORGET_S
-        if rate[0] < _SWARM_PER_S:
+        if self.births.sum() < _SWARM_PER_S * _FORGET_S:
             return 0.0
+        rate = self.births[::-1].cumsum()[::-1] / _FORGET_S
         return float(_LEAST_PX * 2 ** (np.count_nonzero(rate > _FEW_PER_S) / _STEPS))
 
     def learn(self, tracks: Tracks) -> None:

@@ -130,7 +130,7 @@ class Reader:
                 yield self._rows(table, recording, ground, road)
 
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
-        column = {name: _numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
+        column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
         track = self._numbered(table, recording.session)
         seen, merged = _states(table)
         t = column["time_s"] + recording.offset_s
@@ -142,7 +142,7 @@ class Reader:
             return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
             column |= _stand(road, track, column)
-        edge = (_edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
+        edge = (edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         return _on_road(ground, column, track, t, seen, merged, edge)
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
@@ -154,7 +154,7 @@ class Reader:
 
 def rows_of(table: pa.Table, ground: Ground) -> Rows:
     """The rows of a table with ROAD_COLUMNS; the numbers of tracks are their ids, and no edges are known."""
-    column = {name: _numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
+    column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
     track, edge = table["track_id"].to_numpy(), np.full((len(table), 4), np.nan)
     return _on_road(ground, column, track, column["time_s"], *_states(table), edge)
 
@@ -190,11 +190,11 @@ def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
-    edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= names else ()
+    of_edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= names else ()
     if set(_ROAD) <= names and _of_this_site(folder, ground):
-        return *ROAD_COLUMNS, *edges
+        return *ROAD_COLUMNS, *of_edges
     _demand(folder, names, _STATE, "has no metres of this site, and they cannot be computed")
-    return *_ALWAYS, *_STATE, *edges
+    return *_ALWAYS, *_STATE, *of_edges
 
 
 def _demand(folder: Path, names: set[str], needed: tuple[str, ...], what: str) -> None:
@@ -206,8 +206,8 @@ def _demand(folder: Path, names: set[str], needed: tuple[str, ...], what: str) -
 def _of_this_site(folder: Path, ground: Ground) -> bool:
     """Whether the metres of a run are where the site has them: at the lower half of the boxes."""
     for table in blocks(folder, ("x_m", "y_m", *_BOX)):
-        left, top, width, height = (_numbers(table, name) for name in _BOX)
-        x, y = ground.pixels(np.column_stack([_numbers(table, "x_m"), _numbers(table, "y_m")])).T
+        left, top, width, height = (numbers(table, name) for name in _BOX)
+        x, y = ground.pixels(np.column_stack([numbers(table, "x_m"), numbers(table, "y_m")])).T
         known = np.isfinite(x)
         if known.any():
             held = (x > left) & (x < left + width) & (y > top + height / 4) & (y < top + height)
@@ -215,7 +215,7 @@ def _of_this_site(folder: Path, ground: Ground) -> bool:
     return True
 
 
-def _edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
+def edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
     """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
     if EDGE_COLUMNS[0] not in column:
         return np.full((len(column["time_s"]), 4), np.nan)
@@ -325,7 +325,7 @@ def _columns(folder: Path) -> set[str]:
         raise FormatError(f"{path} is damaged: {error}") from None
 
 
-def _numbers(table: pa.Table, name: str) -> Floats:
+def numbers(table: pa.Table, name: str) -> Floats:
     """(N,) a column; NaN where it is empty."""
     return np.concatenate(
         [np.asarray(pc.cast(chunk, pa.float64()).to_numpy(zero_copy_only=False)) for chunk in table[name].chunks]
