@@ -3,6 +3,7 @@
 import os
 import time
 from datetime import datetime
+from pathlib import Path
 
 import pytest
 
@@ -148,6 +149,21 @@ def test_counts_go_when_they_are_told_to(tmp_path):
     retention.results.append(tmp_path)
     retention.prune()
     assert left(tmp_path) == [1, 2, 3]
+
+
+def test_folders_that_are_deleted_while_they_are_measured_count_as_nothing(tmp_path, monkeypatch):
+    for name in ("kept", "gone"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "file").write_bytes(bytes(100))
+    scan = os.scandir
+
+    def scandir(path):
+        if Path(path).name == "gone":
+            raise FileNotFoundError(path)
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    assert size_of(tmp_path) == 100
 
 
 def test_a_size_limit_counts_what_it_may_delete(tmp_path):

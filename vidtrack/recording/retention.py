@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import re
 import shutil
 import time
@@ -49,8 +50,8 @@ def parts_of(root: Path) -> list[Path]:
 
 
 def size_of(folder: Path) -> int:
-    """Bytes of all files below a folder; files deleted meanwhile count as 0."""
-    return sum(_bytes_of(path) for path in folder.rglob("*"))
+    """Bytes of all files below a folder; files and folders deleted meanwhile count as 0."""
+    return sum(_bytes_of(Path(root, name)) for root, _, names in os.walk(folder) for name in names)
 
 
 @dataclass(frozen=True, slots=True)
