@@ -27,8 +27,8 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.fixture(autouse=True)
 def own_log():
-    """What a command called in this process sets about the log ends with the test."""
-    logger = logging.getLogger("vidtrack")
-    before = logger.handlers, logger.level
+    """What a command called in this process, or in a fixture of the module, sets about the log ends with the test."""
     yield
-    logger.handlers, logger.level = before
+    logger = logging.getLogger("vidtrack")
+    logger.handlers = []
+    logger.setLevel(logging.NOTSET)
