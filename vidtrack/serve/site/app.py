@@ -31,6 +31,7 @@ log = logging.getLogger(__name__)
 _STATIC = Path(__file__).with_name("static")
 _COLOURS = Path(__file__).parents[1] / "static" / "colours.css"
 _LARGEST = 4_000_000  # bytes of a request
+_DRAINED = 16 * _LARGEST  # bytes that are read before a request is refused for its size
 _GONE_S = 90.0  # a page that did not ask for so long is gone; browsers let hidden ones ask once a minute
 _MOST_EDITORS = 100
 
@@ -183,11 +184,15 @@ def _picture(picture: Picture | None) -> Response:
 
 async def _asked(request: Request, **kinds: type | tuple[type, ...]) -> dict[str, Any]:
     """The fields of a request's JSON object. Raises HTTPException where it is none, or too large."""
-    content = bytearray()
+    content, size = bytearray(), 0
     async for block in request.stream():
-        content += block
-        if len(content) > _LARGEST:
-            raise HTTPException(413, f"a drawing of more than {_LARGEST} bytes")
+        size += len(block)
+        if size <= _LARGEST:
+            content += block
+        elif size > _DRAINED:
+            break
+    if size > _LARGEST:  # said after the rest was read: a client that still writes reads no answer
+        raise HTTPException(413, f"a drawing of more than {_LARGEST} bytes")
     try:
         asked = json.loads(content)
         json.dumps(asked, ensure_ascii=False).encode()  # half a character is no text
