@@ -55,6 +55,17 @@ def test_pieces_that_weak_foreground_links_are_one_unless_each_is_a_vehicle(typi
     assert grouped([[10, 10, 35, 18], [50, 10, 35, 18]], typical=typical, link=[0, 0]) == [0, 1]
 
 
+@pytest.mark.parametrize("typical", [CAR, None])
+def test_a_piece_between_two_vehicles_joins_the_nearer_one_and_never_both(typical):
+    two, piece = [[10, 10, 35, 18], [30, 34, 35, 18]], [32, 29, 4, 3]
+    assert grouped([*two, piece], [[8, 8, 60, 46]], typical, gap=0.5) == [0, 1, 0]
+    assert grouped([piece, *two], [[8, 8, 60, 46]], typical, gap=0.5) == [0, 0, 1]
+
+
+def test_three_pieces_of_one_vehicle_are_one_though_two_of_them_are_large():
+    assert grouped([[10, 10, 16, 20], [27, 12, 6, 16], [34, 10, 16, 20]], [[9, 9, 42, 22]]) == [0, 0, 0]
+
+
 def test_a_region_of_two_predicted_vehicles_is_a_piece_of_neither():
     assert grouped([[10, 10, 60, 12], [32, 23, 6, 4]], [[9, 8, 30, 20], [40, 8, 32, 20]], None, gap=0.3) == [0, 1]
 

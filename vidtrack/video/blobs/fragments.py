@@ -7,7 +7,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import CORNERS, OBJECTS, Runs, components, connect, find_runs, join
+from vidtrack.video.runs import CORNERS, OBJECTS, Runs, components, connect, find_runs
 
 _SPREAD = 1.2  # predicted boxes are taken this much larger about their centres before fragments are sought in them
 _LIKE = 0.3  # share of the typical area that makes a piece a vehicle
@@ -71,26 +71,53 @@ def together(
     Two regions are pieces of one vehicle if they are close together inside one predicted box; or if no box predicts
     them, one is small and near the other, and both together are no larger than a vehicle; or if they are linked and
     together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that are
-    each like a vehicle are never pieces.
+    each like a vehicle are never pieces. The nearest pieces are joined first; a third region between two vehicles joins
+    the nearer one, not both.
     """
-    parent = np.arange(len(box))
     vehicle = np.empty(len(box), np.int64)
     for i in range(len(box)):
         vehicle[i] = _only_vehicle(box[i], predicted, overlap)
+    one, other, apart = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]  # pieces of one vehicle
     for i in range(len(box)):
         for j in range(i):
             if _both_vehicles(i, j, box, area, typical):
                 continue
-            if vehicle[i] >= 0 and vehicle[i] == vehicle[j]:
-                longer = max(predicted[vehicle[i], 2], predicted[vehicle[i], 3])
-                if _gap(box[i], box[j]) <= gap * longer:
-                    join(parent, i, j)
-            if pieces and _whole(box[i], box[j], typical[i]):
-                join(parent, i, j)
+            distance = _gap(box[i], box[j])
+            same = vehicle[i] >= 0 and vehicle[i] == vehicle[j]
             two = vehicle[i] >= 0 and vehicle[j] >= 0 and vehicle[i] != vehicle[j]
-            if pieces and link[i] == link[j] and not two and _fit(box[i], box[j], typical[i]):
-                join(parent, i, j)
-    return components(parent)
+            if (
+                (same and distance <= gap * max(predicted[vehicle[i], 2], predicted[vehicle[i], 3]))
+                or (pieces and _whole(box[i], box[j], typical[i]))
+                or (pieces and link[i] == link[j] and not two and _fit(box[i], box[j], typical[i]))
+            ):
+                one.append(i)
+                other.append(j)
+                apart.append(distance)
+    group = np.arange(len(box))
+    while len(apart):
+        nearest = 0
+        for k in range(1, len(apart)):
+            nearest = k if apart[k] < apart[nearest] else nearest
+        apart.pop(nearest)
+        a, b = group[one.pop(nearest)], group[other.pop(nearest)]
+        if a != b and _one_vehicle(group, a, b, box, area, typical):
+            for i in range(len(box)):
+                group[i] = min(a, b) if group[i] == a or group[i] == b else group[i]
+    return components(group)
+
+
+@kernel
+def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical: Floats) -> bool:
+    """Whether the regions of groups a and b can be one vehicle: no two of them are vehicles, or all fit into one."""
+    union = np.zeros(4)
+    for i in range(len(box)):
+        if group[i] == a or group[i] == b:
+            union = box[i] if union[2] == 0 else _around(union, box[i])
+    for i in range(len(box)):
+        for j in range(len(box)):
+            if group[i] == a and group[j] == b and _both_vehicles(i, j, box, area, typical):
+                return not np.isnan(typical[i, 0]) and union[2] * union[3] <= _WHOLE * typical[i, 0] * typical[i, 1]
+    return True
 
 
 @kernel
@@ -145,6 +172,16 @@ def _share_inside(box: Floats, other: Floats) -> float:
         low = other[axis] - (size - other[axis + 2]) / 2
         common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
     return common / (box[2] * box[3])
+
+
+@kernel
+def _around(a: Floats, b: Floats) -> Floats:
+    """The bounding box (4,) of both."""
+    both = np.empty(4)
+    for axis in range(2):
+        both[axis] = min(a[axis], b[axis])
+        both[axis + 2] = max(a[axis] + a[axis + 2], b[axis] + b[axis + 2]) - both[axis]
+    return both
 
 
 @kernel(inline="always")
