@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import get_args
 
 import cv2
@@ -39,6 +40,8 @@ class Street:
             y[top : top + CAR[1], max(left, 0) : max(left + CAR[0], 0)] = grey
         y = np.clip(y + self.rng.normal(0, 2, y.shape), 0, 255).astype(np.uint8)
         chroma = np.full(self.half, 128, np.uint8) if self.colour else None
+        if chroma is not None:
+            chroma[:2] = 140  # the verge: a picture with no colour anywhere is that of a camera without
         return Frame(round(time_s * 25), time_s, y, chroma, chroma, full_range=True)
 
 
@@ -196,8 +199,12 @@ def test_the_shadow_of_a_person_is_not_foreground_though_it_is_all_edge():
     assert play(untested, street, 0.3, start=2, region=whole).mask.any()
 
 
-def test_a_dark_patterned_car_shows_whole_though_there_is_no_colour_to_tell_it_from_shadow():
+@pytest.mark.parametrize("sent", ["luminance alone", "grey in colour"])
+def test_a_dark_patterned_car_shows_whole_though_no_colour_tells_it_from_shadow(sent):
     street, detector = Street(colour=False), disturbance()
+    if sent == "grey in colour":
+        grey, luminance = np.full(street.half, 128, np.uint8), street.frame
+        street.frame = lambda *args, **scene: replace(luminance(*args, **scene), u=grey, v=grey)
     play(detector, street, 2)
     stripes = np.where(np.arange(CAR[0]) % 8 < 4, 60, 90)
     foreground = play(detector, street, 0.3, start=2, region=(slice(50, 74), slice(60, 100), stripes))

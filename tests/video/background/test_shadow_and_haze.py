@@ -124,6 +124,7 @@ def test_the_shadow_on_a_smooth_road_in_clear_light_is_no_foreground():
     assert contrast(marked(100.0)) == 0.5
     detector = create(DetectorSettings(), None, None)
     colour = np.full((60, 80), 128, np.uint8)
+    colour[:2] = 140
     for k in range(30):
         light = marked(100.0)
         light[:6, :40] = 50

@@ -17,7 +17,7 @@ from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, haziness, strong, veil
 from vidtrack.video.background.exposure import follow_gain
 from vidtrack.video.background.majority import majority
-from vidtrack.video.background.picture import Picture, View, smooth
+from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import Sunlight, mark_shadow, reclaim
@@ -65,6 +65,7 @@ class Disturbance:
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
         self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
         self._sunlight = Sunlight()
+        self._coloured = True
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
@@ -179,6 +180,7 @@ class Disturbance:
         scene = start(picture)
         self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
         self._veil = veil(picture.luma) or 0.0
+        self._coloured = is_coloured(picture)
         return scene
 
     def _is_new_second(self, dt: float) -> bool:
@@ -190,6 +192,7 @@ class Disturbance:
         moves = self._camera.moves
         in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
         self._contrast, self._hazy = contrast(in_view.luma), haziness(in_view.luma)
+        self._coloured = is_coloured(picture)
         haze = veil(picture.luma)
         self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
 
@@ -212,7 +215,8 @@ class Disturbance:
         floor *= self._contrast if s.contrast else np.float32(1)
         disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak, hit)
         if s.shadow:
-            count = mark_shadow(seen, scene, self._black, self._sunlight.tolerance, weak)
+            told = seen if self._coloured else seen.grey()
+            count = mark_shadow(told, scene, self._black, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
         if s.beams and lamps_light(seen.luma, scene.luma, black):

@@ -17,6 +17,8 @@ from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
 
 FULL_SIZE_ROWS = 580  # taller pictures are reduced to at most this many rows
+_FAINT = 2.0  # grey levels of chroma that a codec adds to a picture without colour
+_SPOTS = 0.01  # share of a picture without colour that has some: captions
 _VIDEO_BLACK = 16  # luminance of black where it does not span the full range
 
 
@@ -30,6 +32,12 @@ class Picture(NamedTuple):
     def grey(self) -> Picture:
         """The luminance alone."""
         return Picture(self.luma, self.cb[:0], self.cr[:0])
+
+
+def is_coloured(picture: Picture) -> bool:
+    """Whether the picture has colour: a camera without colour, or at night, sends the same chroma everywhere."""
+    planes = [plane for plane in (picture.cb, picture.cr) if plane.size]
+    return any((np.abs(plane - np.median(plane)) > _FAINT).mean() > _SPOTS for plane in planes)
 
 
 class View:
