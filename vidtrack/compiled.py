@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any
 
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, _CacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import Event, Listener, register
 from numba.misc.appdirs import AppDirs
@@ -48,8 +48,13 @@ Without a cache, as in a read-only container, each run compiles anew.
 
 
 def first_run() -> bool:
-    """Whether no kernel is kept yet."""
-    return CACHE and not any(KERNELS.rglob("*.nbi"))
+    """Whether no kernel of this package is kept yet for this version of Python."""
+    ours = f"*.py{sys.version_info.major}{sys.version_info.minor}*.nbi"
+    if KERNELS == PACKAGE:
+        return CACHE and not any(PACKAGE.rglob(ours))
+    rooms = {str(source.parent) for source in PACKAGE.rglob("*.py")}
+    kept = (KERNELS / _CacheLocator.get_suitable_cache_subpath(f"{room}/_.py") for room in rooms)
+    return CACHE and not any(any(folder.glob(ours)) for folder in kept)
 
 
 def forget_stale(package: Path) -> None:
@@ -90,6 +95,18 @@ class KernelCache(FunctionCache):
             if found is not None:
                 self._end_turn()
         return found
+
+    def ends_turn(self, compile_: Callable[..., Any]) -> Callable[..., Any]:
+        """The compiler of the function, which lets others have it when it fails."""
+
+        def compile_or_end(*of: Any) -> Any:
+            try:
+                return compile_(*of)
+            except BaseException:
+                self._end_turn()
+                raise
+
+        return compile_or_end
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a kernel for later runs; warn if it cannot be saved."""
@@ -142,6 +159,7 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     compiled = njit(nogil=True, **options)(function)
     if CACHE:
         compiled._cache = KernelCache(function)
+        compiled._compiler.compile = compiled._cache.ends_turn(compiled._compiler.compile)
     return compiled
 
 
