@@ -4,7 +4,7 @@
 
 A row is a row of tracks.parquet that a box of the truth matches (IoU from 0.3). NEES is e' P^-1 e, with e from the
 middle of the true box, which ends at the border of the picture; its mean is 2 if P is right. `rms` is of both axes,
-and `stated` what P says of it. Kinds by the true box: its area, and how much of the vehicle is visible. Rows of a vehicle
+and `stated` what P says of it. Kinds by the true box: its area, and how much of it is visible. Rows of a vehicle
 are not independent: the number of vehicles says more than that of the rows.
 """
 

@@ -25,7 +25,7 @@ from vidtrack.output.sink import Step
 from vidtrack.tracking.picture.border import Border
 from vidtrack.tracks import Tracks
 
-_PIXEL = 0.4
+_PIXEL = 0.45
 """Processed pixels; standard deviation of a centroid from picture to picture."""
 _PATCH = 7 * 7 / 4
 """Processed pixels. Ends that fill less than half of the detector's window of 7 x 7 are lost: from none to half of it.
@@ -35,7 +35,7 @@ _SHARE = 0.05
 """Standard deviation of a centroid per standard deviation of the extent."""
 _BESIDE = 0.1
 """Standard deviation, per side of a cut box, of the middle along the border."""
-_EDGE_SHARE, _EDGE_PIXEL = 0.075, 0.75
+_EDGE_SHARE, _EDGE_PIXEL = 0.085, 0.85
 """Standard deviation of the middle between two edges of a shared blob: shares of the vehicle's side, and pixels."""
 
 
