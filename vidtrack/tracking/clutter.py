@@ -45,7 +45,7 @@ class EvenBox(EvenClutter):
     low, high  (2,) corners of the box, on the first two axes of the measurements
     """
 
-    STATE = ("low", "high", "grown")
+    STATE: tuple[str, ...] = ("low", "high", "grown")
 
     def __init__(self, low: Floats, high: Floats) -> None:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
