@@ -17,6 +17,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S
 from vidtrack.output.folder import refuse_overwriting
 from vidtrack.output.sink import Step
+from vidtrack.output.stated import stated
 from vidtrack.recording.source import Recording, is_recording
 from vidtrack.run.live.checkpoint import Checkpoint
 from vidtrack.run.run import Extras, Pipeline
@@ -80,7 +81,7 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
-            yield step.frame, step.shown, None if road is None else _stand(road, step.tracks)
+            yield step.frame, step.shown, None if road is None else _stand(road, stated(step).tracks)
 
 
 def _stand(road: Footprints, tracks: Tracks) -> Stand:
