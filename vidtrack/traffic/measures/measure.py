@@ -95,6 +95,7 @@ class _Figures:
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
         self.scale = None if found is None else found.scale
+        self.straightness = None if found is None else found.straightness
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
         whole = whole_tracks(None if found is None else found.classes, lives.length, site.classes)
@@ -145,6 +146,7 @@ class _Figures:
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
             "scale": None if self.scale is None else self.scale.told(),
+            "straightness": None if self.straightness is None else self.straightness.told(),
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }
