@@ -13,6 +13,7 @@ from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.measures.by_traffic import contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
@@ -94,8 +95,7 @@ class _Figures:
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
-        self.scale = None if found is None else found.scale
-        self.straightness = None if found is None else found.straightness
+        self.against = contradicting(found)
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
         whole = whole_tracks(None if found is None else found.classes, lives.length, site.classes)
@@ -145,8 +145,7 @@ class _Figures:
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
-            "scale": None if self.scale is None else self.scale.told(),
-            "straightness": None if self.straightness is None else self.straightness.told(),
+            **self.against,
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }
