@@ -110,14 +110,14 @@ def doubts(report: dict[str, Any]) -> list[str]:
     if scale and scale["off"]:
         lines.append(
             f"vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
-            f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the calibration: "
-            "speeds are off by as much"
+            f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the "
+            "calibration: speeds are off by as much"
         )
     if straight and straight["converges"]:
         lines.append(
             f"straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
-            f"{abs(straight['converging_deg']):.1f} degrees (standard deviation {straight['converging_sigma_deg']:.1f}, "
-            f"{straight['paths']} paths); if its lanes are parallel, a point of the calibration is wrong: run vidtrack "
+            f"{abs(straight['converging_deg']):.1f} degrees (standard deviation "
+            f"{straight['converging_sigma_deg']:.1f}, {straight['paths']} paths); if its lanes are parallel, a point of the calibration is wrong: run vidtrack "
             "calibrate"
         )
     if straight and straight["bends"]:

@@ -29,8 +29,10 @@ _ALONE_S, _ALONE_M = 1.0, 1.75
 """s, m along the gate; another passing so near is that of the same vehicle."""
 
 
-def at_gates(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats, may: Mask) -> tuple[Passed, Floats]:
-    """The entries of vehicles that began at one and left elsewhere, and the exits where others ended, and how likely (P,).
+def at_gates(
+    gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats, may: Mask
+) -> tuple[Passed, Floats]:
+    """The entries of vehicles that began at one and left elsewhere, the exits where others ended; how likely (P,).
 
     passed  all that is known
     may     (L + 1, L + 1) whether a trip may go from a leg to another

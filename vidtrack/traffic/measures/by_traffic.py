@@ -1,4 +1,4 @@
-"""What the traffic of runs says about a calibration, without a gate: the sizes of vehicles, and their straight paths."""
+"""What the traffic of runs says about a calibration, without a gate: sizes of vehicles, and their straight paths."""
 
 from __future__ import annotations
 

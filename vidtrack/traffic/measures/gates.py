@@ -67,21 +67,14 @@ class Gates:
 
     def with_beside(self, by: float) -> tuple[Floats, Floats, Ints]:
         """`segment`, `begin` and `first` of these gates, and then of as many that lie at both ends of each."""
-        last = self.first[1:] - 1
-        ahead = (self.segment[:, 2:] - self.segment[:, :2]) / np.linalg.norm(
-            self.segment[:, 2:] - self.segment[:, :2], axis=1
-        )[:, None]
-        start, end = self.segment[self.first[:-1], :2], self.segment[last, 2:]
-        ends = np.stack(
-            [
-                np.column_stack([start - by * ahead[self.first[:-1]], start]),
-                np.column_stack([end, end + by * ahead[last]]),
-            ],
-            axis=1,
-        )
+        first, last = self.first[:-1], self.first[1:] - 1
+        step = self.segment[:, 2:] - self.segment[:, :2]
+        more = by * step / np.linalg.norm(step, axis=1)[:, None]
+        start, end = self.segment[first, :2], self.segment[last, 2:]
+        before, after = np.hstack([start - more[first], start]), np.hstack([end, end + more[last]])
         count = len(self.segment)
         return (
-            np.concatenate([self.segment, ends.reshape(-1, 4)]),
+            np.concatenate([self.segment, np.hstack([before, after]).reshape(-1, 4)]),
             np.concatenate([self.begin, np.column_stack([np.full(len(self), -by), self.length]).ravel()]),
             np.concatenate([self.first, count + 2 + 2 * np.arange(len(self))]),
         )

@@ -55,8 +55,11 @@ def journeys(
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins, passed)
-    probability = np.concatenate([confidence(passed), joins.probability[across.track]])
-    reason = [*reasons(passed), *(["joined"] * len(across))]
+    beside = gates.beside(passed.gate, passed.along)
+    sure = np.where(beside, _BESIDE_SURE, 1.0) * confidence(passed)
+    told = ["inferred" if off else reason for off, reason in zip(beside.tolist(), reasons(passed), strict=True)]
+    probability = np.concatenate([sure, joins.probability[across.track]])
+    reason = [*told, *(["joined"] * len(across))]
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
     if metres:
         inferred, sure = beyond(gates, passed, lives, joins, spans)
@@ -75,6 +78,8 @@ def journeys(
     return Journeys(passed, probability, reason, joins, vehicle, trips)
 
 
+_BESIDE_SURE = 0.8
+"""That a vehicle passed a gate which its path missed by a little, if it must have come or gone there or elsewhere"""
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 

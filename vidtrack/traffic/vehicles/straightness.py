@@ -24,7 +24,7 @@ _ROAD, _LEAST_PATHS, _MOST_ROADS = np.radians(6.0), 10, 4
 _WANDER_M = 0.15
 """m; standard deviation of where vehicles drive within their lane, at each end of a path and in its middle"""
 _LANES, _LENS_PX = np.radians(0.25), 3.0
-"""rad; the outer lanes of a road are so parallel. px in the corner of the picture; footprints of boxes are off by as much"""
+"""rad; the outer lanes of a road are so parallel. px in the corner; footprints of boxes are off by as much"""
 _SIGMAS, _ROUNDS, _FAR = 3.0, 6, 2.0
 """Limit of a doubt; rounds of reweighting, and the standard deviations from which on a path loses its weight"""
 
@@ -90,7 +90,10 @@ class Straightness:
 
 
 def paths_of(ground: Ground, xy: Floats, first: Ints, sound: Mask) -> Paths:
-    """The straight ones among P paths: corners xy (K, 2) m, where each begins first (P + 1,), sound (P,) are looked at."""
+    """The straight ones among P paths.
+
+    xy (K, 2) m their corners; first (P + 1,) where each begins; sound (P,) those that are looked at
+    """
     count = np.diff(first)
     piece = np.flatnonzero(sound & (count >= _LEAST_KNOTS))
     number = np.full(len(count), -1)
@@ -185,7 +188,7 @@ def _lens(paths: Paths, road: Ints) -> tuple[float, float]:
 
 
 def _fitted(design: Floats, y: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
-    """Least squares that outliers do not move: the unknowns (n,), their covariance, and their derivatives by y (n, W)."""
+    """Least squares that outliers do not move: the unknowns (n,), their covariance, their derivatives by y (n, W)."""
     weight = np.ones(len(y))
     scale = 1.0
     for _ in range(_ROUNDS):

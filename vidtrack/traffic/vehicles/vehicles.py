@@ -30,7 +30,7 @@ class Speeds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """Speeds that were asked for; the classes of T tracks, NaN where there is no fit; what contradicts the calibration."""
+    """Speeds that were asked for; classes of T tracks, NaN where there is no fit; what contradicts the calibration."""
 
     speeds: Speeds
     classes: Classified
@@ -90,7 +90,10 @@ class _Sizes:
 
 
 def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Floats, _Sizes, Paths]:
-    """(3, W) speeds as in `Speeds`, sizes, and straight paths, of some tracks; each time is looked up in the piece that it lies in."""
+    """(3, W) speeds as in `Speeds`, sizes, and straight paths, of some tracks.
+
+    Each time is looked up in the piece that it lies in.
+    """
     with np.errstate(invalid="ignore"):
         place = ground.metres(ground.inside(_foot(knots.edge)))
     sure = np.isfinite(place[:, 0])
