@@ -160,6 +160,7 @@ def _agreed(traffic: dict[str, Any]) -> list[str]:
         *lines,
         f"Straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
         f"{straight['converging_deg']:.2f} degrees (standard deviation {straight['converging_sigma_deg']:.2f}, "
-        f"{straight['paths']} paths); by a lens the corner of the picture is off by {straight['lens_px']:.0f} px (standard deviation "
+        f"{straight['paths']} paths); by a lens the corner of the picture is off by "
+        f"{straight['lens_px']:.0f} px (standard deviation "
         f"{straight['lens_sigma_px']:.0f}).",
     ]

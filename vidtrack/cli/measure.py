@@ -117,8 +117,8 @@ def doubts(report: dict[str, Any]) -> list[str]:
         lines.append(
             f"straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
             f"{abs(straight['converging_deg']):.1f} degrees (standard deviation "
-            f"{straight['converging_sigma_deg']:.1f}, {straight['paths']} paths); if its lanes are parallel, a point of the calibration is wrong: run vidtrack "
-            "calibrate"
+            f"{straight['converging_sigma_deg']:.1f}, {straight['paths']} paths); if its lanes are parallel, a "
+            "point of the calibration is wrong: run vidtrack calibrate"
         )
     if straight and straight["bends"]:
         lines.append(

@@ -21,6 +21,8 @@ _STRAIGHT = 0.02
 """Largest rise of the arc over its chord, as a share: else the vehicle turns"""
 _ROAD, _LEAST_PATHS, _MOST_ROADS = np.radians(6.0), 10, 4
 """rad to either side; paths of one road differ by less. How many make a road"""
+_MOST_PATHS = 600
+"""More than that say nothing new."""
 _WANDER_M = 0.15
 """m; standard deviation of where vehicles drive within their lane, at each end of a path and in its middle"""
 _LANES, _LENS_PX = np.radians(0.25), 3.0
@@ -47,6 +49,7 @@ class Paths:
     shared: Floats
 
     def only(self, chosen: Mask) -> Paths:
+        """The paths of a mask."""
         return Paths(*(getattr(self, name)[chosen] for name in self.__slots__))
 
 
@@ -138,6 +141,7 @@ def paths_of(ground: Ground, xy: Floats, first: Ints, sound: Mask) -> Paths:
 
 def straightness(paths: Paths) -> Straightness | None:
     """None for too few paths."""
+    paths = paths.only(np.arange(len(paths.angle)) % -(-max(len(paths.angle), 1) // _MOST_PATHS) == 0)
     road = _roads(paths.angle)
     if not (road >= 0).any():
         return None
