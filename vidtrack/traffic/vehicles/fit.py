@@ -41,6 +41,10 @@ _HEADING_M = 4.0
 _DRIFT = 0.006
 """Standard deviation of a speed, as a share, because shadows and corners that come into view move the edges along: the
 errors of the vehicles of one site lean to one side by as much"""
+_WALKER_M, _GAIT_M_S = 1.2, 0.1
+"""m and m/s; who is no longer walks: legs and arms move the edges to and fro"""
+_ROUNDING_M = 1.2
+"""m; a body is no cuboid. As it turns, the points that its edges rest on move along it by as much in a radian"""
 _LEAST_MISFIT = 0.05
 """Of noise as it is stated above: it is not taken to be less, however well a short track fits."""
 _BAND = 4
@@ -104,7 +108,7 @@ def fit(
         if b - a < _SPEED_KNOTS:
             continue
         for w in range(asked_of[i], asked_of[i + 1]):
-            _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], cov[i], quality[i], speed[w])
+            _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], size[i], cov[i], quality[i], speed[w])
             speed[w, 4] += a
             speed[w, 5] += a
 
@@ -251,8 +255,9 @@ def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) ->
 
 @kernel(error_model="numpy")
 def _speed(
-    t: Floats, path: Floats, asked: float, band: Floats, right: Floats, cov: Floats, misfit: float, speed: Floats
-) -> None:
+    t: Floats, path: Floats, asked: float, band: Floats, right: Floats, size: Floats, cov: Floats, misfit: float,
+    speed: Floats,
+) -> None:  # fmt: skip
     """Write the slope of the path at a time, and its error (6,)."""
     if not t[0] <= asked <= t[-1]:
         return
@@ -275,4 +280,18 @@ def _speed(
     for s in range(SIZE):
         for r in range(SIZE):
             variance += by_size[s] * cov[s, r] * by_size[r] * misfit
-    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance + (_DRIFT * v) ** 2), ex, ey, i, j
+    variance += (_DRIFT * v) ** 2 + (_ROUNDING_M * _turning(t, path, i, j)) ** 2
+    if size[0] < _WALKER_M:
+        variance += _GAIT_M_S**2
+    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance), ex, ey, i, j
+
+
+@kernel(error_model="numpy")
+def _turning(t: Floats, path: Floats, i: int, j: int) -> float:
+    """rad/s; by how much the path turns around the step from i to j."""
+    a, b = max(i - 1, 0), min(j + 1, len(t) - 1)
+    if a == i or b == j:
+        return 0.0
+    before = np.arctan2(path[i, 1] - path[a, 1], path[i, 0] - path[a, 0])
+    after = np.arctan2(path[b, 1] - path[j, 1], path[b, 0] - path[j, 0])
+    return ((after - before + np.pi) % (2 * np.pi) - np.pi) / ((t[b] + t[j] - t[i] - t[a]) / 2)
