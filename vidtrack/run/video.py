@@ -28,7 +28,7 @@ from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.traffic.metres import footprints_of
 from vidtrack.traffic.site import read_site
 from vidtrack.video import background
-from vidtrack.video.background.disturbance import Disturbance
+from vidtrack.video.background.disturbance import PREVIEW_EVERY_S, Disturbance
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Background
@@ -146,7 +146,7 @@ def look_ahead(source: Source, detector: Background, settings: Settings) -> None
     """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene."""
     seconds = settings.detector.disturbance.preview_s
     if isinstance(detector, Disturbance) and seconds:
-        detector.preview(source.opening(seconds, settings.source.end_s))
+        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S))
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

@@ -53,7 +53,7 @@ _LEAST_KNOTS, _LEAST_PATH_M, _SPEED_KNOTS = 3, 2.0, 4
 """For a size; a speed needs more."""
 
 
-@kernel(error_model="numpy")
+@kernel
 def fit(
     first: Ints, t: Floats, edge: Floats, rows: Floats, start: Floats, G: Floats, up: Floats,
     asked_of: Ints, asked: Floats, path: Floats, size: Floats, cov: Floats, quality: Floats, speed: Floats,
@@ -113,7 +113,7 @@ def fit(
             speed[w, 5] += a
 
 
-@kernel(error_model="numpy")
+@kernel
 def _headings(path: Floats, heading: Floats) -> None:
     """Write unit vectors (K, 2) along a path (K, 2), over some metres of it."""
     last = len(path) - 1
@@ -128,7 +128,7 @@ def _headings(path: Floats, heading: Floats) -> None:
         heading[k, 0], heading[k, 1] = dx / far, dy / far
 
 
-@kernel(error_model="numpy")
+@kernel
 def _residuals(
     edge: Floats, rows: float, p: Floats, e: Floats, size: Floats, G: Floats, up: Floats, coarse: float,
     state: Floats, model: Floats, by_state: Floats, residual: Floats, by_size: Floats, weight: Floats,
@@ -159,7 +159,7 @@ def _residuals(
     return total, strange
 
 
-@kernel(error_model="numpy")
+@kernel
 def _normal(
     t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
     coarse: float, band: Floats, right: Floats, whole: Floats, rest: Floats,
@@ -210,7 +210,7 @@ def _normal(
     return total / max(count, 1), strange / max(count, 1)
 
 
-@kernel(error_model="numpy")
+@kernel
 def _factor(band: Floats) -> None:
     """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place."""
     for i in range(len(band)):
@@ -225,7 +225,7 @@ def _factor(band: Floats) -> None:
                 band[i, d] = value / band[j, 0]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _solve(band: Floats, right: Floats) -> None:
     """Solve for all right sides (n, m), in place, with the factor."""
     n = len(band)
@@ -243,7 +243,7 @@ def _solve(band: Floats, right: Floats) -> None:
             right[i, c] /= band[i, 0]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) -> None:
     """Take the path out of the size's equations (Schur complement): coupling (2 K, SIZE), solved (2 K, SIZE + 1)."""
     for k in range(len(coupling)):
@@ -253,7 +253,7 @@ def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) ->
             rest[s] -= coupling[k, s] * solved[k, SIZE]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _speed(
     t: Floats, path: Floats, asked: float, band: Floats, right: Floats, size: Floats, cov: Floats, misfit: float,
     speed: Floats,

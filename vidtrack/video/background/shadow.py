@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
@@ -83,7 +83,7 @@ class Sunlight:
         return _HARD._replace(darkest=min(_HARD.darkest, np.float32((least + _HARDEST) / _BINS)))
 
 
-@kernel(error_model="numpy")
+@kernel
 def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: Tolerance, hit: Image) -> Floats:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's times one factor r.
 
@@ -120,7 +120,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     return count
 
 
-@kernel(inline="always")
+@part
 def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
     """Deviation [grey levels] of the colour from the scene's colour times r, and the scene's colour."""
     blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
@@ -129,7 +129,7 @@ def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tu
     return max(abs(off_blue), abs(off_red)), max(abs(blue), abs(red))
 
 
-@kernel(inline="always")
+@part
 def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
     """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
     h, w = luma.shape
