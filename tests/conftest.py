@@ -11,6 +11,15 @@ settings.load_profile("unhurried")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell switches it off for what it starts in the background
 
 CLOCKED = ("tests/run/live/", "tests/serve/")
+UNCLOCKED = tuple(
+    f"tests/{name}.py"
+    for name in (
+        *(f"run/live/test_live_{of}" for of in ("clock", "leave", "level", "muxer", "station_day", "status")),
+        *(f"serve/test_serve_{of}" for of in ("counts", "review", "site", "site_browser", "site_file")),
+        "serve/test_serve_site_command",
+    )
+)
+"""Files there with neither a camera nor a limit of time: their pages are of finished runs"""
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -20,7 +29,8 @@ def pytest_xdist_make_scheduler(config, log):
 
     class Scheduling(LoadFileScheduling):
         def _split_scope(self, nodeid):
-            return "clocked" if nodeid.startswith(CLOCKED) else super()._split_scope(nodeid)
+            clocked = nodeid.startswith(CLOCKED) and not nodeid.startswith(UNCLOCKED)
+            return "clocked" if clocked else super()._split_scope(nodeid)
 
     return Scheduling(config, log)
 

@@ -11,7 +11,7 @@ from threading import Thread
 import pytest
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
-HANG_S = 60.0
+HANG_S = 180.0
 
 needs_mosquitto = pytest.mark.skipif(MOSQUITTO is None, reason="needs the broker mosquitto")
 

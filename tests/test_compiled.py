@@ -5,16 +5,18 @@ import os
 import signal
 import sys
 from contextlib import contextmanager
+from hashlib import sha1
 from pathlib import Path
 from subprocess import PIPE, Popen
 from threading import Thread
 
 import pytest
 from numba import config, njit
+from numba.core.errors import TypingError
 from numba.core.event import Listener, install_listener
 
 from vidtrack.cli.signals import Terminated, terminate
-from vidtrack.compiled import forget_stale, kernel
+from vidtrack.compiled import first_run, forget_stale, kernel
 
 
 def kernels():
@@ -190,3 +192,41 @@ def test_a_process_that_hangs_in_the_compiler_is_not_waited_for_without_end(add,
         fcntl.flock(other, fcntl.LOCK_EX)
         assert add(1.5, 2.0) == 3.5
     assert list(tmp_path.rglob("*.nbi"))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs file locks")
+def test_a_kernel_that_does_not_compile_is_not_waited_for(tmp_path, monkeypatch):
+    import fcntl
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+
+    @kernel
+    def lengths(x):
+        return len(x)
+
+    with pytest.raises(TypingError):
+        lengths(1)
+    with open(lengths._cache._lock) as other:
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    assert lengths((1, 2)) == 2
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_kernels_of_others_do_not_make_a_first_run_a_later_one(tmp_path, monkeypatch, elsewhere):
+    """Of another Python in the package, and of other packages in NUMBA_CACHE_DIR."""
+    package = tmp_path / "vidtrack"
+    package.mkdir()
+    (package / "scan.py").touch()
+    kept = tmp_path / "kernels" if elsewhere else package
+    own = kept / f"vidtrack_{sha1(str(package).encode()).hexdigest()}" if elsewhere else package / "__pycache__"
+    other = kept / "other_0123" if elsewhere else own
+    for folder in {own, other}:
+        folder.mkdir(parents=True)
+    this = f"py{sys.version_info.major}{sys.version_info.minor}"
+    (other / f"scan.find-1.{this if elsewhere else 'py27'}.nbi").touch()
+    monkeypatch.setattr("vidtrack.compiled.PACKAGE", package)
+    monkeypatch.setattr("vidtrack.compiled.KERNELS", kept)
+    monkeypatch.setattr("vidtrack.compiled.CACHE", True)
+    assert first_run()
+    (own / f"scan.find-1.{this}.nbi").touch()
+    assert not first_run()

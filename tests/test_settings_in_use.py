@@ -107,6 +107,14 @@ def test_a_setting_that_another_one_switches_off_is_refused():
     assert load(assignments=["output.link_s=2"], kind=Input.DETECTIONS).output.link_s == 2
 
 
+def test_a_resolution_cell_is_for_unresolved_targets_or_a_threshold():
+    cell, off = "radar.cell_range_m=150", "radar.unresolved=false"
+    said = "setting radar.cell_range_m has no effect here; it needs radar.unresolved=true or radar.snr_db=NUMBER"
+    assert refused(Input.RADAR, cell, off) == said
+    assert load(assignments=[cell], kind=Input.RADAR).radar.cell_range_m == 150
+    assert load(assignments=[cell, off, "radar.snr_db=13"], kind=Input.RADAR).radar.cell_range_m == 150
+
+
 def test_a_file_may_hold_settings_for_other_inputs_but_none_of_its_own_without_effect(tmp_path):
     path = tmp_path / "settings.toml"
     path.write_text("[tracker]\ncoast_s = 2.0\n[blobs]\ncut = false\n[radar]\nparticles = 50\n")

@@ -83,7 +83,7 @@ def main() -> None:
     vehicles = Vehicles(ground)
     vehicles.add(track, column["time_s"], place, edge)
     asked = np.flatnonzero((of >= 0) & (column["frame"] % round(FPS) == 0))
-    found = vehicles.fitted(len(ids), track[asked], column["time_s"][asked])
+    found = vehicles.fitted(np.arange(len(ids)), track[asked], column["time_s"][asked])
     assert found is not None
     true = np.array([speed_of(frame, who, metres, row) for row in of[asked]])
     for name, speed in (("a track's fit", found.speeds.speed), ("the row itself", column["speed_kmh"][asked] / 3.6)):

@@ -1,22 +1,25 @@
 """A station of four cameras with pixels, left alone while it is hurt: what it counts, and whether it grows.
 
-    python tools/soak_station.py [--minutes 30] [--seed 0] [--every 40] [--folder DIR]
+    python tools/soak_station.py [--minutes 30] [--seed 0] [--every 40] [--folder DIR] [--disk DIR] [--film DIR]
 
-Four cameras show the junction round and round, by one clock; `vidtrack live` tracks them with --http, --record, --roll,
---state and --keep, as a user would start it. A fifth camera, of the same pictures, is tracked without faults by a run
-of its own: the reference. A sixth one is too: it says how much two runs differ that nothing happens to. About every 40
-s one fault of these happens: a camera hangs up and refuses for a while, or sends nothing; the process of a camera is
-killed; all processes are killed, and the command is started again; no file takes another byte for a while, as on a
-full disk.
+Four cameras show a simulated road from above, by one clock, in a film that does not repeat; `vidtrack live` tracks them
+with --http, --record, --roll, --state and --keep, as a user would start it. A fifth camera, of the same pictures, is
+tracked without faults by a run of its own: the reference. A sixth one is too: it says how much two runs differ that
+nothing happens to. About every 40 s one fault of these happens: a camera hangs up and refuses for a while, or sends
+nothing; the process of a camera is killed; all processes are killed, and the command is started again; the disk is full
+for a while. With --disk, the root of a small file system that nothing else uses, it is really full; else no file of the
+running processes takes another byte.
 
 Once in 10 s a line is printed: resident MB of all processes, their handles, MB on the disk, what /healthz says. At the
-end their slopes over the second half, and the crossings of each camera beside those of the reference: there once, in a
-time that was not watched, missed, or found where the reference has none.
+end their slopes over the second half, and the crossings of each camera beside those of the reference. Each is that of
+one vehicle of the film: there once, in a time that was not watched, in a warm-up, missed, or found where the reference
+has none. The exit code is 1 if a camera has missed or invented one.
 """
 
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import resource
 import signal
@@ -39,12 +42,51 @@ from soak_live import slope
 
 from vidtrack.output.intervals.day import day_folders, read_day
 
-SAMPLE = Path(__file__).parent.parent / "samples" / "junction.avi"
 NAMES, SOUND = ("north", "east", "south", "west"), ("reference", "control")
-FPS, LOOK_S, NEAR_S = 8.0, 10.0, 1.5
+WIDTH, HEIGHT, FPS = 320, 180, 10.0
+ROAD = ("--flow", "900", "--camera-height", "25", "--tilt-deg", "75")  # no vehicle hides another
+LOOK_S, NEAR_S, EXTRA_S = 10.0, 2.0, 120.0
 WARM_S = 30.0
 """s after a fault in which a vehicle may be counted that the reference lacks, or twice: the scene is learnt"""
-LINES = ("gate:120,0,120,180", "ramp:0,90,240,90")
+LINES = (f"gate:{WIDTH // 2},0,{WIDTH // 2},{HEIGHT - 1}", f"ramp:0,{HEIGHT // 2},{WIDTH - 1},{HEIGHT // 2}")
+AXES = {"gate": (0, WIDTH // 2, ("left", "right")), "ramp": (1, HEIGHT // 2, ("up", "down"))}
+"""The lines as coordinate, its value on the line, and the directions in which it falls and grows"""
+Crossing = tuple[int, str, str]
+"""Vehicle, line, direction"""
+
+
+class Film:
+    """The pictures of a road in a folder of `vidtrack simulate`, and what crosses the lines in it.
+
+    passes  (line, direction) -> time [s from the first picture] and vehicle of each crossing
+    """
+
+    def __init__(self, folder: Path) -> None:
+        with av.open(str(folder / "video.avi")) as film:
+            arrays = (picture.to_ndarray(format="bgr24") for picture in film.decode(video=0))
+            self.jpegs = [cv2.imencode(".jpg", array)[1].tobytes() for array in arrays]
+        frame, target, left, top, width, height = np.loadtxt(folder / "gt.txt", delimiter=",", usecols=range(6)).T
+        centres = np.column_stack([left + 0.5 * width, top + 0.5 * height])
+        self.passes: dict[tuple[str, str], list[tuple[float, int]]] = {}
+        for vehicle in np.unique(target):
+            own = target == vehicle
+            for line, (axis, place, directions) in AXES.items():
+                side = centres[own, axis] > place
+                for k in np.flatnonzero(side[1:] != side[:-1]):
+                    passes = self.passes.setdefault((line, directions[int(side[k + 1])]), [])
+                    passes.append((frame[own][k] / FPS, int(vehicle)))
+
+    def vehicle(self, line: str, direction: str, time_s: float) -> int:
+        """Which one crossed then; -1 if none did within NEAR_S."""
+        away, vehicle = min(((abs(t - time_s), v) for t, v in self.passes[line, direction]), default=(np.inf, -1))
+        return vehicle if away < NEAR_S else -1
+
+
+def drawn(folder: Path, seconds: float) -> Path:
+    """The folder with the film of a road."""
+    size = ("--size", f"{WIDTH}x{HEIGHT}", "--fps", f"{FPS:g}", "--seconds", f"{seconds:g}")
+    subprocess.run([sys.executable, "-m", "vidtrack", "simulate", "road", "-o", folder, *size, *ROAD], check=True)
+    return folder
 
 
 class Pictures(ThreadingHTTPServer):
@@ -52,11 +94,10 @@ class Pictures(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self) -> None:
+    def __init__(self, jpegs: list[bytes]) -> None:
         super().__init__(("127.0.0.1", 0), Site)
-        with av.open(str(SAMPLE)) as film:
-            arrays = [picture.to_ndarray(format="bgr24") for picture in film.decode(video=0)]
-        self.jpegs = [cv2.imencode(".jpg", array)[1].tobytes() for array in arrays]
+        self.jpegs = jpegs
+        self.began = time.time()
         self.mode = dict.fromkeys((*NAMES, *SOUND), "runs")
 
     def handle_error(self, *_: object) -> None:
@@ -77,11 +118,11 @@ class Site(BaseHTTPRequestHandler):
         self.end_headers()
         last = -1
         while own.mode[name] != "refuses":
-            number = int(time.time() * FPS)
+            number = min(int((time.time() - own.began) * FPS), len(own.jpegs) - 1)
             if number == last or own.mode[name] == "freezes":
                 time.sleep(0.01)
                 continue
-            last, jpeg = number, own.jpegs[number % len(own.jpegs)]
+            last, jpeg = number, own.jpegs[number]
             head = f"--next\r\nContent-Type: image/jpeg\r\nContent-Length: {len(jpeg)}\r\n\r\n"
             self.wfile.write(head.encode() + jpeg + b"\r\n")
 
@@ -90,10 +131,13 @@ class Site(BaseHTTPRequestHandler):
 
 
 class Station:
-    """`vidtrack live` over the four cameras in a folder; it is started again when it has been killed."""
+    """`vidtrack live` over the four cameras in a folder; it is started again when it has been killed.
 
-    def __init__(self, folder: Path, url: str) -> None:
-        self._folder = folder
+    logs  the folder of what each start says
+    """
+
+    def __init__(self, folder: Path, logs: Path, url: str) -> None:
+        self._folder, self._logs = folder, logs
         cameras = "".join(f'[camera.{name}]\naddress = "{url}/{name}.mjpg"\n' for name in NAMES)
         (folder / "cameras.toml").write_text(f"output.lines = {list(LINES)}\n{cameras}")
         self.starts = 0
@@ -103,8 +147,8 @@ class Station:
         places = ["--http", "0", "--record", "tape", "--state", "state", "-o", "out", "-v"]
         limits = ["--roll", "2m", "--keep", "80MB", "--set", "live.timeout_s=8", "--set", "live.replace_state=true"]
         command = [sys.executable, "-m", "vidtrack", "live", "cameras.toml", *places, *limits]
-        self._log = (self._folder.parent / f"log{self.starts}").open("w")
-        self.process = subprocess.Popen(command, cwd=self._folder, stdout=self._log, stderr=self._log)
+        with (self._logs / f"log{self.starts}").open("w") as log:
+            self.process = subprocess.Popen(command, cwd=self._folder, stdout=log, stderr=log)
         self.starts += 1
 
     def children(self) -> list[int]:
@@ -123,7 +167,7 @@ class Station:
 
     def health(self) -> str:
         """The first line of /healthz, or why there is none."""
-        log = (self._folder.parent / f"log{self.starts - 1}").read_text()
+        log = (self._logs / f"log{self.starts - 1}").read_text()
         address = next((word for word in log.split() if word.startswith("http://") and word.endswith("/")), None)
         if address is None:
             return "no page yet"
@@ -136,10 +180,10 @@ class Station:
             return str(error)
 
 
-def hurt(station: Station, pictures: Pictures, rng: Random, happened: Counter, until_s: float) -> None:
+def hurt(station: Station, pictures: Pictures, disk: Path | None, rng: Random, happened: Counter) -> None:
     """One fault, and its end."""
     kind = rng.choice(["refuses", "freezes", "kill one", "kill one", "kill all", "full disk", "full disk"])
-    length_s = min(rng.uniform(2, 25), max(0.0, until_s - time.time()))
+    length_s = rng.uniform(2, 25)
     happened[kind] += 1
     if kind in ("refuses", "freezes"):
         name = rng.choice(NAMES)
@@ -154,6 +198,8 @@ def hurt(station: Station, pictures: Pictures, rng: Random, happened: Counter, u
         station.kill_all()
         time.sleep(rng.uniform(0, 5))
         station.start()
+    elif disk is not None:
+        fill(disk / "ballast", time.time() + length_s)
     else:
         children = station.children()
         for size in (0, resource.RLIM_INFINITY):
@@ -161,6 +207,20 @@ def hurt(station: Station, pictures: Pictures, rng: Random, happened: Counter, u
                 with suppress(ProcessLookupError):
                     resource.prlimit(pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
             time.sleep(length_s if size == 0 else 0)
+
+
+def fill(ballast: Path, until_s: float) -> None:
+    """Take every byte of a disk until a time."""
+    block = bytes(1 << 16)
+    with ballast.open("wb", buffering=0) as file:
+        while time.time() < until_s:
+            try:
+                file.write(block)
+            except OSError as error:
+                if error.errno != errno.ENOSPC:
+                    raise
+                time.sleep(0.01)
+    ballast.unlink()
 
 
 def look(station: Station, folder: Path) -> tuple[float, int, float]:
@@ -177,40 +237,52 @@ def look(station: Station, folder: Path) -> tuple[float, int, float]:
     return resident, int(handles), size / 1e6
 
 
-def crossings(counts: Path) -> tuple[list[tuple[str, str, float]], np.ndarray]:
-    """(line, direction, Unix time) of all crossings, and (S, 2) what was watched."""
+def crossings(counts: Path, film: Film, began: float) -> tuple[list[tuple[Crossing, float]], np.ndarray]:
+    """All crossings with their Unix times, and (S, 2) what was watched."""
     found, spans = [], [np.empty((0, 2))]
     for day in map(read_day, day_folders(counts)):
-        found += [(row["gate"], row["direction"], row["utc"].timestamp()) for row in day.crossings.to_pylist()]
+        for row in day.crossings.to_pylist():
+            t, what = row["utc"].timestamp(), (row["gate"], row["direction"])
+            found.append(((film.vehicle(*what, t - began), *what), t))
         spans.append(day.watched)
-    return found, np.concatenate(spans)
+    begins, ends = np.concatenate(spans).T
+    apart = begins[1:] > ends[:-1] + 0.01  # what is told every 2 s is one span
+    return found, np.column_stack([begins[np.append(True, apart)], ends[np.append(apart, True)]])
+
+
+def truth(film: Film, began: float) -> list[tuple[Crossing, float]]:
+    """All crossings of the film."""
+    return [((vehicle, *what), began + t) for what, passes in film.passes.items() for t, vehicle in passes]
 
 
 def compared(reference, camera) -> Counter:
-    """Crossings of a camera beside the reference's, each matched with at most one."""
+    """How often what happened to the crossings of a camera, where the reference watched."""
     (expected, sure), (found, watched) = reference, camera
-    left, result = sorted(found, key=lambda row: row[2]), Counter(reference=0, counted=len(found))
 
-    def inside(spans, t: float, margin: float) -> bool:
+    def inside(spans: np.ndarray, t: float, margin: float) -> bool:
         return bool(((spans[:, 0] + margin <= t) & (t <= spans[:, 1] - margin)).any())
 
-    for row in sorted(expected, key=lambda row: row[2]):
-        result["reference"] += 1
-        near = [one for one in left if one[:2] == row[:2] and abs(one[2] - row[2]) < NEAR_S]
-        if near:
-            left.remove(min(near, key=lambda one: abs(one[2] - row[2])))
-            result["once"] += 1
-        elif inside(watched, row[2], NEAR_S):
-            begins = watched[:, 0]
-            result[
-                "missed in a warm-up" if ((row[2] - begins > 0) & (row[2] - begins < WARM_S)).any() else "missed"
-            ] += 1
-        else:
+    def in_warm_up(t: float) -> bool:
+        since = t - watched[:, 0]
+        return bool(((since > -NEAR_S) & (since < WARM_S)).any())
+
+    expected = [(what, t) for what, t in expected if inside(sure, t, NEAR_S)]
+    there, wanted = Counter(what for what, _ in found), Counter(what for what, _ in expected)
+    result = Counter(reference=len(expected), counted=len(found))
+    for what, t in expected:
+        if there[what]:
+            result["once"] += there[what] == wanted[what]
+        elif not inside(watched, t, NEAR_S):
             result["in a stated gap"] += 1
-    for *_, t in left:
-        begins = watched[:, 0]
-        warm = ((t - begins > -NEAR_S) & (t - begins < WARM_S)).any() or not inside(watched, t, 0.0)
-        result["not in the reference, in a warm-up" if warm else "invented"] += inside(sure, t, NEAR_S)
+        else:
+            result["missed in a warm-up" if in_warm_up(t) else "missed"] += 1
+            print("   missed", what, round(t, 2), "in a warm-up" if in_warm_up(t) else "")
+    for what, t in found:
+        if there[what] > wanted[what] and inside(sure, t, 2 * NEAR_S):
+            there[what] -= 1
+            warm = in_warm_up(t) or not inside(watched, t, 0.0)
+            result["again or alone in a warm-up" if warm else "invented"] += 1
+            print("   more than the reference has", what, round(t, 2), "in a warm-up" if warm else "")
     return result
 
 
@@ -221,33 +293,37 @@ def sound_run(address: str, folder: Path) -> subprocess.Popen:
     return subprocess.Popen([*command, "--set", "output.level=counts", "--roll", "1h"])
 
 
-def main() -> None:
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--every", type=float, default=40.0, metavar="SECONDS")
     parser.add_argument("--folder", type=Path, help="where the results stay; it must not exist")
+    parser.add_argument("--disk", type=Path, help="the root of a small file system, for the station")
+    parser.add_argument("--film", type=Path, help="a film that was drawn before")
     options = parser.parse_args()
     rng, happened, seen = Random(options.seed), Counter(), []
     with ExitStack() as stack:
         root = options.folder or Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        folder = root / "disk"
-        folder.mkdir(parents=True)
-        pictures = Pictures()
+        folder = (options.disk or root) / "station"
+        for new in (root, folder):
+            new.mkdir(parents=True)
+        film = Film(options.film or drawn(root / "film", 60 * options.minutes + EXTRA_S))
+        pictures = Pictures(film.jpegs)
         Thread(target=pictures.serve_forever, daemon=True).start()
         url = f"http://127.0.0.1:{pictures.server_address[1]}"
         sound = [sound_run(f"{url}/{name}.mjpg", root / name) for name in SOUND]
         for process in sound:
             stack.callback(process.wait)
             stack.callback(process.terminate)
-        station = Station(folder, url)
+        station = Station(folder, root, url)
         stack.callback(station.kill_all)
-        began, until_s = time.time(), time.time() + 60 * options.minutes
-        faults = (station, pictures, rng, happened, until_s, options.every)
+        until_s = pictures.began + 60 * options.minutes
+        faults = (station, pictures, options.disk, rng, happened, until_s, options.every)
         Thread(target=hurting, args=faults, daemon=True).start()
         while time.time() < until_s:
             time.sleep(LOOK_S)
-            seen.append((time.time() - began, *look(station, folder)))
+            seen.append((time.time() - pictures.began, *look(station, folder)))
             print(
                 "{:6.0f} s {:7.1f} MB {:4d} handles {:6.1f} MB on the disk".format(*seen[-1]),
                 station.health(),
@@ -264,20 +340,34 @@ def main() -> None:
             b, error = slope(whole[:, 0], whole[:, column])
             print(f"{name}: {3600 * b:+.1f} +- {3600 * error:.1f} per hour, at {np.median(whole[:, column]):.1f}")
         print(f"faults {dict(happened)}, starts {station.starts}, exit code {code}")
-        expected = crossings(root / "reference" / "intervals")
-        for name, place in [("control", root / "control"), *((name, folder / "out" / name) for name in NAMES)]:
-            print(name, dict(compared(expected, crossings(place / "intervals"))))
+        reference, control = (crossings(root / name / "intervals", film, pictures.began) for name in SOUND)
+        print("reference beside the film", dict(compared((truth(film, pictures.began), reference[1]), reference)))
+        print("control", dict(compared(reference, control)))
+        total: Counter = Counter()
+        for name in NAMES:
+            camera = crossings(folder / "out" / name / "intervals", film, pictures.began)
+            found = compared(reference, camera)
+            print(name, dict(found), flush=True)
+            total += found
+        print("all", dict(total))
+    return int(total["missed"] + total["invented"] > 0)
 
 
 def hurting(
-    station: Station, pictures: Pictures, rng: Random, happened: Counter, until_s: float, every_s: float
+    station: Station,
+    pictures: Pictures,
+    disk: Path | None,
+    rng: Random,
+    happened: Counter,
+    until_s: float,
+    every_s: float,
 ) -> None:
     """Faults until shortly before the end."""
     time.sleep(60)
     while time.time() < until_s - 60:
-        hurt(station, pictures, rng, happened, until_s)
+        hurt(station, pictures, disk, rng, happened)
         time.sleep(rng.expovariate(1 / every_s))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,6 +1,6 @@
 """A day of a counting station in fast motion, without pixels: its counts with faults, beside those without.
 
-    python tools/station_day.py [--cameras 16] [--hours 24] [--seed 0] [--processes 2] [--folder DIR]
+    python tools/station_day.py [--cameras 16] [--first 0] [--hours 24] [--seed 0] [--processes 2] [--folder DIR]
 
 Each camera sees vehicles as boxes, two scans a second, on a simulated clock; tracker, lines, parts, counts by interval
 and saved state are those of `vidtrack live`. The day begins half an hour before Berlin leaves
@@ -264,6 +264,7 @@ def drawn_day(folder: Path, seed: int, seconds: float, camera: int) -> Counter:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cameras", type=int, default=16)
+    parser.add_argument("--first", type=int, default=0, help="number of the first camera")
     parser.add_argument("--hours", type=float, default=24.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
@@ -272,7 +273,9 @@ def main() -> int:
     total: Counter = Counter()
     with tempfile.TemporaryDirectory() as temporary, get_context("fork").Pool(options.processes, load_kernels) as pool:
         work = partial(drawn_day, options.folder or Path(temporary), options.seed, 3600 * options.hours)
-        for done, result in enumerate(pool.imap_unordered(work, range(options.cameras)), 1):
+        for done, result in enumerate(
+            pool.imap_unordered(work, range(options.first, options.first + options.cameras)), 1
+        ):
             total += result
             print(f"{done} cameras: {dict(total)}", flush=True)
     for name, value in total.items():

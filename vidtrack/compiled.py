@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from threading import current_thread, main_thread
 from time import monotonic, sleep
@@ -16,7 +17,7 @@ from types import FrameType
 from typing import Any
 
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, _CacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import Event, Listener, register
 from numba.misc.appdirs import AppDirs
@@ -27,6 +28,7 @@ if sys.platform != "win32":
 log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parent
+_RARELY = 100_000, 50, 1000  # thresholds of the garbage collector; Python's own are 700, 10, 10
 _TURN_S, _LOOK_S = 60.0, 0.02  # a process that takes longer for a kernel is taken to hang
 
 
@@ -48,8 +50,13 @@ Without a cache, as in a read-only container, each run compiles anew.
 
 
 def first_run() -> bool:
-    """Whether no kernel is kept yet."""
-    return CACHE and not any(KERNELS.rglob("*.nbi"))
+    """Whether no kernel of this package is kept yet for this version of Python."""
+    ours = f"*.py{sys.version_info.major}{sys.version_info.minor}*.nbi"
+    if KERNELS == PACKAGE:
+        return CACHE and not any(PACKAGE.rglob(ours))
+    rooms = {str(source.parent) for source in PACKAGE.rglob("*.py")}
+    kept = (KERNELS / _CacheLocator.get_suitable_cache_subpath(f"{room}/_.py") for room in rooms)
+    return CACHE and not any(any(folder.glob(ours)) for folder in kept)
 
 
 def forget_stale(package: Path) -> None:
@@ -91,6 +98,18 @@ class KernelCache(FunctionCache):
                 self._end_turn()
         return found
 
+    def ends_turn(self, compile_: Callable[..., Any]) -> Callable[..., Any]:
+        """The compiler of the function, which lets others have it when it fails."""
+
+        def compile_or_end(*of: Any) -> Any:
+            try:
+                return compile_(*of)
+            except BaseException:
+                self._end_turn()
+                raise
+
+        return compile_or_end
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save a kernel for later runs; warn if it cannot be saved."""
         try:
@@ -131,18 +150,26 @@ def _warn_once(what: str) -> None:
     log.warning(what)
 
 
-def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Decorator: compile on the first call, cache for later runs, release the interpreter's lock.
+_RULES: dict[str, Any] = {"no_cfunc_wrapper": True, "error_model": "numpy"}
+"""The same for all kernels, since numba compiles its own functions once for each set of rules. C calls none of ours, so
+none has a wrapper for that, an eighth less to compile; x / 0 is infinite or NaN."""
 
-    options  of numba.njit
-    """
-    if function is None:
-        return partial(kernel, **options)
-    options = {"no_cfunc_wrapper": True, **options}  # C calls none: an eighth less to compile
-    compiled = njit(nogil=True, **options)(function)
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Decorator: compile on the first call, cache for later runs, release the interpreter's lock."""
+    compiled = njit(nogil=True, **_RULES)(function)
     if CACHE:
         compiled._cache = KernelCache(function)
+        compiled._compiler.compile = compiled._cache.ends_turn(compiled._compiler.compile)
     return compiled
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """Decorator: a function that only kernels call. It is compiled within each of them, under their rule of division.
+
+    By itself it would be inferred, optimised and turned into machine code once more than is needed.
+    """
+    return njit(nogil=True, inline="always", **_RULES)(function)
 
 
 def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., Any]:
@@ -152,7 +179,7 @@ def specialised(function: Callable[..., Any], *constants: int) -> Callable[..., 
     """
     name = "_".join([function.__name__, *map(str, constants)])
     function.__name__ = function.__qualname__ = name
-    return kernel(function, error_model="numpy")
+    return kernel(function)
 
 
 class SignalsWait(Listener):
@@ -191,6 +218,29 @@ class SignalsWait(Listener):
         self._caught.append(number)
 
 
+class FewCollections(Listener):
+    """Lets Python's collector of garbage rest while kernels are compiled: its passes over the compiler's many objects
+    took a seventh of the time.
+    """
+
+    def __init__(self) -> None:
+        self._usual = gc.get_threshold()
+        self._depth = 0
+
+    def on_start(self, event: Event) -> None:
+        """A kernel is compiled, possibly for another one; one thread at a time holds the compiler's lock."""
+        if not self._depth:
+            self._usual = gc.get_threshold()
+            gc.set_threshold(*_RARELY)
+        self._depth += 1
+
+    def on_end(self, event: Event) -> None:
+        """It is compiled."""
+        self._depth -= 1
+        if not self._depth:
+            gc.set_threshold(*self._usual)
+
+
 def compiling() -> bool:
     """Whether another thread of this process compiles or loads a kernel now."""
     lock = global_compiler_lock._lock
@@ -202,5 +252,6 @@ def compiling() -> bool:
 
 _signals = SignalsWait()
 register("numba:compiler_lock", _signals)
+register("numba:compile", FewCollections())
 if IN_TREE:
     forget_stale(PACKAGE)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import vidtrack as vt
 from vidtrack.errors import FormatError
 from vidtrack.state import gather, restore
-from vidtrack.tracking.clutter import ClutterMap
+from vidtrack.tracking.clutter import ClutterMap, EvenBox
 from vidtrack.tracking.rates import Rates
 
 SIDE = 3200.0
@@ -43,6 +43,38 @@ def test_the_mean_density_is_one_whatever_was_seen(seed, count):
     learnt.learn(rng.uniform(-SIDE, 2 * SIDE, (count, 2)), rng.random(count))
     assert learnt.density.mean() == pytest.approx(1.0)
     assert learnt.density.min() > 0
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 50))
+def test_the_box_grows_to_what_is_outside_and_keeps_what_was_counted(seed, count):
+    learnt, rng = new_map(), np.random.default_rng(seed)
+    learnt.learn(rng.uniform(0, SIDE, (100, 2)), np.ones(100))
+    z = rng.uniform(-SIDE, 2 * SIDE, (count, 2))
+    learnt.reach(z)
+    assert ((learnt.low <= z.min(axis=0)) & (z.max(axis=0) <= learnt.high)).all()
+    assert learnt.grown == pytest.approx((learnt.high - learnt.low).prod() / SIDE**2)
+    assert learnt.count.sum() == pytest.approx(100)
+    again = learnt.grown
+    learnt.reach(z)
+    assert learnt.grown == again
+
+
+def test_a_patch_stays_at_its_place_when_the_box_grows():
+    learnt = new_map()
+    learnt.learn(np.random.default_rng(0).uniform(0, SIDE / 4, (5000, 2)), np.ones(5000))
+    learnt.reach(np.array([[2.5 * SIDE, -SIDE]]))
+    inside, outside = np.array([[0.125, 0.125]]) * SIDE, np.array([[0.6, 0.6], [2.0, -0.5]]) * SIDE
+    assert learnt.at(inside)[0] > 20 * learnt.at(outside).max()
+
+
+@pytest.mark.parametrize("where", [new_map, lambda: EvenBox(np.zeros(2), np.full(2, SIDE))])
+def test_the_density_of_a_feed_is_right_when_its_first_scans_were_of_a_corner(where):
+    own, rng = Rates(0.9, None, SIDE**2, where()), np.random.default_rng(0)
+    for k in range(200):
+        z = rng.uniform(0, SIDE if k < 3 else 4 * SIDE, (16, 2))
+        own.look(vt.Scan(float(k), z, 25.0 * np.eye(2)))
+        own.false, own.scans = own.false + 16, own.scans + 1
+    assert own.clutter_density == pytest.approx(1 / SIDE**2, rel=0.25)
 
 
 def test_it_is_even_where_nothing_is_known():

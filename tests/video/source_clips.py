@@ -32,14 +32,15 @@ def write_clip(
     rate: float | Fraction = 25,
     stamps_ms: Iterable[int] | None = None,
     options: dict[str, str] | None = None,
+    spare: int = 0,
 ) -> Path:
-    """Encode `frames` frames, at `rate` or at explicit timestamps."""
+    """Encode `frames` frames, at `rate` or at explicit timestamps; of H.264, no other refers to `spare` in a row."""
     with av.open(str(path), "w", options=options or {}) as container:
         stream = container.add_stream(codec, rate=Fraction(rate).limit_denominator(1001))
         stream.width, stream.height, stream.pix_fmt = *size, pixels
         stream.bit_rate = 2_000_000
         if codec == "libx264":
-            stream.options = {"preset": "ultrafast", "g": "10"}
+            stream.options = {"preset": "ultrafast", "g": "10", "bf": str(spare)}
         stamps = None if stamps_ms is None else list(stamps_ms)
         if stamps is not None:
             stream.codec_context.time_base = Fraction(1, 1000)

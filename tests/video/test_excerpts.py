@@ -59,3 +59,21 @@ def test_spans_of_images(tmp_path):
 def test_a_source_that_is_gone(tmp_path):
     with pytest.raises(SourceError, match="no such file"):
         Excerpts(str(tmp_path / "gone.avi"), SourceSettings())
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "fewer"),
+    [("a.mp4", "libx264", True), ("a.mkv", "libx264", True), ("a.264", "libx264", False), ("a.avi", "mpeg4", False)],
+)
+def test_an_opening_has_all_pictures_that_lie_so_far_apart_and_fewer_others(tmp_path, name, codec, fewer):
+    path, settings = write_clip(tmp_path / name, frames=70, codec=codec, spare=2), SourceSettings(start_s=0.4)
+    with open_source(str(path), settings) as source:
+        every = list(source.opening(1.0, None))
+        some = {frame.time_s: frame.y for frame in source.opening(1.0, None, 0.2)}
+    last_s = -1.0
+    for frame in every:
+        if frame.time_s > last_s + 0.2 - 1e-6:
+            last_s = frame.time_s
+            assert np.array_equal(some.pop(last_s), frame.y)
+    assert 0.4 <= last_s <= 1.4
+    assert (len(some) < len(every) - 6) == fewer  # six lie so far apart

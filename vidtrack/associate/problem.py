@@ -137,7 +137,7 @@ class Problem:
         )
 
 
-@kernel(error_model="numpy")
+@kernel
 def _logs(detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
     """(T,) log_missed and (N,) log_ratio from the factors (T,); VANISHING for ln 0."""
     missed, density, ratio, most = np.empty(len(inside)), np.empty(len(inside)), np.empty(len(row)), 0.0

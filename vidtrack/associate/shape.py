@@ -51,7 +51,7 @@ class Shape:
         return weighed.only(stays)
 
 
-@kernel(error_model="numpy")
+@kernel
 def _compare(
     row: Ints, measurement: Ints, d2: Floats, log_l: Floats, cost: Floats, most: Floats,
     predicted: Floats, boxes: Floats, sigma: float, overlap: float,

@@ -23,6 +23,7 @@ class CalibrateOptions(Options):
 
     site: Path
     picture: str | None
+    run: tuple[str, ...]
     json_to: str | None
 
 
@@ -32,12 +33,14 @@ class CalibrateOptions(Options):
 Examples:
   vidtrack calibrate site.toml
   vidtrack calibrate site.toml --picture traffic.mp4 -o check
+  vidtrack calibrate site.toml --run runs/traffic
   vidtrack calibrate site.toml --json -""",
 )
 @click.argument("site", type=click.Path(path_type=Path))
 @common("Folder for calibration.png and calibration.json.  [default: only printed]")
 @json_option
 @click.option("--picture", metavar="IMAGE|VIDEO", help="Draw a grid of metres over this, or over its first picture.")
+@click.option("--run", multiple=True, metavar="RUN", help="Also ask the traffic of this run: sizes, straight paths.")
 @receives(CalibrateOptions)
 def command(options: CalibrateOptions) -> int:
     """Check the calibration in SITE, a site.toml.
@@ -45,11 +48,16 @@ def command(options: CalibrateOptions) -> int:
     Prints how far each point is from where the fit puts it, and from where the other points alone put it; what a
     pixel is worth in metres, near and far; and how wrong speeds are by the calibration.
 
-    The exit code is 1 when the points contradict each other.
+    With --run also what the traffic says: how large its vehicles come out, whether the lanes of a road converge, and
+    whether straight paths bend as by a lens.
+
+    The exit code is 1 when the points contradict each other, or the traffic contradicts them.
     """
+    from vidtrack.cli.measure import doubts
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_folder
     from vidtrack.traffic.calibration.account import examined
+    from vidtrack.traffic.measures.by_traffic import by_traffic
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)
@@ -60,6 +68,11 @@ def command(options: CalibrateOptions) -> int:
     if background is not None:
         drawn = drawn.scaled(background.shape[1], background.shape[0])
     result = examined(drawn)
+    against = []
+    if options.run:
+        result.report["traffic"] = told = by_traffic(options.run, drawn)
+        against = doubts(told)
+        result.report["warnings"] += against
     folder = None
     if options.output is not None or background is not None:
         folder = open_folder(options.output, options.site.stem, options.force)
@@ -68,7 +81,7 @@ def command(options: CalibrateOptions) -> int:
         _print(result.report)
     if folder is not None:
         click.echo(folder)
-    return 1 if result.report["contradiction"] else 0
+    return 1 if result.report["contradiction"] or against else 0
 
 
 def first_picture(source: str) -> Image:
@@ -124,5 +137,30 @@ def _print(report: dict[str, Any]) -> None:
             f"The camera is {camera['height_m']:.2f} m above the road (standard deviation "
             f"{camera['height_sigma_m']:.2f} m); its focal length is {camera['focal_px']:.0f} px."
         )
+    if "traffic" in report:
+        for line in _agreed(report["traffic"]):
+            console.print(line)
     for line in report["warnings"]:
         console.print(f"[bold]Note:[/bold] {line}")
+
+
+def _agreed(traffic: dict[str, Any]) -> list[str]:
+    """Lines: what the traffic was asked."""
+    scale, straight = traffic["scale"], traffic["straightness"]
+    if scale is None:
+        lines = ["Too few vehicles to check the scale by their sizes."]
+    else:
+        lines = [
+            f"Vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
+            f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles)."
+        ]
+    if straight is None:
+        return [*lines, "Too few straight paths along one road to check whether they converge or bend."]
+    return [
+        *lines,
+        f"Straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
+        f"{straight['converging_deg']:.2f} degrees (standard deviation {straight['converging_sigma_deg']:.2f}, "
+        f"{straight['paths']} paths); by a lens the corner of the picture is off by "
+        f"{straight['lens_px']:.0f} px (standard deviation "
+        f"{straight['lens_sigma_px']:.0f}).",
+    ]

@@ -85,8 +85,8 @@ def command(options: MeasureOptions) -> None:
         write_json(found.report, options.json_to)
     if not options.quiet:
         click.echo(_told(found.report), err=True)
-        if found.report["scale"] and found.report["scale"]["off"]:
-            click.echo(_doubt(found.report["scale"]), err=True)
+        for doubt in doubts(found.report):
+            click.echo(f"vidtrack: {doubt}", err=True)
     if options.json_to != "-":
         click.echo(folder)
 
@@ -104,10 +104,26 @@ def _told(report: dict[str, Any]) -> str:
     )
 
 
-def _doubt(scale: dict[str, Any]) -> str:
-    """One line: the sizes of the vehicles contradict the calibration."""
-    return (
-        f"vidtrack: vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
-        f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the calibration: "
-        "speeds are off by as much"
-    )
+def doubts(report: dict[str, Any]) -> list[str]:
+    """What the sizes and the straight paths of vehicles say against the calibration, one line each."""
+    scale, straight, lines = report["scale"], report["straightness"], []
+    if scale and scale["off"]:
+        lines.append(
+            f"vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
+            f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the "
+            "calibration: speeds are off by as much"
+        )
+    if straight and straight["converges"]:
+        lines.append(
+            f"straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
+            f"{abs(straight['converging_deg']):.1f} degrees (standard deviation "
+            f"{straight['converging_sigma_deg']:.1f}, {straight['paths']} paths); if its lanes are parallel, a "
+            "point of the calibration is wrong: run vidtrack calibrate"
+        )
+    if straight and straight["bends"]:
+        lines.append(
+            f"straight paths bend as by a lens that moves the corner of the picture by {straight['lens_px']:.0f} px "
+            f"(standard deviation {straight['lens_sigma_px']:.0f}, {straight['paths']} paths); give the calibration "
+            "the lens's distortion"
+        )
+    return lines

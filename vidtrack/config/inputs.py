@@ -101,9 +101,6 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.quiet_s": ("radar.estimator", ("imm",)),
     "radar.manoeuvre_s": ("radar.estimator", ("imm",)),
     "radar.agile": ("radar.estimator", ("imm",)),
-    "radar.cell_range_m": ("radar.unresolved", (True,)),
-    "radar.cell_azimuth_deg": ("radar.unresolved", (True,)),
-    "radar.cell_elevation_deg": ("radar.unresolved", (True,)),
     "radar.pfa_max": ("radar.snr_db", (GIVEN,)),
     "radar.group_merge_m": ("radar.group_link_m", (GIVEN,)),
     "live.keep_pictures_s": ("events.pictures", (True,)),
@@ -114,6 +111,9 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
 """Groups and settings that have an effect only if another setting has one of these values."""
 
 _CELL = ("cell_range_m", "cell_azimuth_deg", "cell_elevation_deg")
+
+_EITHER = dict.fromkeys((f"radar.{name}" for name in _CELL), (("radar.unresolved", True), ("radar.snr_db", GIVEN)))
+"""Settings that have an effect if one of these others has its value."""
 
 _REPLACED: Mapping[str, tuple[str, ...]] = {
     "radar.snr_db": ("radar.detection_probability", "radar.clutter_density", "radar.clutter_map"),
@@ -138,6 +138,11 @@ def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     for part, (other, values) in _NEEDS.items():
         if _is_within(name, part):
             yield _OTHER_LIFE.get(kind, other) if other == "tracker.life" else other, values
+
+
+def needs_one_of(name: str) -> tuple[tuple[str, Any], ...]:
+    """Settings with values of which one is enough for this setting to have an effect; none: it depends on no such."""
+    return _EITHER.get(name, ())
 
 
 def is_own(kind: Input, name: str) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from vidtrack.config.group import read_toml
-from vidtrack.config.inputs import Input, is_own, needs, reads
+from vidtrack.config.inputs import Input, is_own, needs, needs_one_of, reads
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 
@@ -84,6 +84,9 @@ def _refuse_idle(kind: Input, settings: Settings, asked: Iterable[str]) -> None:
             wanted = " or ".join(_as_written(value) for value in values)
             now = _as_written(value_of(settings, other))
             complaints.append(f"setting {name} has no effect with {other}={now}; it needs {other}={wanted}")
+        elif (choices := needs_one_of(name)) and all(value_of(settings, other) != value for other, value in choices):
+            wanted = " or ".join(f"{other}={_as_written(value)}" for other, value in choices)
+            complaints.append(f"setting {name} has no effect here; it needs {wanted}")
     if complaints:
         raise ConfigError("\n".join(complaints))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 
@@ -16,6 +17,20 @@ from vidtrack.output.linefile import Every
 
 _PART_ROWS = 20_000  # 3 MB: rows buffered in memory, and rows in a group of the final file
 _PART_S = 60.0
+
+
+@contextmanager
+def memory_of_c() -> Iterator[None]:
+    """Context in which pyarrow takes its memory from the C library.
+
+    Its own allocator keeps some of what every thread has freed, and each part of a live run is finished by a new one.
+    """
+    before = pa.default_memory_pool()
+    pa.set_memory_pool(pa.system_memory_pool())
+    try:
+        yield
+    finally:
+        pa.set_memory_pool(before)
 
 
 class ParquetParts:

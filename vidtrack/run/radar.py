@@ -34,7 +34,7 @@ from vidtrack.radar.scans import Measurements, extent, measurements, surveyed
 from vidtrack.run.groups import Groups
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
-from vidtrack.tracking.clutter import ClutterMap
+from vidtrack.tracking.clutter import ClutterMap, EvenBox, EvenClutter
 from vidtrack.tracking.methods import gate, life, rule
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import NoPicture
@@ -152,8 +152,10 @@ def build_radar_tracker(
 
 def rates(radar: RadarSettings, found: Measurements, detection: float | None) -> Rates:
     """Detection probability and clutter density of the radar that made these measurements."""
-    mapped = radar.clutter_map and radar.clutter_density is None
-    where = ClutterMap(*extent(found), polar=bool(found.sensor.angles)) if mapped else None
+    where: EvenClutter | None = None
+    if radar.clutter_density is None:
+        box = extent(found)
+        where = ClutterMap(*box, polar=bool(found.sensor.angles)) if radar.clutter_map else EvenBox(*box)
     return Rates(detection, radar.clutter_density, surveyed(found), where)
 
 

@@ -17,6 +17,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import HOLD_S, LIVE_HOLD_S
 from vidtrack.output.folder import refuse_overwriting
 from vidtrack.output.sink import Step
+from vidtrack.output.stated import stated
 from vidtrack.recording.source import Recording, is_recording
 from vidtrack.run.live.checkpoint import Checkpoint
 from vidtrack.run.run import Extras, Pipeline
@@ -27,7 +28,7 @@ from vidtrack.tracks import TENTATIVE, Tracks
 from vidtrack.traffic.metres import footprints_of
 from vidtrack.traffic.site import read_site
 from vidtrack.video import background
-from vidtrack.video.background.disturbance import Disturbance
+from vidtrack.video.background.disturbance import PREVIEW_EVERY_S, Disturbance
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Background
@@ -80,7 +81,7 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
-            yield step.frame, step.shown, None if road is None else _stand(road, step.tracks)
+            yield step.frame, step.shown, None if road is None else _stand(road, stated(step).tracks)
 
 
 def _stand(road: Footprints, tracks: Tracks) -> Stand:
@@ -145,7 +146,7 @@ def look_ahead(source: Source, detector: Background, settings: Settings) -> None
     """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene."""
     seconds = settings.detector.disturbance.preview_s
     if isinstance(detector, Disturbance) and seconds:
-        detector.preview(source.opening(seconds, settings.source.end_s))
+        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S))
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

@@ -11,12 +11,14 @@ from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from vidtrack.arrays.types import Ints
 from vidtrack.compiled import CACHE
 from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
+from vidtrack.video.blobs.blobs import Blobs
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.foreground import Foreground
 from vidtrack.video.frame import Frame, Image
@@ -31,12 +33,17 @@ _SHIFTED_S = 8.0  # from then on the camera has moved
 def warm() -> None:
     """Compile what `vidtrack track VIDEO` needs, and keep it for later runs; a second call finds it compiled.
 
-    Tracker and blobs come first: a run that begins at the same time needs the detector first.
+    The tracker comes first, then blobs, then the detector: a run that begins at the same time needs them the other way
+    round, and two processes that need the same kernels in the same order wait for each other.
     """
     settings = Settings()
+    masks = [_drawn(np.zeros((_HEIGHT, _WIDTH), np.uint8), k, 255) for k in range(_PICTURES)]
     tracker = build_blob_tracker(settings.tracker, (_WIDTH, _HEIGHT), smooth=settings.output.smooth)
-    for k in range(_PICTURES):
-        mask = _drawn(np.zeros((_HEIGHT, _WIDTH), np.uint8), k, 255)
+    for k, mask in enumerate(masks):
+        tracker.predict(k / _FPS)
+        tracker.step(_labelled(mask, settings).scan(k / _FPS))
+    tracker = build_blob_tracker(settings.tracker, (_WIDTH, _HEIGHT))
+    for k, mask in enumerate(masks):
         foreground = Foreground(mask, mask.astype(np.float32), 1, weak=mask)
         tracker.step(explain(foreground, tracker.predict(k / _FPS), tracker.road, settings.blobs).scan(k / _FPS))
     tracker = build_blob_tracker(settings.tracker, (_WIDTH, _HEIGHT))
@@ -54,6 +61,18 @@ def warm_beside() -> None:
             [sys.executable, "-c", f"from {__name__} import warm; warm()"], stderr=subprocess.DEVNULL
         )
         register(helper.kill)
+
+
+def _labelled(mask: Image, settings: Settings) -> Blobs:
+    """Each region of a mask (h, w) as a blob, without a kernel of our own."""
+    label, count = ndimage.label(mask)
+    top, left, below, right = np.empty((4, count))
+    for i, (rows, columns) in enumerate(ndimage.find_objects(label)):
+        top[i], left[i], below[i], right[i] = rows.start, columns.start, rows.stop, columns.stop
+    box = np.column_stack([left, top, right - left, below - top])
+    cov = np.zeros((count, 2, 2))
+    cov[:, [0, 1], [0, 1]] = box[:, 2:] ** 2 / 12
+    return Blobs(box[:, :2] + box[:, 2:] / 2, cov, box, box[:, 2] * box[:, 3], np.full(count, 255.0), 1, settings.blobs)
 
 
 def _frames() -> Iterator[Frame]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.errors import ScanError
 from vidtrack.estimate.noise import BOX_JITTER, box_noise
 from vidtrack.scan import Scan
@@ -69,7 +69,7 @@ def best_cover(inner: Floats, outer: Floats) -> tuple[Ints, Floats]:
     return covers(inner, outer, outer[:, 0].argsort(kind="stable"))
 
 
-@kernel(error_model="numpy")
+@kernel
 def covers(inner: Floats, outer: Floats, order: Ints) -> tuple[Ints, Floats]:
     """`best_cover` by a sweep over the outer boxes in the order (M,) of their left edges."""
     index, share = np.full(len(inner), -1), np.zeros(len(inner))
@@ -92,7 +92,7 @@ def covers(inner: Floats, outer: Floats, order: Ints) -> tuple[Ints, Floats]:
     return index, share
 
 
-@kernel(inline="always")
+@part
 def common(a: Floats, b: Floats) -> float:
     """Area that two boxes (4,) have in common; 0 where one of them is not known."""
     wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
@@ -100,7 +100,7 @@ def common(a: Floats, b: Floats) -> float:
     return wide * high if wide > 0 and high > 0 else 0.0
 
 
-@kernel(error_model="numpy")
+@kernel
 def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: float) -> Ints:
     """(T,) for each inner box the outer one that overlaps it most, if it does so most in turn; -1 for none.
 
@@ -126,7 +126,7 @@ def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: flo
     return index
 
 
-@kernel(error_model="numpy")
+@kernel
 def doubles(start: Ints, box: Floats, score: Floats) -> Mask:
     """(N,) boxes (N, 4) that show an object once more: a better one of the same frame, itself no double, is the SAME.
 

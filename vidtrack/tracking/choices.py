@@ -44,7 +44,7 @@ def _heaviest(row: Ints, measurement: Ints, beta: Floats, beta0: Floats) -> Ints
     return best
 
 
-@kernel(error_model="numpy")
+@kernel
 def _of_taken(
     taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_ratio: Floats, log_missed: Floats,
     chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,

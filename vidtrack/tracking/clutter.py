@@ -14,8 +14,55 @@ for clutter at their places before they are confirmed."""
 _NEW = 0.1
 """Measurements of new targets per false one, as in LogRatio and LikelihoodGate; they begin anywhere."""
 
+_BEYOND = 0.1
+"""Share of the side of the surveyed box; it grows by so much beyond a measurement outside it."""
 
-class ClutterMap:
+
+class EvenClutter:
+    """The same density everywhere in what is surveyed."""
+
+    STATE: tuple[str, ...] = ()
+    grown = 1.0
+    """How many times as large as at first is what is surveyed."""
+
+    def reach(self, z: Floats) -> None:
+        """What is surveyed has no box."""
+
+    def at(self, z: Floats) -> Floats:
+        """Ones."""
+        return np.ones(len(z))
+
+    def forget(self, fade: float) -> None:
+        """Nothing is remembered."""
+
+    def learn(self, z: Floats, false: Floats) -> None:
+        """Nothing is learnt."""
+
+
+class EvenBox(EvenClutter):
+    """The same density everywhere in a box, which grows where measurements are outside.
+
+    low, high  (2,) corners of the box, on the first two axes of the measurements
+    """
+
+    STATE: tuple[str, ...] = ("low", "high", "grown")
+
+    def __init__(self, low: Floats, high: Floats) -> None:
+        self.low, self.high = np.asarray(low, float), np.asarray(high, float)
+        self.grown = 1.0
+
+    def reach(self, z: Floats) -> None:
+        """Extend the box to measurements (N, m), and by `_BEYOND` of its side where one is outside."""
+        if not len(z):
+            return
+        side = self.high - self.low
+        first, last = z[:, :2].min(axis=0), z[:, :2].max(axis=0)
+        self.low = np.where(first < self.low, first - _BEYOND * side, self.low)
+        self.high = np.where(last > self.high, last + _BEYOND * side, self.high)
+        self.grown *= float(((self.high - self.low) / side).prod())
+
+
+class ClutterMap(EvenBox):
     """The density of measurements of no known target at a place, over its mean in the whole box.
 
     New targets begin anywhere; false measurements are distributed by a Polya tree. The box is quartered, each quarter
@@ -24,14 +71,14 @@ class ClutterMap:
     With k^2 the density has no steps that the data do not show (M. Lavine, "Some aspects of Polya tree distributions
     for statistical modelling", Annals of Statistics 20(3), 1992).
 
-    low, high  (2,) corners of the box, on the first two axes of the measurements; what lies outside counts at its edge
+    low, high  (2,) corners of the box, on the first two axes of the measurements
     polar      whether these are range and azimuth, and not positions
     """
 
-    STATE = ("count",)
+    STATE = ("count", "low", "high", "grown")
 
     def __init__(self, low: Floats, high: Floats, polar: bool = False) -> None:
-        self.low, self.high = np.asarray(low, float), np.asarray(high, float)
+        super().__init__(low, high)
         self.polar = polar
         self.count: Floats = np.zeros((2**_LEVELS, 2**_LEVELS))
         """False measurements remembered in each cell."""
@@ -46,6 +93,17 @@ class ClutterMap:
             density, whole = (each.repeat(2, axis=0).repeat(2, axis=1) for each in (density, whole))
             density, whole = density * (4 * part + _WEIGHT * level**2) / (whole + _WEIGHT * level**2), part
         return (density + _NEW) / (1 + _NEW)
+
+    def reach(self, z: Floats) -> None:
+        """Extend the box to measurements (N, m); what was counted in a cell is spread evenly over its place."""
+        low, high = self.low, self.high
+        super().reach(z)
+        for axis in np.flatnonzero((low != self.low) | (high != self.high)):
+            old = np.linspace(low[axis], high[axis], len(self.count) + 1)
+            new = np.linspace(self.low[axis], self.high[axis], len(self.count) + 1)
+            common = np.minimum(new[1:, None], old[None, 1:]) - np.maximum(new[:-1, None], old[None, :-1])
+            share = np.maximum(common, 0.0) / np.diff(old)
+            self.count = share @ self.count if axis == 0 else self.count @ share.T
 
     def at(self, z: Floats) -> Floats:
         """(N,) relative density at measurements (N, m)."""
@@ -63,19 +121,3 @@ class ClutterMap:
         share = (z[:, :2] - self.low) / (self.high - self.low)
         row, column = np.clip((share * len(self.count)).astype(np.int64), 0, len(self.count) - 1).T
         return row, column
-
-
-class EvenClutter:
-    """The same density everywhere."""
-
-    STATE = ()
-
-    def at(self, z: Floats) -> Floats:
-        """Ones."""
-        return np.ones(len(z))
-
-    def forget(self, fade: float) -> None:
-        """Nothing is remembered."""
-
-    def learn(self, z: Floats, false: Floats) -> None:
-        """Nothing is learnt."""

@@ -8,7 +8,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.scan import Scan
-from vidtrack.tracking.clutter import ClutterMap, EvenClutter
+from vidtrack.tracking.clutter import EvenClutter
 
 MEMORY_S = 300.0
 """Time constant with which old scans are forgotten."""
@@ -25,7 +25,8 @@ class Rates:
 
     detection, clutter   one number for all, or (B,) one for each Monte Carlo run; density in px^-2, m^-2, ... per scan
     space                what the sensor surveys, in px^2, m^2, ...; None: the extent of all measurements so far
-    where                how the estimated clutter is distributed; None: evenly
+    where                how the estimated clutter is distributed; None: evenly. If it is in a box that measurements
+                         are outside of, the box and with it the space grow
 
     P_D: scans in which tracks were seen, of all scans of confirmed tracks that share no blob. Misses count once the
     track is seen again, by whatever station: those of a target that has gone say nothing of how well targets are seen.
@@ -42,7 +43,7 @@ class Rates:
         detection: Rate = 0.9,
         clutter: Rate = 1e-5,
         space: float | None = None,
-        where: ClutterMap | None = None,
+        where: EvenClutter | None = None,
     ) -> None:
         if detection is not None and not np.all((np.asarray(detection) >= 0) & (np.asarray(detection) <= 1)):
             raise ConfigError(f"detection probability is {detection}; it must lie in 0..1")
@@ -78,7 +79,7 @@ class Rates:
         """False measurements per scan and unit of the measurement space now, the mean over the runs."""
         if self._clutter is not None:
             return _mean(self._clutter)
-        space = float((self.high - self.low).prod()) if self._space is None else self._space
+        space = float((self.high - self.low).prod()) if self._space is None else self._space * self.where.grown
         return (self.false + 1) / (self.scans + 1) / space
 
     def as_dict(self) -> dict[str, float]:
@@ -93,7 +94,8 @@ class Rates:
         )
 
     def look(self, scan: Scan) -> None:
-        """Extend the surveyed space by this scan's measurements, unless it was given."""
+        """Extend the surveyed space by this scan's measurements, unless it was given without a box."""
+        self.where.reach(scan.z)
         if self._clutter is not None or self._space is not None or not len(scan):
             return
         reach = np.sqrt(3 * np.diagonal(scan.R, axis1=1, axis2=2))  # half the width of a uniform error

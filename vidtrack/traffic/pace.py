@@ -47,7 +47,7 @@ class Pace:
         return v, cov
 
 
-@kernel(error_model="numpy")
+@kernel
 def _follow(slot: Ints, t: Floats, place: Floats, by_px: Floats, state: Floats, v: Floats, cov: Floats) -> None:
     """Step through rows; state (T, _WIDTH) of each track: time, time of the last fit, x, y, vx, vy, P."""
     for i in range(len(slot)):
@@ -85,7 +85,7 @@ def _follow(slot: Ints, t: Floats, place: Floats, by_px: Floats, state: Floats, 
         cov[i] = P[2:, 2:]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _begin(now: Floats, t: float, place: Floats, by_px: Floats) -> None:
     """Write the state of a track that is seen for the first time."""
     now[:] = 0.0

@@ -76,13 +76,14 @@ class VideoFile:
                 return stamp - self._origin, chain([first], pictures)
         raise SourceError(f"no key picture of {self._path} before {self._from_s:g} s is found; it cannot be cut")
 
-    def between(self, begin_s: float, end_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
+    def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
         """(time, picture) of a span of time, decoded from the key frame before it; spans in any order.
 
+        Only pictures that lie `every_s` apart are needed; those between them are left out where that saves decoding.
         Where pictures have no stamps, or the place in the file is not found, the file is read from its beginning.
         Iterate over the whole file or over spans, not both.
         """
-        near = self._after_key_frame(begin_s)
+        near = self._after_key_frame(begin_s, end_s, every_s)
         first = next(near, None)
         if first is None or first[0] > begin_s + 1 / self.fps:
             again = VideoFile(self._path, self._settings, SourceStats(told=True))
@@ -95,18 +96,46 @@ class VideoFile:
             if time_s >= begin_s - ROUNDING_S:
                 yield time_s, picture
 
-    def _after_key_frame(self, begin_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
+    def _after_key_frame(self, begin_s: float, end_s: float, every_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
         """Pictures from the key frame before a time on; it ends at one without a stamp."""
         try:
             self._container.seek(int(self._origin + begin_s * self._ticks_per_s), stream=self._stream)
-            for packet in self._container.demux(self._stream):
+            packets = self._container.demux(self._stream)
+            if every_s and not self._is_avi:
+                packets = self._needed(packets, begin_s, end_s, every_s)
+            for packet in packets:
                 for picture in self._stream.codec_context.decode(packet):
                     stamp = self._stamp(picture)
                     if stamp is None:
                         return
-                    yield (stamp - self._origin) / self._ticks_per_s, picture
+                    yield self._time_s(stamp), picture
         except av.FFmpegError:  # damaged here, or without an index
             return
+
+    def _needed(
+        self, packets: Iterator[av.Packet], begin_s: float, end_s: float, every_s: float
+    ) -> Iterator[av.Packet]:
+        """The packets; of a span, the decoder drops pictures less than `every_s` apart that no other refers to."""
+        span: list[av.Packet] = []
+        for packet in packets:
+            span.append(packet)
+            if packet.pts is None or (packet.dts is not None and self._time_s(packet.dts) > end_s + ROUNDING_S):
+                break
+        wanted: set[int] = set()
+        next_s = begin_s
+        for stamp in sorted(packet.pts for packet in span if packet.pts is not None):
+            if self._time_s(stamp) > next_s - ROUNDING_S:
+                wanted.add(stamp)
+                next_s = self._time_s(stamp) + every_s
+        for packet in span:
+            spare = packet.pts is not None and packet.pts not in wanted
+            self._stream.codec_context.skip_frame = "NONREF" if spare else "DEFAULT"
+            yield packet
+        self._stream.codec_context.skip_frame = "DEFAULT"
+        yield from packets
+
+    def _time_s(self, stamp: int) -> float:
+        return (stamp - self._origin) / self._ticks_per_s
 
     @cached_property
     def _origin(self) -> int:

@@ -55,8 +55,8 @@ class ImageSequence:
                 continue
             yield index, index / self.fps, picture
 
-    def between(self, begin_s: float, end_s: float) -> Iterator[tuple[float, av.VideoFrame]]:
-        """(time, picture) of a span of time."""
+    def between(self, begin_s: float, end_s: float, every_s: float = 0.0) -> Iterator[tuple[float, av.VideoFrame]]:
+        """(time, picture) of a span of time; all, also those less than `every_s` apart."""
         first, last = ceil(begin_s * self.fps - 1e-6), floor(end_s * self.fps + 1e-6)
         for index in range(max(first, 0), min(last + 1, len(self._paths))):
             try:

@@ -126,12 +126,15 @@ class Source:
     ) -> None:
         self.close()
 
-    def opening(self, seconds: float, end_s: float | None) -> Iterator[Frame]:
-        """The frames of its first seconds, at most to end_s, from a second reading; their numbers are 0."""
+    def opening(self, seconds: float, end_s: float | None, every_s: float = 0.0) -> Iterator[Frame]:
+        """The frames of its first seconds, at most to end_s, from a second reading; their numbers are 0.
+
+        Some of those less than `every_s` apart may be missing.
+        """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
         with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
-            for picture in again.between(begin_s, end_s):
+            for picture in again.between(begin_s, end_s, every_s):
                 yield matched(to_frame(0, *picture), self._first)
 
     def close(self) -> None:

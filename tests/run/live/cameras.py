@@ -24,7 +24,7 @@ from vidtrack.video.live.connection import Stalled
 
 SYSTEM_PYTHON = "/usr/bin/python3"
 SERVER = Path(__file__).with_name("rtsp_server.py")
-HANG_S = 60.0
+HANG_S = 180.0
 """What takes longer hangs. Nothing is measured by it: a slow machine may take almost as long."""
 
 

@@ -272,3 +272,31 @@ def test_the_balance_is_of_what_was_lost_and_made(tmp_path):
     assert [row["outflow"] for row in rows] == [1, 0, 0, 1, 0, 0]
     assert [row["left_over"] for row in rows] == [0, 0, 1, -1, 0, 0]
     assert all(row["inflow"] - row["outflow"] - row["stored"] == row["left_over"] for row in rows)
+
+
+def test_who_passes_beside_an_entry_and_leaves_elsewhere_has_entered_there(tmp_path):
+    """The western gate reaches from 200 to 300 px, 10 px a metre: 1 m beside it is near enough, 3 m is not."""
+    gates = PLACE["gates"] | {"west": {"line": [[100, 200], [100, 300]], "role": "entry"}}
+    tracks = [
+        along(1, 10 + np.arange(0, 5, 0.04), np.arange(0, 5, 0.04) * 100 + 50, np.linspace(320, 220, 125)),
+        along(2, 20 + np.arange(0, 5, 0.04), np.arange(0, 5, 0.04) * 100 + 50, np.linspace(340, 240, 125)),
+        straight(3, 30.0, 50, 310, 100, 2),  # never leaves
+    ]
+    found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE | {"gates": gates})).tables
+    entries = [row for row in found["crossings"].to_pylist() if row["gate"] == "west"]
+    assert [(row["track_id"], row["reason"]) for row in entries] == [(1, "inferred")]
+    assert entries[0]["along_m"] == pytest.approx(11.0, abs=0.2)
+    assert {row["track_id"]: row["complete"] for row in found["trips"].to_pylist()} == {1: True, 2: False}
+
+
+def test_who_begins_waiting_at_an_entry_has_come_in_there(tmp_path):
+    """One stands 2 m behind the western entry when its track begins, and one 12 m behind it."""
+    t = np.arange(0, 10, 0.04)
+    tracks = [
+        along(track, begin + t, x + np.maximum(t - 3, 0) * 80, 240)
+        for track, begin, x in ((1, 10.0, 120), (2, 30.0, 220))
+    ]
+    found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE)).tables
+    entries = [row for row in found["crossings"].to_pylist() if row["gate"] == "west"]
+    assert [(row["track_id"], row["reason"]) for row in entries] == [(1, "inferred")]
+    assert {row["track_id"]: row["complete"] for row in found["trips"].to_pylist()} == {1: True, 2: False}

@@ -19,6 +19,7 @@ from vidtrack.output.folder import usable
 from vidtrack.output.intervals.days import zone_of
 from vidtrack.output.linked import refuse_link
 from vidtrack.output.lock import exclusive
+from vidtrack.output.parquet import memory_of_c
 from vidtrack.output.sink import Step
 from vidtrack.output.status import Account, StatusBoard, trouble_of
 from vidtrack.recording.event_pictures import EventPictures
@@ -112,6 +113,7 @@ class LiveRun:
             stack.callback(self._recorder.close)
             self._source = source = stack.enter_context(self._open_source(connect, stats))
             stack.enter_context(frame_by_frame(settings.detector.kind))
+            stack.enter_context(memory_of_c())
             self._checkpoint = self._restored(explain=extras.explain)
             if extras.state or extras.record:
                 self._checkpoint.gather()  # raises ConfigError for a detector that cannot be saved

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.estimate.noise import edge_sigma
 from vidtrack.tracking.boxes import covers
 
@@ -13,7 +13,7 @@ ONE_SIDED = 4.0
 """Part of a vehicle is hidden if an edge is off by so many standard deviations, and the opposite one by at most one."""
 
 
-@kernel(error_model="numpy")
+@kernel
 def claims(
     predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats, order: Ints,
     cover: float, growth: float, edge: float, pixel: float,
@@ -38,7 +38,7 @@ def claims(
     return shared, hides
 
 
-@kernel
+@part
 def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, order: Ints, cover: float) -> Ints:
     """(T,) the blob each track shares with others, or lies on without being assigned it; -1 for all others."""
     shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
@@ -62,7 +62,7 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, ord
     return shared
 
 
-@kernel(error_model="numpy")
+@part
 def _changed(box: Floats, blob: Floats, growth: float, edge: float, pixel: float) -> bool:
     """Whether a blob (4,) has another size than the vehicle's box (4,), or one edge where it was and the other not."""
     ratio = blob[2] * blob[3] / (box[2] * box[3])

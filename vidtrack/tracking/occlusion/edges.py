@@ -12,7 +12,7 @@ UNKNOWN = 1e8
 """Variance of a coordinate without an edge."""
 
 
-@kernel(error_model="numpy")
+@kernel
 def from_edges(
     predicted: Floats, box: Floats, var: Floats, blob: Ints, blobs: Floats, cut: Mask, hides: Mask,
     gate: float, edge: float, pixel: float,

@@ -82,7 +82,7 @@ def _sides(box: Floats, edges: tuple[float, float, float, float], reach: float) 
     return sides
 
 
-@kernel(error_model="numpy")
+@kernel
 def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float]) -> Floats:
     """(N,) product of both axes' normal probabilities between the edges; a pixel is a unit square around its place."""
     inside = np.ones(len(x))

@@ -64,7 +64,7 @@ def _whole(box: Floats, right: float, bottom: float) -> Mask:
     return whole
 
 
-@kernel(error_model="numpy")
+@kernel
 def _growth(before: Floats, after: Floats) -> Floats:
     """(N, 4) bounded ratios of typical sizes (N, 2), for both corners and both sides of boxes; 1 where unknown."""
     growth = np.ones((len(before), 4))

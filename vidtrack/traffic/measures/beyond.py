@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.crossings import confidence
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, step_rows
 from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
 from vidtrack.traffic.measures.stretches import End, Lives
+from vidtrack.traffic.measures.trips import at_edge, first_of
 
 REACH_S = 1.5
 """s; longest time between the passing and the track"""
@@ -22,8 +23,51 @@ _LEAST_M_S, _SURE = 1.5, 3.0
 _LIKELY = 0.5
 _ELSEWHERE_S = 4.0
 """s; the mean time in which a vehicle has come from elsewhere, such as out of another one's blob"""
+_AT_M, _AT_SURE = 3.0, 0.8
+"""m; from a gate, where a vehicle that began or ended there has passed it"""
 _ALONE_S, _ALONE_M = 1.0, 1.75
 """s, m along the gate; another passing so near is that of the same vehicle."""
+
+
+def at_gates(
+    gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats, may: Mask
+) -> tuple[Passed, Floats]:
+    """The entries of vehicles that began at one and left elsewhere, the exits where others ended; how likely (P,).
+
+    passed  all that is known
+    may     (L + 1, L + 1) whether a trip may go from a leg to another
+    """
+    vehicle = joins.vehicles(len(lives.track))
+    enters, leaves = gates.ways(passed.gate, passed.side)
+    order, who, tracks = np.argsort(passed.t, kind="stable"), vehicle[passed.track], len(vehicle)
+    entry = first_of(who, order[enters[order]], tracks)
+    exit_ = first_of(who, order[leaves[order]][::-1], tracks)
+    leg = np.append(gates.leg[passed.gate], -1)
+    begins, ends = np.ones((2, tracks), bool)
+    begins[joins.after] = ends[joins.before] = False
+    parts = []
+    for end, edges, lacks, other, inwards in (
+        (lives.head, spans[:, 0], begins & (entry[vehicle] < 0) & (exit_[vehicle] >= 0), leg[exit_[vehicle]], True),
+        (lives.tail, spans[:, 1], ends & (exit_[vehicle] < 0) & (entry[vehicle] >= 0), leg[entry[vehicle]], False),
+    ):
+        track = np.flatnonzero(lacks & np.isfinite(end.t) & ~at_edge(end.t, edges))
+        meant = gates.role("entry" if inwards else "exit", "both")
+        gate, along, far = gates.nearest(end.xy[track], meant)
+        legs = gates.leg[gate], other[track]
+        near = (far < _AT_M) & may[legs if inwards else legs[::-1]]
+        parts.append(_stood(gates, end, track[near], gate[near], along[near], far[near], inwards))
+    found = parts[0].and_also(parts[1])
+    found = found.only(_alone(found, passed))
+    return found, np.full(len(found), _AT_SURE)
+
+
+def _stood(gates: Gates, end: End, track: Ints, gate: Ints, along: Floats, far: Floats, inwards: bool) -> Passed:
+    """Passings of gates by stretches where they began or ended, so far away."""
+    inward = gates.inward[gate]
+    no, unknown = np.zeros(len(track), bool), np.full(len(track), np.nan)
+    sigma = np.sqrt(end.spread[track, 0])
+    side = inward if inwards else 1 - inward
+    return Passed(end.t[track], gate, track, side, along, sigma, far, far, no, no, unknown, unknown, unknown, unknown)
 
 
 def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats) -> tuple[Passed, Floats]:

@@ -55,14 +55,58 @@ class Gates:
         (dx, dy), (x, y) = (ends[1] - ends[0]).T, (middle - ends[0]).T
         return (dx * y - dy * x >= 0).astype(np.int64)
 
+    @property
+    def length(self) -> Floats:
+        """(G,) lengths of the gates."""
+        last = self.first[1:] - 1
+        return np.asarray(self.begin[last] + np.linalg.norm(self.segment[last, 2:] - self.segment[last, :2], axis=1))
+
+    def beside(self, gate: Ints, along: Floats) -> Mask:
+        """(N,) whether places on gates (N,), so far along them (N,), are beyond their ends."""
+        return np.asarray((along < 0) | (along > self.length[gate]))
+
+    def with_beside(self, by: float) -> tuple[Floats, Floats, Ints]:
+        """`segment`, `begin` and `first` of these gates, and then of as many that lie at both ends of each."""
+        first, last = self.first[:-1], self.first[1:] - 1
+        step = self.segment[:, 2:] - self.segment[:, :2]
+        more = by * step / np.linalg.norm(step, axis=1)[:, None]
+        start, end = self.segment[first, :2], self.segment[last, 2:]
+        before, after = np.hstack([start - more[first], start]), np.hstack([end, end + more[last]])
+        count = len(self.segment)
+        return (
+            np.concatenate([self.segment, np.hstack([before, after]).reshape(-1, 4)]),
+            np.concatenate([self.begin, np.column_stack([np.full(len(self), -by), self.length]).ravel()]),
+            np.concatenate([self.first, count + 2 + 2 * np.arange(len(self))]),
+        )
+
     def place(self, gate: Ints, along: Floats) -> Floats:
-        """(N, 2) the places on gates (N,) so far along them (N,)."""
+        """(N, 2) the places on gates (N,), or beside them, so far along them (N,)."""
         owner = np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
         apart = self.begin.max(initial=0) + np.abs(along).max(initial=0) + 1.0  # one axis for all gates
         s = np.searchsorted(self.begin + apart * owner, along + apart * gate, side="right") - 1
+        s = np.maximum(s, self.first[gate])  # before the first end
         start, end = self.segment[s, :2], self.segment[s, 2:]
         ahead = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
         return np.asarray(start + (along - self.begin[s])[:, None] * ahead)
+
+    def nearest(self, xy: Floats, among: Mask | None = None) -> tuple[Ints, Floats, Floats]:
+        """(N,) the gates that are nearest to points (N, 2), the places along them, and how far they are.
+
+        among  (G,) the gates that are looked at; None: all
+        """
+        owner = np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
+        start, step = self.segment[:, :2], self.segment[:, 2:] - self.segment[:, :2]
+        share = np.clip(np.einsum("nsi,si->ns", xy[:, None] - start, step) / np.sum(step**2, axis=1), 0, 1)
+        far = np.linalg.norm(xy[:, None] - start - share[..., None] * step, axis=2)
+        if among is not None:
+            far[:, ~among[owner]] = np.inf
+        s, n = np.argmin(far, axis=1), np.arange(len(xy))
+        return owner[s], self.begin[s] + share[n, s] * np.linalg.norm(step[s], axis=1), far[n, s]
+
+    def ways(self, gate: Ints, side: Ints) -> tuple[Mask, Mask]:
+        """(N,) whether passings of gates (N,) to a side (N,) enter, and whether they leave."""
+        both, inwards = self.role("both")[gate], self.inward[gate] == side
+        return self.role("entry")[gate] | (both & inwards), self.role("exit")[gate] | (both & ~inwards)
 
     def role(self, *wanted: str) -> Mask:
         """(G,) whether a gate has one of these roles."""

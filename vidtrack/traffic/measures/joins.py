@@ -27,7 +27,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.rows import Rows, off_road
 from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M_S, STANDING_JOLT, End, Lives
 
-LONGEST_S = 8.0
+LONGEST_S = 20.0
 _ROUNDS, _PASSES = 4, 30
 """In which the rate of chance is found, and of belief propagation"""
 _LOST_S = 2.0

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.traffic.measures.beyond import beyond
+from vidtrack.traffic.measures.beyond import at_gates, beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing, lasting
 from vidtrack.traffic.measures.stretches import Lives
-from vidtrack.traffic.measures.trips import Trips, at_edge, trips_of
+from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,18 +47,25 @@ def journeys(
     allowed  pairs of legs; none: all but turning back
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
-    passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     may = _may(gates, allowed)
+    passed = passed.only(~gates.beside(passed.gate, passed.along) | _needed(gates, passed, may))
+    passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     if metres:
         passed = passed.only(~_of_others(gates, passed, lives, may))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins, passed)
-    probability = np.concatenate([confidence(passed), joins.probability[across.track]])
-    reason = [*reasons(passed), *(["joined"] * len(across))]
+    beside = gates.beside(passed.gate, passed.along)
+    sure = np.where(beside, _BESIDE_SURE, 1.0) * confidence(passed)
+    told = ["inferred" if off else reason for off, reason in zip(beside.tolist(), reasons(passed), strict=True)]
+    probability = np.concatenate([sure, joins.probability[across.track]])
+    reason = [*told, *(["joined"] * len(across))]
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
     if metres:
         inferred, sure = beyond(gates, passed, lives, joins, spans)
+        probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
+        passed = passed.and_also(inferred)
+        inferred, sure = at_gates(gates, passed, lives, joins, spans, may)
         probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
         passed = passed.and_also(inferred)
     order = np.argsort(passed.t, kind="stable")
@@ -71,6 +78,8 @@ def journeys(
     return Journeys(passed, probability, reason, joins, vehicle, trips)
 
 
+_BESIDE_SURE = 0.8
+"""That a vehicle passed a gate which its path missed by a little, if it must have come or gone there or elsewhere"""
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 
@@ -82,15 +91,28 @@ def _may(gates: Gates, allowed: Sequence[tuple[str, str]]) -> Mask:
     return may
 
 
-def _ways(gates: Gates, passed: Passed) -> tuple[Mask, Mask]:
-    """(P,) whether a passing enters, and whether it leaves."""
-    both, inwards = gates.role("both")[passed.gate], gates.inward[passed.gate] == passed.side
-    return gates.role("entry")[passed.gate] | (both & inwards), gates.role("exit")[passed.gate] | (both & ~inwards)
+def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
+    """(P,) passings beside a gate without which a trip that may be would have no entry, or no exit."""
+    beside = gates.beside(passed.gate, passed.along)
+    drawn = ~beside
+    k = np.flatnonzero(beside)
+    beside[k] = gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0] == passed.gate[k]
+    leg, inwards = gates.leg[passed.gate], gates.inward[passed.gate] == passed.side
+    enters, leaves = gates.ways(passed.gate, passed.side)
+    tracks = int(passed.track.max(initial=-1)) + 1
+    order = np.argsort(passed.t, kind="stable")
+    first_in = first_of(passed.track, order[(enters & drawn)[order]], tracks)
+    last_out = first_of(passed.track, order[(leaves & drawn)[order]][::-1], tracks)
+    entry, exit_ = first_in[passed.track], last_out[passed.track]
+    t, leg_of = np.append(passed.t, np.nan), np.append(leg, -1)
+    enters &= beside & inwards & (entry < 0) & (t[exit_] > passed.t) & may[leg, leg_of[exit_]]
+    leaves &= beside & ~inwards & (exit_ < 0) & (t[entry] < passed.t) & may[leg_of[entry], leg]
+    return np.asarray(enters | leaves)
 
 
 def _of_others(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
     """(P,) exits of a movement that may not be, passed after the stretch was seen alone for the last time."""
-    enters, leaves = _ways(gates, passed)
+    enters, leaves = gates.ways(passed.gate, passed.side)
     leg = gates.leg[passed.gate]
     came = np.full(len(lives.track), -1)
     entry = np.flatnonzero(enters)[::-1]
@@ -100,7 +122,7 @@ def _of_others(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
 
 def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:
     """Joins of stretches that end after an entry or before an exit, and of those that begin so."""
-    enters, leaves = _ways(gates, passed)
+    enters, leaves = gates.ways(passed.gate, passed.side)
     event = np.flatnonzero(enters | leaves)
     event = event[np.argsort(passed.t[event], kind="stable")]
     first, last = np.full((2, len(lives.track)), -1)

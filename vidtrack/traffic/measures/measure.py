@@ -13,13 +13,14 @@ from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.measures.by_traffic import contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.passing import REACH_M, REACH_PX, Passing
+from vidtrack.traffic.measures.passing import BESIDE_M, REACH_M, REACH_PX, Passing
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
@@ -52,10 +53,10 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     drawn = {size: site.scaled(*size) for size in sizes}
     grounds = {size: None if one.calibration is None else calibrated(one) for size, one in drawn.items()}
     gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
-    reach = REACH_PX if site.calibration is None else REACH_M
+    reach, beside = (REACH_PX, 0.0) if site.calibration is None else (REACH_M, BESIDE_M)
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     metres, ground = site.calibration is not None, grounds[sizes[0]]
-    reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, reach)
+    reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, reach, beside)
     staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
     for whole in reader:
         rows = stretches.add(whole)
@@ -94,7 +95,7 @@ class _Figures:
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
-        self.scale = None if found is None else found.scale
+        self.against = contradicting(found)
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
         whole = whole_tracks(None if found is None else found.classes, lives.length, site.classes)
@@ -144,7 +145,7 @@ class _Figures:
             "impossible_movements": [
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
-            "scale": None if self.scale is None else self.scale.told(),
+            **self.against,
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }

@@ -2,7 +2,8 @@
 
 A track passes a gate when the step between two of its positions meets the gate's line. If it then comes back before it
 was away from the gate by its margin, neither passing counts: it jitters or stands on the line. One that is last seen
-beyond the gate has passed, however near.
+beyond the gate has passed, however near. Gates may be looked at as if they were longer at both ends: what passes beside
+them has a place on the gate below 0 or beyond its length.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from vidtrack.traffic.measures.rows import Rows
 
 REACH_M, REACH_PX = 10.0, 100.0
 """How far from a gate distances are looked at: many times what positions are off."""
+BESIDE_M = 2.0
+"""m; how far beside a gate a vehicle may have been that is known to have passed there: positions are off by as much"""
 
 _BACK_S = 2.0
 """s; who passes a gate and comes back so soon jitters, or others hide a part of it"""
@@ -91,13 +94,17 @@ class Passed:
 class Passing:
     """Takes blocks of rows in order of time; remembers each track's last position and its side of each gate.
 
-    reach  distances from a gate beyond it are taken for this, in the unit of positions
+    reach   distances from a gate beyond it are taken for this, in the unit of positions
+    beside  by how much gates are longer at both ends
     """
 
-    def __init__(self, gates: Gates, reach: float) -> None:
-        self._gates = gates
-        self._reach = reach
-        segment, first = gates.segment, gates.first
+    def __init__(self, gates: Gates, reach: float, beside: float = 0.0) -> None:
+        self._gates, self._reach = gates, reach
+        self._segment, self._begin, self._first = (
+            gates.with_beside(beside) if beside else (gates.segment, gates.begin, gates.first)
+        )
+        segment, first = self._segment, self._first
+        lines = len(first) - 1
         low = np.minimum(segment[:, :2], segment[:, 2:])
         high = np.maximum(segment[:, :2], segment[:, 2:])
         self._frame = np.column_stack(
@@ -107,8 +114,8 @@ class Passing:
             ]
         )
         self._state = np.full((0, 7), np.nan)
-        self._far = np.zeros((0, len(gates)))
-        self._last = np.full((0, len(gates)), -1)
+        self._far = np.zeros((0, lines))
+        self._last = np.full((0, lines), -1)
         self._way = np.full((0, 3), np.nan)
         self._real = np.zeros((0, 9))
         self._whole = np.zeros((0, 7), np.int64)
@@ -127,12 +134,12 @@ class Passing:
         values = np.column_stack([rows.t, rows.xy, rows.sigma, speed, rows.speed_sigma, rows.speed_shared])
         row = 0
         while row < len(rows):
-            if self._count + len(self._gates) > len(self._whole):
-                more = 2 * len(self._whole) + 64 * len(self._gates)
+            if self._count + len(self._frame) > len(self._whole):
+                more = 2 * len(self._whole) + 64 * len(self._frame)
                 self._real, self._whole = _longer(self._real, more, 0.0), _longer(self._whole, more, 0)
             row, self._count = _look(
                 row, self._count, values, rows.track, rows.margin, rows.seen, rows.merged,
-                self._gates.segment, self._gates.begin, self._gates.first, self._frame, self._reach,
+                self._segment, self._begin, self._first, self._frame, self._reach,
                 self._state, self._way, self._far, self._last, self._real, self._whole,
             )  # fmt: skip
 
@@ -150,7 +157,7 @@ class Passing:
         real, whole = real[kept], whole[kept]
         return Passed(
             t=real[:, TIME],
-            gate=whole[:, GATE],
+            gate=whole[:, GATE] % max(len(self._gates), 1),
             track=whole[:, TRACK],
             side=whole[:, SIDE],
             along=real[:, ALONG],

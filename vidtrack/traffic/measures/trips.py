@@ -59,16 +59,16 @@ def trips_of(passed: Passed, gates: Gates, vehicle: Ints, begin: Floats, end: Fl
     leg = np.append(gates.leg[passed.gate], -1)
     inwards = gates.inward[passed.gate] == passed.side
     enters, leaves = (gates.role(role, "both")[passed.gate] for role in ("entry", "exit"))
-    entry = _first(vehicle, np.flatnonzero(enters), len(begin))
+    entry = first_of(vehicle, np.flatnonzero(enters), len(begin))
     t = np.append(passed.t, np.nan)
-    exit_ = _first(vehicle, np.flatnonzero(leaves & ~(passed.t <= t[entry][vehicle]))[::-1], len(begin))
-    wrong_in = _first(vehicle, np.flatnonzero(gates.role("exit")[passed.gate] & inwards), len(begin))
+    exit_ = first_of(vehicle, np.flatnonzero(leaves & ~(passed.t <= t[entry][vehicle]))[::-1], len(begin))
+    wrong_in = first_of(vehicle, np.flatnonzero(gates.role("exit")[passed.gate] & inwards), len(begin))
     left = (entry < 0) & (exit_ >= 0) & (t[wrong_in] < t[exit_]) & (leg[wrong_in] != leg[exit_])
     entry = np.where(left, wrong_in, entry)
     entered = t[entry]  # NaN without an entry
     wrong_out = gates.role("entry")[passed.gate] & ~inwards & (passed.t > entered[vehicle])
     wrong_out &= leg[:-1] != leg[entry][vehicle]
-    exit_ = np.where(exit_ < 0, _first(vehicle, np.flatnonzero(wrong_out)[::-1], len(begin)), exit_)
+    exit_ = np.where(exit_ < 0, first_of(vehicle, np.flatnonzero(wrong_out)[::-1], len(begin)), exit_)
     who = np.flatnonzero((entry >= 0) | (exit_ >= 0))
     from_s = np.where(entry[who] >= 0, entered[who], begin[who])
     to_s = np.where(exit_[who] >= 0, t[exit_[who]], end[who])
@@ -84,8 +84,8 @@ def at_edge(t: Floats, edges: Floats) -> Mask:
     return np.asarray((np.abs(t[:, None] - edges) < _EDGE_S).any(axis=1))
 
 
-def _first(vehicle: Ints, passings: Ints, vehicles: int) -> Ints:
-    """(V,) the first of these passings of each vehicle, -1: none."""
+def first_of(vehicle: Ints, passings: Ints, vehicles: int) -> Ints:
+    """(V,) the first of these passings (indices, in order) of each vehicle, -1: none."""
     found = np.full(vehicles, -1)
     found[vehicle[passings[::-1]]] = passings[::-1]
     return found

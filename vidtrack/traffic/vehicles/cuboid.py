@@ -16,7 +16,7 @@ LEFT, TOP, RIGHT, BOTTOM = range(4)
 X, Y, LENGTH, WIDTH, HEIGHT = range(5)
 
 
-@kernel(error_model="numpy")
+@kernel
 def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_state: Floats) -> float:
     """Write the edges (4,) px of the box of a cuboid and their derivatives (4, 5); returns px per metre there.
 

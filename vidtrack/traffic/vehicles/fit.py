@@ -41,6 +41,10 @@ _HEADING_M = 4.0
 _DRIFT = 0.006
 """Standard deviation of a speed, as a share, because shadows and corners that come into view move the edges along: the
 errors of the vehicles of one site lean to one side by as much"""
+_WALKER_M, _GAIT_M_S = 1.2, 0.1
+"""m and m/s; who is no longer walks: legs and arms move the edges to and fro"""
+_ROUNDING_M = 1.2
+"""m; a body is no cuboid. As it turns, the points that its edges rest on move along it by as much in a radian"""
 _LEAST_MISFIT = 0.05
 """Of noise as it is stated above: it is not taken to be less, however well a short track fits."""
 _BAND = 4
@@ -49,7 +53,7 @@ _LEAST_KNOTS, _LEAST_PATH_M, _SPEED_KNOTS = 3, 2.0, 4
 """For a size; a speed needs more."""
 
 
-@kernel(error_model="numpy")
+@kernel
 def fit(
     first: Ints, t: Floats, edge: Floats, rows: Floats, start: Floats, G: Floats, up: Floats,
     asked_of: Ints, asked: Floats, path: Floats, size: Floats, cov: Floats, quality: Floats, speed: Floats,
@@ -104,12 +108,12 @@ def fit(
         if b - a < _SPEED_KNOTS:
             continue
         for w in range(asked_of[i], asked_of[i + 1]):
-            _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], cov[i], quality[i], speed[w])
+            _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], size[i], cov[i], quality[i], speed[w])
             speed[w, 4] += a
             speed[w, 5] += a
 
 
-@kernel(error_model="numpy")
+@kernel
 def _headings(path: Floats, heading: Floats) -> None:
     """Write unit vectors (K, 2) along a path (K, 2), over some metres of it."""
     last = len(path) - 1
@@ -124,7 +128,7 @@ def _headings(path: Floats, heading: Floats) -> None:
         heading[k, 0], heading[k, 1] = dx / far, dy / far
 
 
-@kernel(error_model="numpy")
+@kernel
 def _residuals(
     edge: Floats, rows: float, p: Floats, e: Floats, size: Floats, G: Floats, up: Floats, coarse: float,
     state: Floats, model: Floats, by_state: Floats, residual: Floats, by_size: Floats, weight: Floats,
@@ -155,7 +159,7 @@ def _residuals(
     return total, strange
 
 
-@kernel(error_model="numpy")
+@kernel
 def _normal(
     t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
     coarse: float, band: Floats, right: Floats, whole: Floats, rest: Floats,
@@ -206,7 +210,7 @@ def _normal(
     return total / max(count, 1), strange / max(count, 1)
 
 
-@kernel(error_model="numpy")
+@kernel
 def _factor(band: Floats) -> None:
     """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place."""
     for i in range(len(band)):
@@ -221,7 +225,7 @@ def _factor(band: Floats) -> None:
                 band[i, d] = value / band[j, 0]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _solve(band: Floats, right: Floats) -> None:
     """Solve for all right sides (n, m), in place, with the factor."""
     n = len(band)
@@ -239,7 +243,7 @@ def _solve(band: Floats, right: Floats) -> None:
             right[i, c] /= band[i, 0]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) -> None:
     """Take the path out of the size's equations (Schur complement): coupling (2 K, SIZE), solved (2 K, SIZE + 1)."""
     for k in range(len(coupling)):
@@ -249,10 +253,11 @@ def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) ->
             rest[s] -= coupling[k, s] * solved[k, SIZE]
 
 
-@kernel(error_model="numpy")
+@kernel
 def _speed(
-    t: Floats, path: Floats, asked: float, band: Floats, right: Floats, cov: Floats, misfit: float, speed: Floats
-) -> None:
+    t: Floats, path: Floats, asked: float, band: Floats, right: Floats, size: Floats, cov: Floats, misfit: float,
+    speed: Floats,
+) -> None:  # fmt: skip
     """Write the slope of the path at a time, and its error (6,)."""
     if not t[0] <= asked <= t[-1]:
         return
@@ -275,4 +280,18 @@ def _speed(
     for s in range(SIZE):
         for r in range(SIZE):
             variance += by_size[s] * cov[s, r] * by_size[r] * misfit
-    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance + (_DRIFT * v) ** 2), ex, ey, i, j
+    variance += (_DRIFT * v) ** 2 + (_ROUNDING_M * _turning(t, path, i, j)) ** 2
+    if size[0] < _WALKER_M:
+        variance += _GAIT_M_S**2
+    speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance), ex, ey, i, j
+
+
+@kernel
+def _turning(t: Floats, path: Floats, i: int, j: int) -> float:
+    """rad/s; by how much the path turns around the step from i to j."""
+    a, b = max(i - 1, 0), min(j + 1, len(t) - 1)
+    if a == i or b == j:
+        return 0.0
+    before = np.arctan2(path[i, 1] - path[a, 1], path[i, 0] - path[a, 0])
+    after = np.arctan2(path[b, 1] - path[j, 1], path[b, 0] - path[j, 0])
+    return ((after - before + np.pi) % (2 * np.pi) - np.pi) / ((t[b] + t[j] - t[i] - t[a]) / 2)

@@ -78,7 +78,7 @@ class Knotting:
         self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))
 
 
-@kernel(error_model="numpy")
+@kernel
 def _mean(knot: Floats, done: Floats) -> None:
     """Write a knot (COLUMNS,) as mean time, four mean edges, rows (6,)."""
     done[0] = knot[_TIME] / knot[_ROWS]
@@ -93,7 +93,7 @@ def _means(knots: Floats, done: Floats) -> None:
         _mean(knots[i], done[i])
 
 
-@kernel(error_model="numpy")
+@kernel
 def _gather(track: Ints, t: Floats, xy: Floats, edge: Floats, open_: Floats, who: Ints, done: Floats) -> int:
     """Add rows to the open knots (T, COLUMNS); writes the tracks and values of those that end, returns their number."""
     count = 0

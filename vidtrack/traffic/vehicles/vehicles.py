@@ -13,6 +13,7 @@ from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
 from vidtrack.traffic.vehicles.knots import Knots, Knotting
 from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
+from vidtrack.traffic.vehicles.straightness import Paths, Straightness, paths_of, straightness
 
 _BATCH = 4096
 """Tracks that are fitted at a time, which bounds the memory."""
@@ -29,11 +30,12 @@ class Speeds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """Speeds that were asked for; the classes of T tracks, NaN where there is no fit; the calibration's scale."""
+    """Speeds that were asked for; classes of T tracks, NaN where there is no fit; what contradicts the calibration."""
 
     speeds: Speeds
     classes: Classified
     scale: Scale | None
+    straightness: Straightness | None
 
 
 class Vehicles:
@@ -59,16 +61,18 @@ class Vehicles:
         knots = self._knotting.knots(tracks)
         if len(knots.t) == 0:
             return None
-        speeds, sizes = np.full((3, len(t)), np.nan), []
+        speeds, sizes, driven = np.full((3, len(t)), np.nan), [], []
         for begin in range(0, tracks, _BATCH):
             asked = np.flatnonzero((track >= begin) & (track < begin + _BATCH))
             some = knots.between(begin, min(begin + _BATCH, tracks))
-            speeds[:, asked], found = _fitted(self._ground, some, track[asked] - begin, t[asked])
+            speeds[:, asked], found, paths = _fitted(self._ground, some, track[asked] - begin, t[asked])
+            driven.append(paths)
             sizes.append(replace(found, track=found.track + begin))
         told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
         told = _best(replace(told, track=vehicle[told.track]))
         scale = scale_of(told.information, told.vector, told.speed)
-        return Fitted(Speeds(*speeds), _classes(told, vehicle), scale)
+        straight = Paths(*(np.concatenate([getattr(one, name) for one in driven]) for name in Paths.__slots__))
+        return Fitted(Speeds(*speeds), _classes(told, vehicle), scale, straightness(straight))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,8 +89,11 @@ class _Sizes:
     speed: Floats
 
 
-def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Floats, _Sizes]:
-    """(3, W) speeds as in `Speeds`, and sizes, of some tracks; each time is looked up in the piece that it lies in."""
+def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Floats, _Sizes, Paths]:
+    """(3, W) speeds as in `Speeds`, sizes, and straight paths, of some tracks.
+
+    Each time is looked up in the piece that it lies in.
+    """
     with np.errstate(invalid="ignore"):
         place = ground.metres(ground.inside(_foot(knots.edge)))
     sure = np.isfinite(place[:, 0])
@@ -107,7 +114,8 @@ def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Float
     result = np.empty((3, len(t)))
     result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
     result[2, order] = _by_shared(ground, knots.t, path, speed)
-    return result, _sizes(knots.t, first, owner, path, size, cov, misfit)
+    driven = paths_of(ground, path, first, np.isfinite(misfit))
+    return result, _sizes(knots.t, first, owner, path, size, cov, misfit), driven
 
 
 def _by_shared(ground: Ground, t: Floats, path: Floats, speed: Floats) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.video.background.scene import BEAM, Levels
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import OBJECTS, SIDES, connect, find_runs
@@ -34,7 +34,7 @@ def _dark(scene: Levels, limit: np.float32) -> bool:
     return 2 * dark > looked_at
 
 
-@kernel(error_model="numpy")
+@kernel
 def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> None:
     """Set hit (h, w) uint8 from 1 to BEAM where lamps light the scene.
 
@@ -73,6 +73,6 @@ def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> Non
             hit[row[k], start[k] : stop[k]] = BEAM
 
 
-@kernel(inline="always")
+@part
 def _blur(before: np.float32, middle: np.float32, after: np.float32) -> np.float32:
     return np.float32(0.25) * before + np.float32(0.5) * middle + np.float32(0.25) * after

@@ -87,7 +87,7 @@ def _between(a: float, b: float, share: float) -> float:
     return float(a + (b - a) * share if share < 0.5 else b - (b - a) * (1 - share))
 
 
-@kernel(error_model="numpy")
+@kernel
 def disturbance(
     picture: Picture,
     scene: Scene,

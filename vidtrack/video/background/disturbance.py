@@ -33,7 +33,8 @@ _UNSURE_GHOST_S = 0.3  # cover that makes a ghost during that time
 _SHADOW_S, _UNSURE_SHADOW_S = 5.0, 1.0  # shadow that lies longer is the ghost of a bright vehicle, or the sun moved
 _LIFT = 0.5  # grey levels a second by which the darkest luminance seen is forgotten
 _GAP_S = 2.0  # after a longer gap between frames the scene is as uncertain as after a start, and no cover is counted
-_PREVIEW_EVERY_S = 0.2  # between pictures of the preview
+PREVIEW_EVERY_S = 0.2
+"""Seconds between pictures of the preview."""
 _KNOWN_S = np.float32(0.1)  # cover under known vehicles: below all limits, but not the 0 of pixels that were seen free
 
 
@@ -78,7 +79,7 @@ class Disturbance:
         """
         pictures: list[tuple[float, Picture]] = []
         for frame in frames:
-            if not pictures or frame.time_s > pictures[-1][0] + _PREVIEW_EVERY_S - ROUNDING_S:
+            if not pictures or frame.time_s > pictures[-1][0] + PREVIEW_EVERY_S - ROUNDING_S:
                 pictures.append((frame.time_s, smooth(self._view.reduce(frame))))
         if len(pictures) < 2:
             return

@@ -6,7 +6,7 @@ import numpy as np
 
 from vidtrack.arrays.median import median
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
@@ -18,7 +18,7 @@ _STEP = np.float32(0.02)  # a smaller change is left to learning
 _LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covered, or the picture is missing
 
 
-@kernel(error_model="numpy")
+@kernel
 def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
     """Multiply the scene's luminance by the camera's gain relative to it, if learning is too slow for that gain."""
     g = gain(picture.luma, scene, black)
@@ -28,13 +28,13 @@ def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
                 _amplify(plane[y], g, black)
 
 
-@kernel
+@part
 def _amplify(row: Levels, g: np.float32, black: np.float32) -> None:
     for x in range(len(row)):
         row[x] = min(black + g * (row[x] - black), np.float32(255))
 
 
-@kernel(error_model="numpy")
+@part
 def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     """Median of (Y - black) / (B - black) over points that were not covered in the last picture; 1 if too few.
 
@@ -56,7 +56,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     return g if 1 / _LARGEST < g < _LARGEST else np.float32(1)
 
 
-@kernel
+@part
 def _mostly_steady(ratio: Floats) -> bool:
     """Whether the median of ratio (N,) is within _STEP of 1."""
     above = below = 0

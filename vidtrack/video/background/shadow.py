@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
@@ -86,7 +86,7 @@ class Sunlight:
         return _HARD._replace(darkest=min(_HARD.darkest, np.float32((least + _HARDEST) / _BINS)))
 
 
-@kernel(error_model="numpy")
+@kernel
 def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: Tolerance, hit: Image) -> Floats:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's times one factor r.
 
@@ -125,7 +125,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     return count
 
 
-@kernel(inline="always")
+@part
 def _at_rim(hit: Image, y: int, x: int, start: int, stop: int) -> bool:
     """Whether what is disturbed ends within _RIM of the pixel (y, x) of the run from start to stop."""
     if x < start + _RIM or x >= stop - _RIM or y < _RIM or y >= len(hit) - _RIM:
@@ -133,7 +133,7 @@ def _at_rim(hit: Image, y: int, x: int, start: int, stop: int) -> bool:
     return hit[y - _RIM, x] == 0 or hit[y + _RIM, x] == 0
 
 
-@kernel(inline="always")
+@part
 def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
     """Deviation [grey levels] of the colour from the scene's colour times r, and the scene's colour."""
     blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
@@ -142,7 +142,7 @@ def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tu
     return max(abs(off_blue), abs(off_red)), max(abs(blue), abs(red))
 
 
-@kernel(inline="always")
+@part
 def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
     """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
     h, w = luma.shape

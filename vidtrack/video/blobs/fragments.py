@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import CORNERS, OBJECTS, Runs, components, connect, find_runs
 
@@ -45,7 +45,7 @@ def links(row: Runs, start: Runs, stop: Runs, label: Ints, total: int, weak: Ima
     return link
 
 
-@kernel
+@part
 def _run_at(row: Runs, start: Runs, stop: Runs, y: int, x: int) -> int:
     """Index of the run, of those in raster order, that holds the pixel (x, y); -1: none."""
     low, high = 0, len(row)  # the last run that begins there or before lies in low - 1
@@ -114,13 +114,15 @@ def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical
         if group[i] == a or group[i] == b:
             union = box[i] if union[2] == 0 else _around(union, box[i])
     for i in range(len(box)):
+        if group[i] != a:
+            continue
         for j in range(len(box)):
-            if group[i] == a and group[j] == b and _both_vehicles(i, j, box, area, typical):
+            if group[j] == b and _both_vehicles(i, j, box, area, typical):
                 return not np.isnan(typical[i, 0]) and union[2] * union[3] <= _WHOLE * typical[i, 0] * typical[i, 1]
     return True
 
 
-@kernel
+@part
 def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
     """Whether a small box and a near one together are no larger than a vehicle of typical (2,) width and height."""
     if np.isnan(typical[0]):
@@ -130,7 +132,7 @@ def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
     return small and _union(a, b) <= _WHOLE * usual and _gap(a, b) <= _NEAR * max(typical[0], typical[1])
 
 
-@kernel
+@part
 def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
     """Whether two linked boxes together are no larger than a vehicle of typical (2,) width and height."""
     if np.isnan(typical[0]):
@@ -139,7 +141,7 @@ def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
     return _union(a, b) <= _WHOLE * typical[0] * typical[1]
 
 
-@kernel
+@part
 def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -> bool:
     """Whether two regions are each like a vehicle."""
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
@@ -151,7 +153,7 @@ def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
 
 
-@kernel
+@part
 def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     """Index of the predicted box that contains most of this box (4,); -1 for none, or if others overlap it too."""
     vehicle, sharers = -1, 0
@@ -163,7 +165,7 @@ def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     return vehicle if sharers == 1 else -1
 
 
-@kernel(inline="always")
+@part
 def _share_inside(box: Floats, other: Floats) -> float:
     """Share of a box's area inside the other box, enlarged by _SPREAD."""
     common = 1.0
@@ -184,14 +186,14 @@ def _around(a: Floats, b: Floats) -> Floats:
     return both
 
 
-@kernel(inline="always")
+@part
 def _union(a: Floats, b: Floats) -> float:
     """Area of the bounding box of both."""
     wide = max(a[0] + a[2], b[0] + b[2]) - min(a[0], b[0])
     return wide * (max(a[1] + a[3], b[1] + b[3]) - min(a[1], b[1]))
 
 
-@kernel(inline="always")
+@part
 def _gap(a: Floats, b: Floats) -> float:
     """Distance between two boxes along the axis that separates them more; negative where they overlap."""
     across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel
+from vidtrack.compiled import kernel, part
 from vidtrack.tracking.boxes import common
 from vidtrack.video.frame import Image
 
@@ -13,7 +13,7 @@ _COVERED = 0.4  # share of a predicted box that the region fills if the vehicle 
 _SAME = 0.5  # share of the smaller of two boxes in the other: they do not tell where one vehicle ends
 
 
-@kernel(error_model="numpy")
+@kernel
 def nearest_box(inside: Image, box: Ints, predicted: Floats) -> tuple[Ints, int]:
     """Index of the predicted box nearest to each pixel (h, w), -1 outside, and the number of boxes with pixels.
 
@@ -50,7 +50,7 @@ def nearest_box(inside: Image, box: Ints, predicted: Floats) -> tuple[Ints, int]
     return label, count
 
 
-@kernel
+@part
 def _filled(inside: Image, box: Ints, p: Floats) -> float:
     """Share of the box p (4,) that the region fills."""
     h, w = inside.shape
@@ -63,7 +63,7 @@ def _filled(inside: Image, box: Ints, p: Floats) -> float:
     return filled / (p[2] * p[3])
 
 
-@kernel(error_model="numpy")
+@part
 def _share(a: Floats, b: Floats) -> float:
     """Intersection of two boxes as a share of the smaller one."""
     return common(a, b) / min(a[2] * a[3], b[2] * b[3])

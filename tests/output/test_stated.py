@@ -1,0 +1,80 @@
+"""The errors that tables state of vehicles in the picture."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from synthetic_steps import make_step
+
+from vidtrack.output.stated import stated
+from vidtrack.scan import Scan
+
+ROWS = {"own": (1, "c", 100.0, 50.0), "shared": (2, "m", 60.0, 60.0), "coasting": (3, "o", 100.0, 50.0)}
+
+
+def step_of(kind, P, pixel=1.0, rim=1.5, surveyed=(0.0, 0, 200, 100), side=(23.0, 13.0)):
+    """A step with one track of a covariance, whose box is `side` wide and high about its position."""
+    step = make_step(0, [ROWS[kind]])
+    xy = step.tracks.xy[0]
+    box = np.array([[*(xy - np.divide(side, 2)), *side]])
+    group = np.array([1 if kind == "shared" else -1])
+    taken = np.array([-1 if kind == "coasting" else 0])
+    scan = Scan(0.0, xy[None], np.eye(2), pixel=pixel, rim=rim, surveyed=np.array(surveyed))
+    return replace(step, scan=scan, tracks=replace(step.tracks, P=P[None], box=box, group=group, measurement=taken))
+
+
+def position(step):
+    return stated(step).tracks.xy_cov[0]
+
+
+def test_measurements_without_outlines_keep_the_filter_s_errors():
+    step = step_of("own", 4 * np.eye(4), rim=0.0)
+    assert stated(step) is step
+
+
+def test_a_blob_of_its_own_limits_the_error_whatever_the_filter_says():
+    unsure, sure = position(step_of("own", 1e6 * np.eye(4))), position(step_of("own", 1e-6 * np.eye(4)))
+    lasting = np.array([400.0, 100.0]) / 12 * (0.05**2 + (12.25 / 200) ** 2)  # sides of 20 and 10 px within the rim
+    np.testing.assert_allclose(np.diag(sure), lasting, rtol=1e-3)
+    np.testing.assert_allclose(np.diag(unsure), lasting + 0.45**2, rtol=1e-3)
+
+
+def test_a_coasting_track_has_the_filter_s_error_and_that_of_its_outline():
+    P = np.diag([9.0, 1, 4, 1])
+    coasting, sure = position(step_of("coasting", P)), position(step_of("own", 1e-9 * np.eye(4)))
+    np.testing.assert_allclose(np.diag(coasting), [9 + sure[0, 0], 4 + sure[1, 1]], rtol=1e-6)
+
+
+def test_edges_measure_a_track_on_a_shared_blob():
+    assert np.diag(position(step_of("shared", 1e6 * np.eye(4)))) == pytest.approx(
+        [1.7**2 + 0.85**2, 2 * 0.85**2], rel=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("surveyed", "more"), [((89.0, 0, 200, 100), [0, 1]), ((0, 44, 200, 100), [2, 0]), ((89, 44, 200, 100), [2, 1])]
+)
+def test_a_box_that_the_border_cuts_is_less_certain_along_it(surveyed, more):
+    P = np.eye(4)
+    by = np.diag(position(step_of("own", P, surveyed=surveyed)) - position(step_of("own", P)))
+    assert np.sqrt(np.maximum(by, 0)) == pytest.approx(more, abs=1e-6)
+
+
+def test_all_errors_of_a_small_blob_scale_with_the_processed_pixel():
+    P = np.diag([4.0, 1, 4, 1])
+    fine = position(step_of("own", P))
+    scene = (0.0, 0, 2000, 1000)
+    coarse = position(step_of("own", 9 * P, pixel=3.0, rim=4.5, side=(69.0, 39.0), surveyed=scene))
+    np.testing.assert_allclose(coarse, 9 * fine, rtol=1e-9)
+
+
+@given(seed=st.integers(0, 2**32 - 1), kind=st.sampled_from(sorted(ROWS)))
+def test_what_is_stated_is_a_covariance_with_the_filter_s_of_velocities(seed, kind):
+    root = np.random.default_rng(seed).normal(size=(4, 4))
+    P = root @ root.T + 1e-3 * np.eye(4)
+    found = stated(step_of(kind, P)).tracks
+    assert np.linalg.eigvalsh(found.P[0]).min() > 0
+    velocity = np.ix_(found.velocity, found.velocity)
+    np.testing.assert_allclose(found.P[0][velocity], P[velocity], rtol=1e-6)
