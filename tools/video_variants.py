@@ -21,24 +21,32 @@ from video_clips import Clip
 
 Picture = NDArray[np.uint8]
 SMALLEST_TOLERANCE = 4.0  # frames
+DROPS = 8e-4  # a picture and pixel
 SWAY_SHARE = 0.9  # of the picture that a swaying camera sees
 OTHER_SIDE = {"left": "right", "right": "left"}
+OTHER_WAY = OTHER_SIDE | {"up": "down", "down": "up"}
 
 
 @dataclass(frozen=True)
 class Variant:
     """How a clip is changed.
 
-    every   only every n-th frame
-    half    half the size
-    mirror  left and right exchanged
-    view    changes one picture; called as view(picture, rng)
-    sway    standard deviation of the camera's displacement, px at a width of 640; None: the camera stands
+    every     only every n-th frame
+    half      half the size
+    mirror    left and right exchanged
+    backward  from the last frame to the first
+    doubled   every second frame is the one before it once more, as of a camera that sends more than it sees
+    light     factor of the light at a time [s]
+    view      changes one picture; called as view(picture, rng)
+    sway      standard deviation of the camera's displacement, px at a width of 640; None: the camera stands
     """
 
     every: int = 1
     half: bool = False
     mirror: bool = False
+    backward: bool = False
+    doubled: bool = False
+    light: Callable[[float], float] | None = None
     view: Callable[[Picture, Generator], Picture] | None = None
     sway: float | None = None
 
@@ -54,6 +62,41 @@ def dusk(picture: Picture, rng: Generator) -> Picture:
     return _noisy(light, np.sqrt(2.0 + 0.3 * light), rng)
 
 
+def grey(picture: Picture, rng: Generator) -> Picture:
+    """No colour."""
+    return np.asarray(cv2.cvtColor(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR), np.uint8)
+
+
+def bright(picture: Picture, rng: Generator) -> Picture:
+    """Too much light: pale, and flat where it is bright."""
+    return np.rint(255 * (picture / 255.0) ** 0.55).astype(np.uint8)
+
+
+def noise(picture: Picture, rng: Generator) -> Picture:
+    """A poor sensor's noise."""
+    return _noisy(picture.astype(np.float32), np.full((1, 1, 1), 9.0), rng)
+
+
+def rain(picture: Picture, rng: Generator) -> Picture:
+    """Streaks of drops, less contrast, and noise."""
+    height, width = picture.shape[:2]
+    long = int(0.05 * height)
+    streaks = np.zeros((height, width), np.float32)
+    drops = int(DROPS * height * width)
+    for x, y, lit in zip(
+        rng.integers(0, width, drops).tolist(), rng.integers(-long, height, drops).tolist(),
+        rng.uniform(10, 45, drops).tolist(), strict=True,
+    ):  # fmt: skip
+        cv2.line(streaks, (x, y), (x + int(0.15 * long), y + long), lit, 1)
+    light = 0.8 * picture + 33.0 + streaks[..., None]
+    return _noisy(light.astype(np.float32), np.full((1, 1, 1), 3.0), rng)
+
+
+def flicker(time_s: float) -> float:
+    """Light of lamps that beat with the camera, and an exposure that jumps every 3.7 s."""
+    return 1 + 0.07 * float(np.sin(2 * np.pi * time_s / 2.3)) + 0.12 * (int(time_s / 3.7) % 2)
+
+
 def _noisy(light: NDArray, sigma: NDArray, rng: Generator) -> Picture:
     noise = sigma * rng.standard_normal(light.shape, dtype=np.float32)
     return np.clip(np.rint(light + noise), 0, 255).astype(np.uint8)
@@ -64,6 +107,13 @@ VARIANTS = {
     "every-3rd": Variant(every=3),
     "half": Variant(half=True),
     "mirror": Variant(mirror=True),
+    "backward": Variant(backward=True),
+    "doubled": Variant(doubled=True),
+    "flicker": Variant(light=flicker),
+    "grey": Variant(view=grey),
+    "bright": Variant(view=bright),
+    "noise": Variant(view=noise),
+    "rain": Variant(view=rain),
     "haze": Variant(view=haze),
     "dusk": Variant(view=dusk),
     "sway-0.5": Variant(sway=0.5),
@@ -80,32 +130,39 @@ def derive(clip: Clip, name: str, folder: Path) -> Clip:
     with av.open(str(clip.video)) as container:
         stream = container.streams.video[0]
         size, rate = (stream.width, stream.height), stream.average_rate
-    assert rate is not None  # all clips with crossings have one
+        assert rate is not None  # all clips with crossings have one
+        count = sum(1 for _ in container.decode(video=0)) if variant.backward else 0
     if not path.is_file():
         part = path.with_name(f"part-{path.name}")
-        _write(part, _pictures(clip.video, variant), rate / variant.every)
+        _write(part, _pictures(clip.video, variant, float(rate)), rate / variant.every)
         part.rename(path)
     lines = tuple(_line(text, variant, size) for text in clip.lines)
-    events = tuple(_event(event, variant) for event in clip.events)
+    events = tuple(_event(event, variant, count) for event in clip.events)
     return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=events)
 
 
-def _pictures(video: Path, variant: Variant) -> Iterator[Picture]:
+def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
     rng = np.random.default_rng(0)
     with av.open(str(video)) as container:
         decoded = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
+    if variant.backward:
+        decoded.reverse()
+    if variant.doubled:
+        decoded = [decoded[k - k % 2] for k in range(len(decoded))]
     width = decoded[0].shape[1]
     shifts = np.zeros((len(decoded), 2))
     if variant.sway is not None:
         shifts = variant.sway * width / 640 * _sway(len(decoded), rng)
-    for picture, shift in zip(decoded[:: variant.every], shifts[:: variant.every], strict=True):
-        changed: Picture = np.asarray(picture, np.uint8)
+    for k in range(0, len(decoded), variant.every):
+        changed, shift = np.asarray(decoded[k], np.uint8), shifts[k]
         if variant.mirror:
             changed = changed[:, ::-1]
         if variant.half:
             changed = np.asarray(cv2.resize(changed, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
         if variant.sway is not None:
             changed = _window(changed, shift)
+        if variant.light is not None:
+            changed = np.clip(variant.light(k / rate) * changed, 0, 255).astype(np.uint8)
         if variant.view is not None:
             changed = variant.view(changed, rng)
         yield changed
@@ -151,8 +208,10 @@ def _line(text: str, variant: Variant, size: tuple[int, int]) -> str:
     return f"{name}:{','.join(f'{value:g}' for value in ends.ravel())}"
 
 
-def _event(event: Event, variant: Variant) -> Event:
-    """The crossing as the variant has it."""
+def _event(event: Event, variant: Variant, count: int) -> Event:
+    """The crossing as the variant of a clip of `count` frames has it."""
+    if variant.backward:
+        return replace(event, frame=count - 1 - event.frame, direction=OTHER_WAY[event.direction])
     direction = OTHER_SIDE.get(event.direction, event.direction) if variant.mirror else event.direction
     tolerance = event.tolerance if variant.every == 1 else max(event.tolerance / variant.every, SMALLEST_TOLERANCE)
     return replace(event, frame=event.frame / variant.every, direction=direction, tolerance=tolerance)

@@ -53,6 +53,7 @@ class Disturbance:
         "_hazy",
         "_veil",
         "_sunlight",
+        "_coloured",
     )
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
