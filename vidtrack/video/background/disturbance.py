@@ -194,7 +194,7 @@ class Disturbance:
         moves = self._camera.moves
         in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
         self._contrast, self._hazy = contrast(in_view.luma), haziness(in_view.luma)
-        self._coloured = is_coloured(picture)
+        self._coloured = is_coloured(Picture(*in_view[:3]))
         haze = veil(picture.luma)
         self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
 

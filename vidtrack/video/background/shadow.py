@@ -19,7 +19,6 @@ _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
 _CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
 _REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
-_RIM = 3  # px from the edge of a disturbance over which a shadow may be soft
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
@@ -41,19 +40,17 @@ class Tolerance(NamedTuple):
     darkest        least share of the scene's light
     chroma_share   share of the scene's colour by which the chroma planes may miss the factor, beside _CHROMA
     texture        grey levels by which luminance differences may miss the factor: soft edges
-    texture_share  the same as a share of the scene's light, within _RIM of the edge of what is disturbed
-    inside_share   the same farther inside, where a shadow has no edge, but a vehicle has windows and lamps
+    texture_share  the same as a share of the scene's light
     """
 
     darkest: np.float32
     chroma_share: np.float32
     texture: np.float32
     texture_share: np.float32
-    inside_share: np.float32
 
 
-SOFT = Tolerance(np.float32(0.5), np.float32(0), np.float32(2), np.float32(0.22), np.float32(0.08))
-_HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3), np.float32(0.3))
+SOFT = Tolerance(np.float32(0.5), np.float32(0), np.float32(2), np.float32(0.22))
+_HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3))
 
 
 class Sunlight:
@@ -98,8 +95,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     darkened = 0
     row, start, stop = find_runs(hit, OBJECTS)
     coloured = len(picture.cb) > 0
-    at_rim = tolerance.texture_share if coloured else _GREY_SHARE
-    inside = tolerance.inside_share if coloured else _GREY_SHARE
+    share = tolerance.texture_share if coloured else _GREY_SHARE
     for k in range(len(row)):
         y = row[k]
         for x in range(start[k], stop[k]):
@@ -114,7 +110,6 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
             off, colour = _colour(picture, scene, y // 2, x // 2, r) if coloured else (np.float32(0), np.float32(0))
             if structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA:
                 count[int(r * _BINS)] += 1
-            share = at_rim if _at_rim(hit, y, x, start[k], stop[k]) else inside
             if (
                 r >= tolerance.darkest
                 and off < _CHROMA + tolerance.chroma_share * colour
@@ -123,14 +118,6 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
                 hit[y, x] = SHADOW
     count[_BINS] = darkened
     return count
-
-
-@part
-def _at_rim(hit: Image, y: int, x: int, start: int, stop: int) -> bool:
-    """Whether what is disturbed ends within _RIM of the pixel (y, x) of the run from start to stop."""
-    if x < start + _RIM or x >= stop - _RIM or y < _RIM or y >= len(hit) - _RIM:
-        return True
-    return hit[y - _RIM, x] == 0 or hit[y + _RIM, x] == 0
 
 
 @part
