@@ -119,7 +119,8 @@ class VideoFile:
         span: list[av.Packet] = []
         for packet in packets:
             span.append(packet)
-            if packet.pts is None or (packet.dts is not None and self._time_s(packet.dts) > end_s + ROUNDING_S):
+            stamp = packet.pts if packet.dts is None else packet.dts
+            if packet.pts is None or stamp is None or self._time_s(stamp) > end_s + ROUNDING_S:
                 break
         wanted: set[int] = set()
         next_s = begin_s
@@ -127,11 +128,13 @@ class VideoFile:
             if self._time_s(stamp) > next_s - ROUNDING_S:
                 wanted.add(stamp)
                 next_s = self._time_s(stamp) + every_s
-        for packet in span:
-            spare = packet.pts is not None and packet.pts not in wanted
-            self._stream.codec_context.skip_frame = "NONREF" if spare else "DEFAULT"
-            yield packet
-        self._stream.codec_context.skip_frame = "DEFAULT"
+        try:
+            for packet in span:
+                spare = packet.pts is not None and packet.pts not in wanted
+                self._stream.codec_context.skip_frame = "NONREF" if spare else "DEFAULT"
+                yield packet
+        finally:
+            self._stream.codec_context.skip_frame = "DEFAULT"
         yield from packets
 
     def _time_s(self, stamp: int) -> float:

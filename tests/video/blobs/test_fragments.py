@@ -66,6 +66,13 @@ def test_three_pieces_of_one_vehicle_are_one_though_two_of_them_are_large():
     assert grouped([[10, 10, 16, 20], [27, 12, 6, 16], [34, 10, 16, 20]], [[9, 9, 42, 22]]) == [0, 0, 0]
 
 
+def test_a_row_of_vehicles_that_shreds_link_stays_as_many():
+    vehicles = [[50.0 * k, 10, 35, 18] for k in range(60)]
+    shreds = [[50.0 * k + 38, 15, 4, 4] for k in range(59)]
+    group = grouped([*vehicles, *shreds], link=np.zeros(119, int))
+    assert len(set(group[:60])) == 60
+
+
 def test_a_region_of_two_predicted_vehicles_is_a_piece_of_neither():
     assert grouped([[10, 10, 60, 12], [32, 23, 6, 4]], [[9, 8, 30, 20], [40, 8, 32, 20]], None, gap=0.3) == [0, 1]
 

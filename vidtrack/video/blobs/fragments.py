@@ -93,16 +93,17 @@ def together(
                 one.append(i)
                 other.append(j)
                 apart.append(distance)
-    group = np.arange(len(box))
-    while len(apart):
-        nearest = 0
-        for k in range(1, len(apart)):
-            nearest = k if apart[k] < apart[nearest] else nearest
-        apart.pop(nearest)
-        a, b = group[one.pop(nearest)], group[other.pop(nearest)]
-        if a != b and _one_vehicle(group, a, b, box, area, typical):
-            for i in range(len(box)):
-                group[i] = min(a, b) if group[i] == a or group[i] == b else group[i]
+    group, refused = np.arange(len(box)), np.zeros((len(box), len(box)), np.bool_)
+    for k in np.argsort(np.array(apart), kind="mergesort"):
+        a, b = min(group[one[k]], group[other[k]]), max(group[one[k]], group[other[k]])
+        if a == b or refused[a, b]:  # groups that do not fit together never will: they only grow
+            continue
+        if not _one_vehicle(group, group[one[k]], group[other[k]], box, area, typical):
+            refused[a, b] = refused[b, a] = True
+            continue
+        for i in range(len(box)):
+            group[i] = a if group[i] == b else group[i]
+            refused[a, i] = refused[i, a] = refused[a, i] or refused[b, i]
     return components(group)
 
 
