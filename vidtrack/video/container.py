@@ -119,8 +119,9 @@ class VideoFile:
         span: list[av.Packet] = []
         for packet in packets:
             span.append(packet)
-            stamp = packet.pts if packet.dts is None else packet.dts
-            if packet.pts is None or stamp is None or self._time_s(stamp) > end_s + ROUNDING_S:
+            if packet.pts is None:
+                break
+            if self._time_s(packet.pts if packet.dts is None else packet.dts) > end_s + ROUNDING_S:
                 break
         wanted: set[int] = set()
         next_s = begin_s

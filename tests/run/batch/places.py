@@ -37,7 +37,7 @@ class AtOnce(Executor):
         future = Future()
         try:
             future.set_result(self.do(told))
-        except Exception as error:
+        except Exception as error:  # an executor hands on whatever its task raised
             future.set_exception(error)
         return future
 

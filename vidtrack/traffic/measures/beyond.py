@@ -23,8 +23,10 @@ _LEAST_M_S, _SURE = 1.5, 3.0
 _LIKELY = 0.5
 _ELSEWHERE_S = 4.0
 """s; the mean time in which a vehicle has come from elsewhere, such as out of another one's blob"""
-_AT_M, _AT_SURE = 3.0, 0.8
+_AT_M = 3.0
 """m; from a gate, where a vehicle that began or ended there has passed it"""
+INFERRED_SURE = 0.8
+"""That a vehicle passed a gate beside its path, or at the end of it, if it must have come or gone somewhere"""
 _ALONE_S, _ALONE_M = 1.0, 1.75
 """s, m along the gate; another passing so near is that of the same vehicle."""
 
@@ -58,7 +60,7 @@ def at_gates(
         parts.append(_stood(gates, end, track[near], gate[near], along[near], far[near], inwards))
     found = parts[0].and_also(parts[1])
     found = found.only(_alone(found, passed))
-    return found, np.full(len(found), _AT_SURE)
+    return found, np.full(len(found), INFERRED_SURE)
 
 
 def _stood(gates: Gates, end: End, track: Ints, gate: Ints, along: Floats, far: Floats, inwards: bool) -> Passed:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.traffic.measures.beyond import at_gates, beyond
+from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
@@ -56,7 +56,7 @@ def journeys(
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins, passed)
     beside = gates.beside(passed.gate, passed.along)
-    sure = np.where(beside, _BESIDE_SURE, 1.0) * confidence(passed)
+    sure = np.where(beside, INFERRED_SURE, 1.0) * confidence(passed)
     told = ["inferred" if off else reason for off, reason in zip(beside.tolist(), reasons(passed), strict=True)]
     probability = np.concatenate([sure, joins.probability[across.track]])
     reason = [*told, *(["joined"] * len(across))]
@@ -78,8 +78,6 @@ def journeys(
     return Journeys(passed, probability, reason, joins, vehicle, trips)
 
 
-_BESIDE_SURE = 0.8
-"""That a vehicle passed a gate which its path missed by a little, if it must have come or gone there or elsewhere"""
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
 
 

@@ -20,7 +20,7 @@ from vidtrack.traffic.measures.crossings import following, section_speeds, way_n
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.passing import BESIDE_M, REACH_M, REACH_PX, Passing
+from vidtrack.traffic.measures.passing import Passing, reaches
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
@@ -53,10 +53,9 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     drawn = {size: site.scaled(*size) for size in sizes}
     grounds = {size: None if one.calibration is None else calibrated(one) for size, one in drawn.items()}
     gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
-    reach, beside = (REACH_PX, 0.0) if site.calibration is None else (REACH_M, BESIDE_M)
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     metres, ground = site.calibration is not None, grounds[sizes[0]]
-    reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, reach, beside)
+    reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, *reaches(metres))
     staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
     for whole in reader:
         rows = stretches.add(whole)

@@ -91,6 +91,11 @@ class Passed:
         return replace(self, speed=speed, speed_sigma=own, speed_shared=shared)
 
 
+def reaches(metres: bool) -> tuple[float, float]:
+    """`reach` and `beside` of Passing, where positions are in metres or in pixels: those have no beside."""
+    return (REACH_M, BESIDE_M) if metres else (REACH_PX, 0.0)
+
+
 class Passing:
     """Takes blocks of rows in order of time; remembers each track's last position and its side of each gate.
 

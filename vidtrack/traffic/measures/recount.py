@@ -14,7 +14,7 @@ from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.checks import movements
 from vidtrack.traffic.measures.gates import gates_of
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.passing import BESIDE_M, REACH_M, REACH_PX, Passed, Passing
+from vidtrack.traffic.measures.passing import Passed, Passing, reaches
 from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import has_tracks, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
@@ -142,12 +142,12 @@ class Recount:
 
     def _look_over_gates(self, site: Site, ground: Ground | None) -> list[Fault]:
         """Find who passes the gates that were not there before, and forget those that are gone."""
-        reach, beside = (REACH_PX, 0.0) if ground is None else (REACH_M, BESIDE_M)
         before, self._passed, faults = self._passed, {}, []
         for name, gate in site.gates.items():
             if gate.line not in before:
                 try:
-                    passing = Passing(gates_of(site.model_copy(update={"gates": {name: gate}}), ground), reach, beside)
+                    alone = gates_of(site.model_copy(update={"gates": {name: gate}}), ground)
+                    passing = Passing(alone, *reaches(ground is not None))
                 except ConfigError as error:
                     faults.append(Fault(("gates", name), str(error)))
                     continue

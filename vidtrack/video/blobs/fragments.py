@@ -110,16 +110,18 @@ def together(
 @kernel
 def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical: Floats) -> bool:
     """Whether the regions of groups a and b can be one vehicle: no two of them are vehicles, or all fit into one."""
-    union = np.zeros(4)
+    left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
     for i in range(len(box)):
         if group[i] == a or group[i] == b:
-            union = box[i] if union[2] == 0 else _around(union, box[i])
+            left, right = min(left, box[i, 0]), max(right, box[i, 0] + box[i, 2])
+            top, bottom = min(top, box[i, 1]), max(bottom, box[i, 1] + box[i, 3])
+    union = (right - left) * (bottom - top)
     for i in range(len(box)):
         if group[i] != a:
             continue
         for j in range(len(box)):
             if group[j] == b and _both_vehicles(i, j, box, area, typical):
-                return not np.isnan(typical[i, 0]) and union[2] * union[3] <= _WHOLE * typical[i, 0] * typical[i, 1]
+                return not np.isnan(typical[i, 0]) and union <= _WHOLE * typical[i, 0] * typical[i, 1]
     return True
 
 
@@ -175,16 +177,6 @@ def _share_inside(box: Floats, other: Floats) -> float:
         low = other[axis] - (size - other[axis + 2]) / 2
         common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
     return common / (box[2] * box[3])
-
-
-@kernel
-def _around(a: Floats, b: Floats) -> Floats:
-    """The bounding box (4,) of both."""
-    both = np.empty(4)
-    for axis in range(2):
-        both[axis] = min(a[axis], b[axis])
-        both[axis + 2] = max(a[axis] + a[axis + 2], b[axis] + b[axis + 2]) - both[axis]
-    return both
 
 
 @part
