@@ -14,12 +14,12 @@ CLOCKED = ("tests/run/live/", "tests/serve/")
 UNCLOCKED = tuple(
     f"tests/{name}.py"
     for name in (
-        *(f"run/live/test_live_{of}" for of in ("clock", "leave", "level", "muxer", "station_day", "status")),
-        *(f"serve/test_serve_{of}" for of in ("counts", "review", "site", "site_browser", "site_file")),
+        *(f"run/live/test_live_{of}" for of in ("clock", "leave", "level", "muxer", "parts", "places", "station_day", "status", "trouble")),
+        *(f"serve/test_serve_{of}" for of in ("browser", "counts", "review", "site", "site_browser", "site_file")),
         "serve/test_serve_site_command",
     )
 )
-"""Files there with neither a camera nor a limit of time: their pages are of finished runs"""
+"""Files there with neither a camera nor a limit of time: their pages are of finished runs, or of cameras made up"""
 
 
 @pytest.hookimpl(optionalhook=True)
