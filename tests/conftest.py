@@ -14,17 +14,20 @@ CLOCKED = ("tests/run/live/", "tests/serve/")
 UNCLOCKED = tuple(
     f"tests/{name}.py"
     for name in (
-        *(f"run/live/test_live_{of}" for of in ("clock", "leave", "level", "muxer", "station_day", "status")),
-        *(f"serve/test_serve_{of}" for of in ("counts", "review", "site", "site_browser", "site_file")),
+        *(
+            f"run/live/test_live_{of}"
+            for of in ("clock", "leave", "level", "muxer", "parts", "places", "station_day", "status", "trouble")
+        ),
+        *(f"serve/test_serve_{of}" for of in ("browser", "counts", "review", "site", "site_browser", "site_file")),
         "serve/test_serve_site_command",
     )
 )
-"""Files there with neither a camera nor a limit of time: their pages are of finished runs"""
+"""Files there with neither a camera nor a limit of time: their pages are of finished runs, or of cameras made up"""
 LONG = tuple(
     f"tests/{name}.py"
     for name in (
         "serve/test_serve_site_browser", "doctor/test_doctor_advice", "test_frame_rate", "traffic/test_site_runs",
-        "papers/test_registry", "test_samples", "run/batch/test_command",
+        "papers/test_registry", "test_samples", "run/batch/test_command", "serve/test_serve_browser", "run/live/test_live_trouble",
     )
 )  # fmt: skip
 """Files that no worker should begin when the others are nearly done"""

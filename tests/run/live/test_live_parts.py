@@ -129,13 +129,13 @@ def test_counts_go_on_after_a_kill_and_after_an_end(tmp_path, clock):
 
 
 def test_a_gap_in_the_frames_is_a_gap_in_what_was_watched(tmp_path, clock):
-    """A pause of 0.5 s is one too at this rate: tracks that coast for 0.6 s are not surely found again."""
+    """A pause of 0.4 s is one too at this rate: tracks that coast for 0.6 s are not surely found again."""
     station = Station(tmp_path, clock)
-    for begin_s in (0, 30, 60.2, 65.68, 70.8):
+    for begin_s in (0, 30, 60.2, 65.56, 70.68):
         station.drive(begin_s, begin_s + 5)
     station.parts.finish()
     (day,) = day_folders(tmp_path / "intervals")
-    spans = [[3, 4.96], [33, 34.96], [63.2, 65.16], [68.68, 75.76]]
+    spans = [[3, 4.96], [33, 34.96], [63.2, 65.16], [68.56, 75.64]]
     assert (read_day(day).watched - BEGAN_S).round(2).tolist() == spans
 
 
