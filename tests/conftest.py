@@ -14,7 +14,10 @@ CLOCKED = ("tests/run/live/", "tests/serve/")
 UNCLOCKED = tuple(
     f"tests/{name}.py"
     for name in (
-        *(f"run/live/test_live_{of}" for of in ("clock", "leave", "level", "muxer", "parts", "places", "station_day", "status", "trouble")),
+        *(
+            f"run/live/test_live_{of}"
+            for of in ("clock", "leave", "level", "muxer", "parts", "places", "station_day", "status", "trouble")
+        ),
         *(f"serve/test_serve_{of}" for of in ("browser", "counts", "review", "site", "site_browser", "site_file")),
         "serve/test_serve_site_command",
     )
