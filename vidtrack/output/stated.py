@@ -79,7 +79,7 @@ def _outline(side: Floats, pixel: float) -> Floats:
 
 
 def _contradicted(step: Step) -> tuple[Floats, Floats]:
-    """(T, 2) variances by the boxes of measurements: of vehicles with a blob of their own, and of those that share one."""
+    """(T, 2) variances by the boxes of measurements: with a blob of its own, and with a shared one."""
     tracks, scan = step.tracks, step.scan
     seen = tracks.measurement >= 0
     if scan.box is None or not seen.any():
