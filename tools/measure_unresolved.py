@@ -82,7 +82,9 @@ def table(steps: list[tuple[int, Tracks]]) -> formats.Table:
     named = {one for _, tracks in steps for one in tracks.id[tracks.status != TENTATIVE].tolist()}
     rows = [(scan, tracks, np.isin(tracks.id, list(named))) for scan, tracks in steps]
     frame = np.concatenate([np.full(kept.sum(), scan) for scan, _, kept in rows])
-    identity, xy, cov = (np.concatenate([getattr(t, name)[kept] for _, t, kept in rows]) for name in ("id", "xy", "xy_cov"))
+    identity, xy, cov = (
+        np.concatenate([getattr(t, one)[kept] for _, t, kept in rows]) for one in ("id", "xy", "xy_cov")
+    )
     return formats.Table(frame, identity, xy, None, np.ones(len(frame)), cov, None, unit="m")
 
 

@@ -41,7 +41,7 @@ _SHARE, _SIZE, _MOST = 0.05, 22.0, 2.0
 processed pixels); in proportion for others, up to so many times as much."""
 _BESIDE = 0.13
 """Standard deviation, per side of a cut box, of the middle along the border."""
-_EDGE_SHARE, _EDGE_PIXEL = 0.06, 0.7
+_EDGE_SHARE, _EDGE_PIXEL = 0.05, 0.6
 """Standard deviation of the middle between two edges of a shared blob: shares of the vehicle's side, and pixels."""
 _UNIFORM = 1 / 12
 """Variance of what is uniform over an interval of one."""
@@ -79,7 +79,7 @@ def _outline(side: Floats, pixel: float) -> Floats:
 
 
 def _contradicted(step: Step) -> tuple[Floats, Floats]:
-    """(T, 2) variances by the measurements' boxes: of vehicles with a blob of their own, and of those that share one."""
+    """(T, 2) variances by the boxes of measurements: with a blob of its own, and with a shared one."""
     tracks, scan = step.tracks, step.scan
     seen = tracks.measurement >= 0
     if scan.box is None or not seen.any():

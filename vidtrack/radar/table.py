@@ -83,7 +83,9 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     table = table.rename_columns([name.strip() for name in table.column_names])
     _refuse_repeated_names(path, table.column_names)
     if not len(table):
-        raise PlotFormatError(_complaint(path, unit, faults) if faults else f"{path} holds no plots, only a line of names")
+        raise PlotFormatError(
+            _complaint(path, unit, faults) if faults else f"{path} holds no plots but a line of names"
+        )
     line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
     columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
     return Table(path, table.column_names, columns, line, unit, faults)

@@ -90,7 +90,9 @@ FRAMES = [ETHERNET + ipv4(f"payload number {k}".encode()) for k in range(6)]
 
 
 @pytest.mark.parametrize("capture", [pcap, lambda frames: pcap(frames, order=">"), pcapng])
-@pytest.mark.parametrize("damage", [b"\xff" * 16, b"\x00" * 12 + b"\xff" * 4, b"trash " * 500], ids=["head", "size", "trash"])
+@pytest.mark.parametrize(
+    "damage", [b"\xff" * 16, bytes(12) + b"\xff" * 4, b"trash " * 500], ids=["head", "size", "trash"]
+)
 def test_a_capture_is_read_past_a_damaged_header(capture, damage):
     whole, losses = capture(FRAMES), Losses()
     at = whole.index(FRAMES[2]) - 28 * (capture is pcapng) - 16 * (capture is not pcapng)

@@ -124,7 +124,7 @@ def _is_block(content: bytes, order: str, at: int) -> bool:
 
 
 def _next_block(content: bytes, order: str, at: int) -> int:
-    """Where the next whole block is that matters; the end if there is none. Blocks begin at multiples of four octets."""
+    """Where the next whole block is that matters; the end if there is none. Their lengths are multiples of four."""
     while at + 12 <= len(content):
         words = np.frombuffer(content, f"{order}u4", min(_SEARCHED, len(content) - at) // 4, at)
         for start in (at + 4 * np.flatnonzero(np.isin(words, _KINDS))).tolist():

@@ -134,7 +134,7 @@ def _breaks(cut: Regions, predicted: Floats) -> bool:
     Where a vehicle looks like the road, as a white lorry on a crossing, it has a neck of its own; when another one
     touches it, both together are too large for one vehicle.
     """
-    left, top, right, bottom = np.concatenate([predicted[:, :2], predicted[:, :2] + predicted[:, 2:]], axis=1).T[..., None]
+    (left, top), (right, bottom) = predicted[:, :2].T[..., None], (predicted[:, :2] + predicted[:, 2:]).T[..., None]
     length = np.minimum(cut.stop, right) - np.maximum(cut.start, left)
     inside = np.where((cut.row >= top) & (cut.row < bottom), np.maximum(length, 0.0), 0.0)
     common = inside @ (cut.label[:, None] == np.arange(cut.total))  # (K, parts) pixels
