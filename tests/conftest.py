@@ -27,7 +27,8 @@ LONG = tuple(
     f"tests/{name}.py"
     for name in (
         "serve/test_serve_site_browser", "doctor/test_doctor_advice", "test_frame_rate", "traffic/test_site_runs",
-        "papers/test_registry", "test_samples", "run/batch/test_command", "serve/test_serve_browser", "run/live/test_live_trouble",
+        "papers/test_registry", "test_samples", "run/batch/test_command", "serve/test_serve_browser",
+        "run/live/test_live_trouble",
     )
 )  # fmt: skip
 """Files that no worker should begin when the others are nearly done"""
