@@ -164,7 +164,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     return compiled
 
 
-def part(function: Callable[..., Any]) -> Any:
+def inlined(function: Callable[..., Any]) -> Any:
     """Decorator: a function that only kernels call. It is compiled within each of them, under their rule of division.
 
     By itself it would be inferred, optimised and turned into machine code once more than is needed.

@@ -11,7 +11,7 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 
@@ -159,7 +159,7 @@ def _assigned(
     return _one_hot(assign(start, measurement, cost, miss, measurements))
 
 
-@part
+@inlined
 def _never(cost: Floats, rows: int) -> float:
     """A cost larger than any difference between two assignments."""
     most = 0.0
@@ -168,7 +168,7 @@ def _never(cost: Floats, rows: int) -> float:
     return (1 + rows) * (1.0 + most)
 
 
-@part
+@inlined
 def _edge(row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, measurements: int) -> Floats:
     """(T,) cost of a measurement at the edge of each row's gate, with the largest ln|S| of the cluster."""
     cluster = clusters(row, measurement, len(limit), measurements)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import bdtrc
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.errors import ConfigError
 from vidtrack.tracking.register import Register
 from vidtrack.tracks import MERGED, TENTATIVE
@@ -205,7 +205,7 @@ def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> M
     return hopeless
 
 
-@part
+@inlined
 def _counts(history: int, window: int) -> tuple[int, int]:
     """Hits and misses of a row in its last `window` scans; its birth is the highest bit of its history."""
     hits, misses = 0, 0
