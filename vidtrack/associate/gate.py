@@ -25,7 +25,7 @@ PROBABILITY = 0.999
 _MODES = {"mahalanobis": FULL, "decoupled": DECOUPLED, "box": BOX, "euclidean": EUCLIDEAN}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Pairs:
     """Gated (track, measurement) pairs, sorted by track.
 

@@ -48,6 +48,16 @@ def absolute(box: Floats, xy: Floats) -> Floats:
 
 
 @kernel
+def around(x: Floats, box: Floats) -> Floats:
+    """(T, 4) boxes in the picture, from boxes relative to the positions of states [x, vx, y, vy, ...] (T, n)."""
+    placed = box.copy()
+    for t in range(len(box)):
+        for axis in range(min(2, x.shape[1] // 2)):
+            placed[t, axis] += x[t, 2 * axis]
+    return placed
+
+
+@kernel
 def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, least: float, hits: Ints) -> None:
     """Move boxes (T, 4), in place, by a share towards the boxes seen (M, 4) that they have `taken` (T,); -1: none.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.rows import every
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.hard import GNN, HARD, Associator
 from vidtrack.associate.problem import Problem
@@ -51,15 +52,16 @@ class Immediate:
         decision = self.two_stage.decide(self.rule, problem, confirmed)
         shared, hides = self.sharing.claim(view, decision, confirmed, count)
         decision = decision.without(shared >= 0)
-        free = _unclaimed(hides, decision.measurement, decision.beta, unresolved)
-        tentative = ~confirmed
-        open_to_all = free.take(pairs.measurement) & tentative.take(pairs.row)
-        if np.count_nonzero(open_to_all):
-            second = self.two_stage.decide(self._starter, problem.only(open_to_all), tentative)
+        free, left = _left_over(
+            hides, decision.measurement, decision.beta, unresolved, confirmed, pairs.row, pairs.measurement
+        )
+        if np.count_nonzero(left):
+            second = self.two_stage.decide(self._starter, problem.only(left), ~confirmed)
             free = _unclaimed(free, second.measurement, second.beta, unresolved)
             decision = decision.joined(second)
         shared, free = self.sharing.catch(view, decision, np.maximum(shared, unresolved), free)
-        free &= self.two_stage.sure(problem.scan) & self.births
+        if not (self.births and self.two_stage.single(problem.scan)):
+            free &= self.two_stage.sure(problem.scan) & self.births
         if not self.rule.gated_births:
             free[whole.pairs.measurement] = False
         return Association(whole, decision, heaviest(decision), shared, hides, distinct(problem.scan, free))
@@ -71,7 +73,7 @@ class Immediate:
 
     def shown(self, rows: int) -> Mask:
         """(rows,) all."""
-        return np.ones(rows, bool)
+        return every(rows)
 
     def visible(self, tracks: Tracks) -> Tracks:
         """All."""
@@ -94,6 +96,18 @@ class Immediate:
 
     def add(self, count: int) -> None:
         """Nothing is remembered of a row."""
+
+
+@kernel
+def _left_over(
+    free: Mask, measurement: Ints, beta: Floats, unresolved: Ints, confirmed: Mask, row: Ints, of_pair: Ints
+) -> tuple[Mask, Mask]:
+    """(M,) the unclaimed measurements, and (N,) the pairs that they leave to tracks which are not confirmed (T,)."""
+    left = _unclaimed(free, measurement, beta, unresolved)
+    open_ = np.empty(len(row), np.bool_)
+    for k in range(len(row)):
+        open_[k] = left[of_pair[k]] and not confirmed[row[k]]
+    return left, open_
 
 
 @kernel

@@ -27,7 +27,7 @@ from vidtrack.estimate.sensor import POSITION
 from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association, Timing
-from vidtrack.tracking.boxes import absolute, longer
+from vidtrack.tracking.boxes import around, longer
 from vidtrack.tracking.choices import choices, evidence
 from vidtrack.tracking.deferred.deferred import Deferred
 from vidtrack.tracking.deferred.forest import ForestRule
@@ -59,7 +59,7 @@ class Outcome(NamedTuple):
     def after(self, kept: Mask, born: Ints) -> Outcome:
         """The outcome of the tracks kept (T,), then of those born from measurements (B,)."""
         measurement, nis = self.measurement, self.nis
-        if not kept.all():
+        if np.count_nonzero(kept) < len(kept):
             measurement, nis = measurement[kept], nis[kept]
         if len(born):
             measurement, nis = np.concatenate([measurement, born]), np.concatenate([nis, each(np.nan, len(born))])
@@ -299,7 +299,9 @@ class Tracker:
     def _delete(self, found: Association, t: float, events: list[Event]) -> Mask:
         """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         register = self.register
-        left = (register.history & 1 == 0) & (self.picture.in_view(self.bank) < 0.5)  # unseen, and likelier outside
+        left = register.history & 1 == 0
+        if np.count_nonzero(left):
+            left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
         idle = self.life.idle(register, t)
@@ -371,7 +373,7 @@ class Tracker:
 
     def _boxes(self) -> Floats:
         """(T, 4) the tracks' boxes in the picture."""
-        return absolute(self.register.box, self._xy())
+        return around(self.bank.x, self.register.box)
 
     def _keep(self, kept: Mask) -> None:
         self.timing.keep(kept)

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vidtrack.arrays.rows import no_index
+from vidtrack.arrays.rows import every, no_index
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
@@ -63,7 +63,7 @@ class Exclusive:
 
     def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """No track shares a measurement, and all measurements may be of new targets."""
-        return no_index(len(confirmed)), np.ones(count, bool)
+        return no_index(len(confirmed)), every(count)
 
     def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """No track continues on what its gate does not hold."""
