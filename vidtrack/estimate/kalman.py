@@ -49,7 +49,7 @@ class KalmanBank:
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         """x, P after dt seconds; changes nothing (paper 004, eqs. 6 and 7).
 
-        The last answer is kept: a detector asks for the tracks at the time of a frame before the tracker is given its scan.
+        The last answer is kept: a detector asks for the tracks of a frame before the tracker is given its scan.
         """
         known = self._known
         if known is not None and known.dt == dt and known.of_x is self.x and known.of_P is self.P:
@@ -104,7 +104,6 @@ class KalmanBank:
         self.scale = np.concatenate([self.scale, scale])
 
     def keep(self, rows: np.ndarray) -> None:
-        rows = np.arange(len(self))[rows]
         for name in self.STATE:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
 

@@ -91,8 +91,8 @@ class Stations:
         return min(1.0, since / lasting_s) if lasting_s > 0 else 1.0
 
     def share(self, scan: Scan, x: Floats, model: Motion) -> float | Floats:
-        """Share of its detection probability with which the scan's station covers states x (T, n) of a model: (T,), or one
-        for all.
+        """Share of its detection probability with which the scan's station covers states x (T, n) of a model: (T,), or
+        one for all.
         """
         coverage = self.each[scan.station].coverage
         if coverage is None:

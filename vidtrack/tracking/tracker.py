@@ -27,7 +27,7 @@ from vidtrack.estimate.sensor import POSITION
 from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association, Timing
-from vidtrack.tracking.boxes import around, longer
+from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.choices import choices, evidence
 from vidtrack.tracking.deferred.deferred import Deferred
 from vidtrack.tracking.deferred.forest import ForestRule
@@ -316,7 +316,8 @@ class Tracker:
                 (idle & ~left & ~hopeless, "never travelled and stands still"),
                 (parts & ~left, "part of the vehicle that it never left"),
             ):
-                events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))
+                if np.count_nonzero(gone):
+                    events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))
             self._keep(~going)
         self.sharing.merge(shared, register, t, events)
         return ~going
@@ -325,7 +326,7 @@ class Tracker:
         """Start tentative tracks from free measurements (B,), which are returned, and confirm those that qualify."""
         born = found.free.nonzero()[0]
         if len(born):
-            born = self.sharing.newcomers(born, view, self._boxes()[self.register.status != TENTATIVE])
+            born = self.sharing.newcomers(born, view, self.register, self.bank)
         if len(born):
             self._start(born, scan, events)
         self._confirm(scan.t, events)
@@ -370,10 +371,6 @@ class Tracker:
     def _xy(self) -> Floats:
         """(T, d) the tracks' positions."""
         return self.bank.x.take(self.model.position, axis=1)
-
-    def _boxes(self) -> Floats:
-        """(T, 4) the tracks' boxes in the picture."""
-        return around(self.bank.x, self.register.box)
 
     def _keep(self, kept: Mask) -> None:
         self.timing.keep(kept)
