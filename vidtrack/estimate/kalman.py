@@ -11,7 +11,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.decision import Decision
 from vidtrack.estimate.kernels import mixture_update, projection, propagation
 from vidtrack.estimate.motion.model import Motion
-from vidtrack.estimate.sensor import Sensor
+from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.scan import Scan
 
 
@@ -85,7 +85,8 @@ class KalmanBank:
         rows, m = len(decision.parent), H.shape[1]
         known = decision.inflation is not None and scan.noise is not None
         inflation = decision.inflation if known else np.zeros(rows)
-        self.x, self.P = mixture_update(*H.shape[1:], sensor.angles)(
+        positions = H is POSITION.H(self.x, self.model.position)
+        self.x, self.P = mixture_update(*H.shape[1:], sensor.angles, positions=positions)(
             self.x, self.P, H, excess, zhat, scan.z, scan.R,
             decision.parent, decision.row, decision.measurement, decision.beta, decision.beta0,
             inflation, decision.spread, scan.noise if known else _no_excess(m)[0],
