@@ -89,7 +89,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
     z (M, m), R (M, m, m), and of the decision parent (K,), row (B,), measurement (B,), beta (B,), beta0 (K,),
     inflation (K,) and spread; it returns x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
     Innovations of the components `angles` are wrapped to -pi..pi. `positions`: H selects the positions of a state
-    [x, vx, y, vy, ...]; the products with it are then the entries that it selects, and the compiler leaves out the rest.
+    [x, vx, y, vy, ...]; products with it are then the entries that it selects.
 
     S = H P H' + excess + R; the excess is the part of the predicted measurement's covariance that H P H' lacks.
     K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance has Joseph's form

@@ -125,9 +125,9 @@ class Stations:
         return detection * share, clutter
 
     def record(
-        self, scan: Scan, register: Register, share: Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
+        self, scan: Scan, register: Register, share: float | Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
     ) -> Mask:
-        """Note which rows (T,) the scan shows, of a covered share and an expected P_D (T,); returns those looked at."""
+        """Note which rows (T,) the scan shows, of a covered share and an expected P_D; returns those looked at."""
         number = scan.station
         looked = hit | (share >= 0.5)
         register.record_hits(hit, sure, looked, number, scan.t, dt)
