@@ -40,8 +40,9 @@ SETTLING_S = 5.0
 
 @dataclass(frozen=True)
 class Watched:
-    """One camera's run: processor time [s], frames, dropped frames, mean number of vehicles, latency [ms]."""
+    """One camera's run: duration and processor time [s], frames, dropped frames, mean number of vehicles, latency [ms]."""
 
+    seconds: float
     used_s: float
     frames: int
     dropped: int
@@ -107,9 +108,8 @@ def send(pictures: list[bytes], size: tuple[int, int], fps: int, told: Connectio
     server.serve_forever()
 
 
-def watch(address: str, seconds: float, core: int, told: Connection) -> None:
-    """A live run on one core; tells what it needed."""
-    os.sched_setaffinity(0, {core})
+def watch(address: str, seconds: float, told: Connection) -> None:
+    """A live run; tells what it needed."""
     vehicles, begin, frames, dropped = [], 0.0, 0, 0
     with tempfile.TemporaryDirectory() as folder, LiveRun(address, Settings(), Path(folder) / "run") as run:
         first_s = time.monotonic()
@@ -125,7 +125,9 @@ def watch(address: str, seconds: float, core: int, told: Connection) -> None:
                 dropped = run.board.now().reading["frames_dropped"] - dropped
                 latency = run.board.latency_ms()
                 break
-    told.send(Watched(used, frames, dropped, float(np.mean(vehicles)), latency["p50"], latency["p99"]))
+    told.send(
+        Watched(now - SETTLING_S, used, frames, dropped, float(np.mean(vehicles)), latency["p50"], latency["p99"])
+    )
 
 
 def _used() -> float:
@@ -143,9 +145,12 @@ def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> li
     sender.start()
     address = f"http://127.0.0.1:{here.recv()}/"
     pipes = [context.Pipe() for _ in range(cameras)]
-    runs = [context.Process(target=watch, args=(address, seconds, core, told)) for _, told in pipes]
+    runs = [context.Process(target=watch, args=(address, seconds, told)) for _, told in pipes]
+    every_core = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {core})  # inherited by what starts now, with all its threads
     for run in runs:
         run.start()
+    os.sched_setaffinity(0, every_core)
     found = [heard.recv() for heard, _ in pipes]
     for run in runs:
         run.join()
@@ -168,7 +173,7 @@ def main() -> None:
             for cameras in options.cameras:
                 found = measure(clip, fps, cameras, options.seconds, options.core)
                 ms = 1e3 * float(np.mean([each.used_s / each.frames for each in found]))
-                load = sum(each.used_s for each in found) / options.seconds
+                load = sum(each.used_s / each.seconds for each in found)
                 vehicles = float(np.mean([each.vehicles for each in found]))
                 middle, late = np.median([each.median_ms for each in found]), max(each.late_ms for each in found)
                 print(
