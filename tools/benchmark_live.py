@@ -40,7 +40,7 @@ SETTLING_S = 5.0
 
 @dataclass(frozen=True)
 class Watched:
-    """One camera's run: duration and processor time [s], frames, dropped frames, mean number of vehicles, latency [ms]."""
+    """One camera's run: duration and processor time [s], frames, dropped ones, mean number of vehicles, latencies."""
 
     seconds: float
     used_s: float

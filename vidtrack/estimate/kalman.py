@@ -105,6 +105,7 @@ class KalmanBank:
         self.scale = np.concatenate([self.scale, scale])
 
     def keep(self, rows: np.ndarray) -> None:
+        rows = np.arange(len(self))[rows]
         for name in self.STATE:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
 
