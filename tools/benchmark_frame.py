@@ -6,7 +6,8 @@ Each round runs on each clip, one after the other: decoding alone; a whole run i
 makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components, in
 one thread, on the same pictures. All times are processor time in ms a frame, user and system, of all threads for
 decoding, run and MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from
-the caches that they share. Medians of the rounds. `beyond` is the run less decoding.
+the caches that they share. Medians of the rounds. `beyond` is the run less decoding, `ratio` the duration of the run,
+with all cores, over that of decoding in one thread; other processes count there.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from statistics import median
-from time import thread_time
+from time import perf_counter, thread_time
 
 import av
 import cv2
@@ -40,10 +41,11 @@ def used() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def decode(path: Path) -> int:
-    """Decode all; returns the number of pictures."""
+def decode(path: Path, threads: int = 0) -> int:
+    """Decode all, in so many threads, 0: as many as FFmpeg wants; returns the number of pictures."""
     with av.open(str(path)) as container:
         container.streams.video[0].thread_type = "AUTO"
+        container.streams.video[0].codec_context.thread_count = threads
         return sum(1 for _ in container.decode(video=0))
 
 
@@ -94,6 +96,15 @@ def cost(what: Callable[[Path], object], path: Path) -> float:
     return used() - begin
 
 
+def ratio(path: Path) -> float:
+    """Duration of a run over that of decoding in one thread."""
+    begin = perf_counter()
+    whole_run(path)
+    middle = perf_counter()
+    decode(path, threads=1)
+    return (middle - begin) / (perf_counter() - middle)
+
+
 def main() -> None:
     """Run the rounds, print a row for each clip."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -110,8 +121,8 @@ def main() -> None:
             with open_source(str(clip), Settings().source) as source:
                 sizes[clip] = source.width, source.height
             row = {"decode": cost(decode, clip), "run": cost(whole_run, clip), "MOG2": cost(mog2, clip), **stages(clip)}
-            rows.append({name: 1e3 * seconds / frames for name, seconds in row.items()})
-    names = ("decode", "run", *STAGES, "MOG2", "beyond")
+            rows.append({name: 1e3 * seconds / frames for name, seconds in row.items()} | {"ratio": ratio(clip)})
+    names = ("decode", "run", *STAGES, "MOG2", "beyond", "ratio")
     print("ms a frame          " + "".join(f"{name:>9s}" for name in names))
     for clip, rows in found.items():
         width, height = sizes[clip]

@@ -11,13 +11,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from threading import current_thread, main_thread
+from threading import current_thread, get_ident, main_thread
 from time import monotonic, sleep
 from types import FrameType
 from typing import Any
 
 from numba import njit
-from numba.core.caching import FunctionCache, _CacheLocator
+from numba.core.caching import FunctionCache, UserProvidedCacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.event import Event, Listener, register
 from numba.misc.appdirs import AppDirs
@@ -28,7 +28,9 @@ if sys.platform != "win32":
 log = logging.getLogger(__name__)
 
 PACKAGE = Path(__file__).parent
-_RARELY = 100_000, 50, 1000  # thresholds of the garbage collector; Python's own are 700, 10, 10
+_RARELY = 100_000, 50, 1000
+"""While kernels are compiled, Python looks for garbage after so many new objects (usually 700), among older ones every
+50th time, and among the oldest every 1000th time of that (usually every 10th)."""
 _TURN_S, _LOOK_S = 60.0, 0.02  # a process that takes longer for a kernel is taken to hang
 
 
@@ -55,7 +57,7 @@ def first_run() -> bool:
     if KERNELS == PACKAGE:
         return CACHE and not any(PACKAGE.rglob(ours))
     rooms = {str(source.parent) for source in PACKAGE.rglob("*.py")}
-    kept = (KERNELS / _CacheLocator.get_suitable_cache_subpath(f"{room}/_.py") for room in rooms)
+    kept = (KERNELS / UserProvidedCacheLocator.get_suitable_cache_subpath(f"{room}/_.py") for room in rooms)
     return CACHE and not any(any(folder.glob(ours)) for folder in kept)
 
 
@@ -158,13 +160,13 @@ none has a wrapper for that, an eighth less to compile; x / 0 is infinite or NaN
 def kernel(function: Callable[..., Any]) -> Any:
     """Decorator: compile on the first call, cache for later runs, release the interpreter's lock."""
     compiled = njit(nogil=True, **_RULES)(function)
-    if CACHE:
+    if CACHE:  # by private names: numba has no public way to a cache other than its own, which a full disk ends
         compiled._cache = KernelCache(function)
         compiled._compiler.compile = compiled._cache.ends_turn(compiled._compiler.compile)
     return compiled
 
 
-def part(function: Callable[..., Any]) -> Any:
+def inlined(function: Callable[..., Any]) -> Any:
     """Decorator: a function that only kernels call. It is compiled within each of them, under their rule of division.
 
     By itself it would be inferred, optimised and turned into machine code once more than is needed.
@@ -241,17 +243,37 @@ class FewCollections(Listener):
             gc.set_threshold(*self._usual)
 
 
+class InCompiler(Listener):
+    """Which threads compile or load a kernel, or wait for their turn."""
+
+    def __init__(self) -> None:
+        self._depth: dict[int, int] = {}  # by thread; one may enter again within
+
+    def on_start(self, event: Event) -> None:
+        """A thread asks for the compiler."""
+        self._depth[get_ident()] = self._depth.get(get_ident(), 0) + 1
+
+    def on_end(self, event: Event) -> None:
+        """It gives the compiler back."""
+        self._depth[get_ident()] -= 1
+        if not self._depth[get_ident()]:
+            del self._depth[get_ident()]
+
+    @property
+    def others(self) -> bool:
+        """Whether other threads than this one are in it."""
+        return any(thread != get_ident() for thread in list(self._depth))
+
+
 def compiling() -> bool:
     """Whether another thread of this process compiles or loads a kernel now."""
-    lock = global_compiler_lock._lock
-    free = lock.acquire(blocking=False)
-    if free:
-        lock.release()
-    return not free
+    return _in_compiler.others
 
 
 _signals = SignalsWait()
+_in_compiler = InCompiler()
 register("numba:compiler_lock", _signals)
+register("numba:compiler_lock", _in_compiler)
 register("numba:compile", FewCollections())
 if IN_TREE:
     forget_stale(PACKAGE)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vidtrack.arrays.types import Floats, Ints, Mask
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Decision:
     """The association of one scan: how K successor rows follow from T rows and M measurements.
 
@@ -78,7 +78,7 @@ class Event(NamedTuple):
         return [cls(t, track, kind, reason) for track in ids.tolist()]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Choices:
     """The choice made for each track of a scan, for `--decisions`. -1 and NaN: none.
 

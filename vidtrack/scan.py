@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vidtrack.estimate.sensor import Sensor
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Scan:
     """The measurements of a sensor at one time.
 
@@ -80,10 +80,10 @@ class Scan:
             raise ScanError(f"noise must be ({dim}, {dim}) to match z, not {noise.shape}")
         if noise is not None and (self.noise is not None or not count):  # otherwise checked as part of R
             check_covariances(noise[None], "R" if self.noise is None else "noise")
-        object.__setattr__(self, "noise", noise)
-        object.__setattr__(self, "t", float(self.t))
-        object.__setattr__(self, "z", z)
-        object.__setattr__(self, "R", R)
+        self.noise = noise
+        self.t = float(self.t)
+        self.z = z
+        self.R = R
         for name, shape, kind in (
             ("box", (count, 4), float),
             ("amplitude", (count,), float),
@@ -98,12 +98,12 @@ class Scan:
             value = np.asarray(value)
             if value.shape != shape:
                 raise ScanError(f"{name} must be {shape} to match z, not {value.shape}")
-            if not np.isfinite(value).all():
+            if np.count_nonzero(np.isfinite(value)) < value.size:
                 i = int(np.argwhere(~np.isfinite(value))[0, 0])
                 raise ScanError(
                     f"{name} of measurement {i} is not finite: {value[i]}; leave {name} out where it is unknown"
                 )
-            object.__setattr__(self, name, np.ascontiguousarray(value, dtype=kind))
+            setattr(self, name, np.ascontiguousarray(value, dtype=kind))
         if self.box is not None and self.box[:, 2:].min(initial=0) < 0:
             i = int(np.argmin(self.box[:, 2:].min(axis=1)))
             raise ScanError(
@@ -122,6 +122,6 @@ class Scan:
             return self
         weak = object.__new__(Scan)  # without validating it again
         for name in self.__slots__:
-            object.__setattr__(weak, name, getattr(self, name))
-        object.__setattr__(weak, "R", self.R + (inflation - 1) * self.lasting)
+            setattr(weak, name, getattr(self, name))
+        weak.R = self.R + (inflation - 1) * self.lasting
         return weak

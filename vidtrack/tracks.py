@@ -26,7 +26,7 @@ TENTATIVE, CONFIRMED, COASTING, MERGED = (int(status) for status in Status)
 """The statuses as plain integers: NumPy compares these ten times as fast as members of an enumeration."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Tracks:
     """A snapshot of all tracks at time t; rows are tracks.
 

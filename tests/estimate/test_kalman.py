@@ -203,3 +203,19 @@ def test_keep_drops_the_other_rows():
     bank.predict(0.1)
     bank.update(missed(0), Scan(0.0, np.zeros((1, 2)), np.eye(2)), POSITION)
     assert len(bank) == 0
+
+
+def test_a_look_ahead_is_that_of_the_states_there_are():
+    """The last one is kept; other states, or another time, must not be given it."""
+    bank = filled_bank(np.random.default_rng(5), 3, 2)
+    first = bank.ahead(0.5)
+    assert bank.ahead(0.5)[0] is first[0]
+    assert not np.allclose(bank.ahead(0.7)[0], first[0])
+    bank.x = bank.x + 1.0
+    np.testing.assert_allclose(bank.ahead(0.5)[0], first[0] + np.array([1.5, 1.0, 1.5, 1.0]))
+    before = bank.P
+    bank.P = 2 * bank.P
+    assert not np.allclose(bank.ahead(0.5)[1], first[1])
+    bank.P = before
+    bank.predict(0.5)
+    np.testing.assert_allclose(bank.x, first[0] + np.array([1.5, 1.0, 1.5, 1.0]))

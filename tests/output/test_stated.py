@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_steps import make_step
 
-from vidtrack.output.stated import stated
+from vidtrack.output.stated import all_stated, stated
 from vidtrack.scan import Scan
 
 ROWS = {"own": (1, "c", 100.0, 50.0), "shared": (2, "m", 60.0, 60.0), "coasting": (3, "o", 100.0, 50.0)}
@@ -113,3 +113,16 @@ def test_what_is_stated_is_a_covariance_with_the_filter_s_of_velocities(seed, ki
     assert np.linalg.eigvalsh(found.P[0]).min() > 0
     velocity = np.ix_(found.velocity, found.velocity)
     np.testing.assert_allclose(found.P[0][velocity], P[velocity], rtol=1e-6)
+
+
+def test_steps_together_are_stated_as_each_alone():
+    P = np.diag([9.0, 1, 4, 1])
+    alike = [step_of("own", P), step_of("coasting", 2 * P), step_of("shared", 3 * P)]
+    others = [
+        step_of("own", P, rim=0.0),
+        step_of("own", P, pixel=2.0),
+        step_of("own", P, surveyed=(89.0, 44, 200, 100)),
+    ]
+    steps = [*alike, *others, *alike]
+    for together, alone in zip(all_stated(steps), map(stated, steps), strict=True):
+        np.testing.assert_array_equal(together.tracks.P, alone.tracks.P)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 
 
 @kernel
@@ -19,7 +19,7 @@ def median(values: Floats) -> float:
     return (lower + upper) / 2
 
 
-@part
+@inlined
 def _ranked(values: Floats, rank: int) -> float:
     """The value with so many before it in ascending order, moved to its place, by Hoare's selection."""
     low, high = 0, len(values) - 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 
 
@@ -15,6 +15,13 @@ def each(value: float | Floats, rows: int) -> Floats:
     same = np.empty(rows)
     same.fill(value)
     return same
+
+
+def every(rows: int) -> Mask:
+    """(rows,) True. In a third of the time of `np.ones`."""
+    all_of_them = np.empty(rows, bool)
+    all_of_them.fill(True)
+    return all_of_them
 
 
 def no_index(rows: int) -> Ints:

@@ -13,7 +13,7 @@ from scipy.special import gammainc, gammaincinv
 from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
-from vidtrack.compiled import kernel, part, specialised
+from vidtrack.compiled import inlined, kernel, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
 from vidtrack.scan import Scan
@@ -25,7 +25,7 @@ PROBABILITY = 0.999
 _MODES = {"mahalanobis": FULL, "decoupled": DECOUPLED, "box": BOX, "euclidean": EUCLIDEAN}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Pairs:
     """Gated (track, measurement) pairs, sorted by track.
 
@@ -190,7 +190,7 @@ def quantile(probability: float, dim: int) -> float:
     return float(2 * gammaincinv(dim / 2, probability))
 
 
-@part
+@inlined
 def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
     """(T, 2) half sides of the bounding box of each gate, on the first two axes."""
     axes = min(2, cov.shape[1])
@@ -296,7 +296,7 @@ def _gated(
     return specialised(gated, m, mode, *angles)
 
 
-@part
+@inlined
 def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
     """(P,) order by row, then measurement, of pairs that are sorted by row; two counting sorts."""
     first, begin = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)

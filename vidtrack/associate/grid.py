@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import part
+from vidtrack.compiled import inlined
 
 
-@part
+@inlined
 def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
     """Sort points z (M, m) into grid cells over their first two axes, by run (M,), row and column of the cell.
 
@@ -49,7 +49,7 @@ def cells(z: Floats, run: Ints, reach: Floats) -> tuple[Ints, Ints, Floats, Floa
     return order, first, origin, cell, shape
 
 
-@part
+@inlined
 def _typical(reach: Floats) -> Floats:
     """(2,) mean of the finite half sides (T, 2); ones if there are none."""
     total, count = np.zeros(2), 0

@@ -7,11 +7,12 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.rows import every, starts
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
 from vidtrack.associate.problem import Problem
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 
@@ -67,12 +68,13 @@ class GNN:
 
     def decide(self, problem: Problem) -> Decision:
         """Optimal assignment, cluster by cluster."""
+        return one_hot(self.taken(problem, every(problem.rows), every(problem.measurements)))
+
+    def taken(self, problem: Problem, rows: Mask, free: Mask) -> Ints:
+        """(T,) measurement of each track, -1 for none; only these rows (T,) may take one, and only free ones (M,)."""
         pairs = problem.pairs
         cardinal = self.convention == "maximum-cardinality"
-        chosen = _assigned(
-            pairs.row, pairs.start, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, len(problem.scan), cardinal
-        )
-        return Decision(*chosen)
+        return _assigned(pairs.row, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, rows, free, cardinal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,18 +150,24 @@ def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measuremen
 
 @kernel
 def _assigned(
-    row: Ints, start: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats,
-    measurements: int, cardinal: bool,
-) -> tuple[Ints, Ints, Ints, Floats, Floats]:  # fmt: skip
-    """The decision of least cost; `cardinal`: with as few unassigned rows as possible."""
+    row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, rows: Mask, free: Mask, cardinal: bool
+) -> Ints:
+    """(T,) the assignment of least cost; `cardinal`: with as few unassigned rows as possible."""
+    n, most = 0, len(row)
+    taker, choice, near, price = np.empty_like(row), np.empty_like(row), np.empty(most), np.empty(most)
+    for k in range(most):
+        if rows[row[k]] and free[measurement[k]]:
+            taker[n], choice[n], near[n], price[n] = row[k], measurement[k], d2[k], cost[k]
+            n += 1
+    taker, choice, near, price = taker[:n], choice[:n], near[:n], price[:n]
     if cardinal:
-        miss = np.full(len(limit), _never(cost, len(limit)))
+        miss = np.full(len(limit), _never(price, len(limit)))
     else:
-        miss = _edge(row, measurement, d2, cost, limit, measurements)
-    return _one_hot(assign(start, measurement, cost, miss, measurements))
+        miss = _edge(taker, choice, near, price, limit, len(free))
+    return assign(starts(taker, len(limit)), choice, price, miss, len(free))
 
 
-@part
+@inlined
 def _never(cost: Floats, rows: int) -> float:
     """A cost larger than any difference between two assignments."""
     most = 0.0
@@ -168,7 +176,7 @@ def _never(cost: Floats, rows: int) -> float:
     return (1 + rows) * (1.0 + most)
 
 
-@part
+@inlined
 def _edge(row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, measurements: int) -> Floats:
     """(T,) cost of a measurement at the edge of each row's gate, with the largest ln|S| of the cluster."""
     cluster = clusters(row, measurement, len(limit), measurements)

@@ -21,7 +21,7 @@ VANISHING = 2000.0
 weights are those of the limit, and events with one such factor still rank above events with two."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Problem:
     """The possible pairs of T tracks and M measurements, with their probabilities.
 
@@ -102,7 +102,7 @@ class Problem:
 
     @cached_property
     def _logs(self) -> tuple[Floats, Floats]:
-        return _logs(self.detection, self.inside, self.clutter, self.pairs.row, self.pairs.log_l)
+        return logs(self.detection, self.inside, self.clutter, self.pairs.row, self.pairs.log_l)
 
     def only(self, mask: Mask) -> Problem:
         """The problem with the pairs of a mask (N,)."""
@@ -114,7 +114,7 @@ class Problem:
         These rows count neither as seen nor as missed.
         """
         own = shared < 0
-        if own.all():
+        if np.count_nonzero(own) == len(own):
             return self
         left = self.only(own[self.pairs.row] & ~np.isin(self.pairs.measurement, shared[~own]))
         return replace(left, detection=np.where(own, self.detection, 0.0))
@@ -138,7 +138,7 @@ class Problem:
 
 
 @kernel
-def _logs(detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
+def logs(detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
     """(T,) log_missed and (N,) log_ratio from the factors (T,); VANISHING for ln 0."""
     missed, density, ratio, most = np.empty(len(inside)), np.empty(len(inside)), np.empty(len(row)), 0.0
     for k in range(len(log_l)):

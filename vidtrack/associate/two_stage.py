@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.rows import every
 from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.hard import Associator
 from vidtrack.associate.problem import Problem
@@ -25,18 +26,18 @@ class TwoStage:
 
     def sure(self, scan: Scan) -> Mask:
         """(M,) the scan's sure detections."""
-        if scan.score is None or self._single(scan):
-            return np.ones(len(scan), bool)
+        if scan.score is None or self.single(scan):
+            return every(len(scan))
         return scan.score >= self.least
 
     def surely(self, scan: Scan, taken: Ints) -> Mask:
         """(T,) rows that have `taken` (T,) a sure detection; -1: none."""
         took = taken >= 0
-        if not self._single(scan):
+        if not self.single(scan):
             took[took] = self.sure(scan)[taken[took]]
         return took
 
-    def _single(self, scan: Scan) -> bool:
+    def single(self, scan: Scan) -> bool:
         """Whether all detections of a scan are sure."""
         return scan.score is None or self.least == -np.inf
 
@@ -44,7 +45,7 @@ class TwoStage:
         """The decision about rows (T,): sure measurements in the first stage, others in the second."""
         pairs = problem.pairs
         asked = rows.take(pairs.row)
-        if self._single(problem.scan):
+        if self.single(problem.scan):
             return associate.decide(problem.only(asked))
         first_round = self.sure(problem.scan)[pairs.measurement]
         first = associate.decide(problem.only(asked & first_round))

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.decision import Decision
 from vidtrack.estimate.kernels import mixture_update, projection, propagation
 from vidtrack.estimate.motion.model import Motion
-from vidtrack.estimate.sensor import Sensor
+from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.scan import Scan
+
+
+class _Ahead(NamedTuple):
+    """x, P after dt seconds, from of_x and of_P."""
+
+    dt: float
+    of_x: Floats
+    of_P: Floats  # noqa: N815
+    x: Floats
+    P: Floats
 
 
 class KalmanBank:
@@ -28,16 +41,25 @@ class KalmanBank:
         self.P = np.empty((0, n, n))
         self.hits = np.empty(0, np.int64)
         self.scale = np.empty(0)
+        self._known: _Ahead | None = None
 
     def __len__(self) -> int:
         return len(self.x)
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
-        """x, P after dt seconds; changes nothing (paper 004, eqs. 6 and 7)."""
+        """x, P after dt seconds; changes nothing (paper 004, eqs. 6 and 7).
+
+        The last answer is kept: a detector asks for the tracks of a frame before the tracker is given its scan.
+        """
+        known = self._known
+        if known is not None and known.dt == dt and known.of_x is self.x and known.of_P is self.P:
+            return known.x, known.P
         F = self.model.transition(dt, self.x)
         J = self.model.jacobian(dt, self.x, F)
         Q = self.model.process_noise(dt, self.x, self.P, self.hits, self.scale)
-        return propagation(self.x.shape[1])(self.x, self.P, F, J, Q)
+        x, P = propagation(self.x.shape[1])(self.x, self.P, F, J, Q)
+        self._known = _Ahead(dt, self.x, self.P, x, P)
+        return x, P
 
     def jacobian(self, dt: float, x: Floats) -> Floats:
         """(1, n, n) or (T, n, n) derivative of the motion at means x (T, n)."""
@@ -50,7 +72,7 @@ class KalmanBank:
         """zhat (T, m), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m): z = zhat + H dx + excess + noise."""
         position = self.model.position
         H = sensor.H(self.x, position)
-        return sensor.h(self.x, position), H, np.zeros((1, H.shape[1], H.shape[1]))
+        return sensor.h(self.x, position), H, _no_excess(H.shape[1])
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance H P H' plus the excess (T, m, m)."""
@@ -63,13 +85,14 @@ class KalmanBank:
         rows, m = len(decision.parent), H.shape[1]
         known = decision.inflation is not None and scan.noise is not None
         inflation = decision.inflation if known else np.zeros(rows)
-        self.x, self.P = mixture_update(*H.shape[1:], sensor.angles)(
+        positions = H is POSITION.H(self.x, self.model.position)
+        self.x, self.P = mixture_update(*H.shape[1:], sensor.angles, positions=positions)(
             self.x, self.P, H, excess, zhat, scan.z, scan.R,
             decision.parent, decision.row, decision.measurement, decision.beta, decision.beta0,
-            inflation, decision.spread, scan.noise if known else np.zeros((m, m)),
+            inflation, decision.spread, scan.noise if known else _no_excess(m)[0],
         )  # fmt: skip
-        self.hits = self.hits[decision.parent] + (decision.beta0 < 0.5)
-        self.scale = self.scale[decision.parent]
+        self.hits = self.hits.take(decision.parent) + (decision.beta0 < 0.5)
+        self.scale = self.scale.take(decision.parent)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
         self.insert(*self.model.birth(position, cov, scale), scale)
@@ -85,3 +108,9 @@ class KalmanBank:
         rows = np.arange(len(self))[rows]
         for name in self.STATE:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
+
+
+@lru_cache
+def _no_excess(m: int) -> Floats:
+    """(1, m, m) zeros; cached: do not write to it."""
+    return np.zeros((1, m, m))

@@ -82,13 +82,14 @@ def projection(m: int, n: int) -> Projection:
 
 
 @lru_cache
-def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
+def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: bool = False) -> Update:
     """The moment-matched mixture of the missed branch (weight beta0) and one Kalman update per measurement.
 
     The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m), zhat (T, m),
     z (M, m), R (M, m, m), and of the decision parent (K,), row (B,), measurement (B,), beta (B,), beta0 (K,),
     inflation (K,) and spread; it returns x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
-    Innovations of the components `angles` are wrapped to -pi..pi.
+    Innovations of the components `angles` are wrapped to -pi..pi. `positions`: H selects the positions of a state
+    [x, vx, y, vy, ...]; products with it are then the entries that it selects.
 
     S = H P H' + excess + R; the excess is the part of the predicted measurement's covariance that H P H' lacks.
     K = P H' S^-1 by a Cholesky factor of S (paper 004, eq. 3). The covariance has Joseph's form
@@ -121,6 +122,9 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
                 j, weight = (0, widening) if missed else (measurement[b], beta[b])
                 for i in range(n):  # P H'
                     for a in range(m):
+                        if positions:
+                            K[i, a] = P[t, i, 2 * a]
+                            continue
                         total = 0.0
                         for d in range(n):
                             total += P[t, i, d] * H[h, a, d]
@@ -128,8 +132,11 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
                 for a in range(m):  # S = L L'
                     for c in range(a + 1):
                         total = excess[s, a, c] + (noise[a, c] if missed else R[j, a, c])
-                        for d in range(n):
-                            total += H[h, a, d] * K[d, c]
+                        if positions:
+                            total += K[2 * a, c]
+                        else:
+                            for d in range(n):
+                                total += H[h, a, d] * K[d, c]
                         for e in range(c):
                             total -= L[a, e] * L[c, e]
                         L[a, c] = np.sqrt(total) if a == c else total / L[c, c]
@@ -163,16 +170,18 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
                         A[i, c] = P[t, i, c]
                 for a in range(m):  # A = P - K H P
                     for c in range(n):
-                        total = 0.0
-                        for d in range(n):
-                            total += H[h, a, d] * P[t, d, c]
+                        total = P[t, 2 * a, c] if positions else 0.0
+                        if not positions:
+                            for d in range(n):
+                                total += H[h, a, d] * P[t, d, c]
                         for i in range(n):
                             A[i, c] -= K[i, a] * total
                 for i in range(n):  # A H' - K (excess + R)
                     for a in range(m):
-                        total = 0.0
-                        for d in range(n):
-                            total += A[i, d] * H[h, a, d]
+                        total = A[i, 2 * a] if positions else 0.0
+                        if not positions:
+                            for d in range(n):
+                                total += A[i, d] * H[h, a, d]
                         for c in range(m):
                             total -= K[i, c] * (excess[s, c, a] + R[j, c, a])
                         AH[i, a] = total
@@ -193,4 +202,6 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = ()) -> Update:
                         P1[k, i, c] -= mean[i] * mean[c]
         return x1, P1
 
+    if positions:
+        update.__name__ = "update_by_positions"
     return specialised(update, m, n, *angles)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import part
+from vidtrack.compiled import inlined
 from vidtrack.scan import Scan
 
 LASTING_S = 0.5
@@ -58,13 +58,13 @@ def file_noise(lag: Floats, variance: Floats, hold_s: float) -> tuple[float, flo
     return jitter, accel
 
 
-@part
+@inlined
 def edge_variance(side: float, share: float, pixel: float) -> float:
     """Variance of a blob's edge, for a vehicle with this side: (share side)^2 plus a processed pixel squared."""
     return (share * side) ** 2 + pixel**2
 
 
-@part
+@inlined
 def edge_sigma(side: float, share: float, pixel: float) -> float:
     """Standard deviation of a blob's edge, see `edge_variance`."""
     return np.hypot(share * side, pixel)

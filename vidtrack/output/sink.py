@@ -23,7 +23,7 @@ _HALF_PX = 0.5
 _UNLIMITED = (-np.inf, -np.inf, np.inf, np.inf)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Step:
     """The results of the whole pipeline for one frame or one radar scan.
 

@@ -21,14 +21,16 @@ L   what lasts, and what this picture contradicts:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.output.sink import Step
+from vidtrack.scan import Scan
 from vidtrack.tracking.picture.border import Border
-from vidtrack.tracks import Tracks
 
 _PIXEL = 0.15
 """Processed pixels; standard deviation of a centroid from picture to picture."""
@@ -49,26 +51,49 @@ _UNIFORM = 1 / 12
 
 def stated(step: Step) -> Step:
     """The step with covariances as they are stated, in pixels of the scene; as it is where blobs have no outlines."""
-    if not step.scan.rim or not len(step.tracks):
-        return step
-    return replace(step, tracks=_restated(step))
+    return all_stated([step])[0]
 
 
-def _restated(step: Step) -> Tracks:
-    tracks = step.tracks
-    pixel, rim = step.scan.pixel, step.scan.rim
-    place = list(tracks.position)
-    P = tracks.P[:, place][:, :, place]
-    shared, own = tracks.group >= 0, tracks.measurement >= 0
-    side = np.maximum(tracks.box[:, 2:] - 2 * rim, 2 * pixel)
+def all_stated(steps: Sequence[Step]) -> list[Step]:
+    """Each step as it is stated; those whose scans are alike are calculated together."""
+    done: list[Step] = []
+    for outlined, alike in groupby(steps, _outlines):
+        some = list(alike)
+        if outlined is None:
+            done += some
+            continue
+        ends = np.cumsum([len(step.tracks) for step in some])
+        for step, P in zip(some, np.split(_restated(some), ends[:-1]), strict=True):
+            done.append(replace(step, tracks=replace(step.tracks, P=P)))
+    return done
+
+
+def _outlines(step: Step) -> tuple[float, ...] | None:
+    """What the stated errors depend on besides the tracks; None where blobs have no outlines."""
+    scan = step.scan
+    if not scan.rim or not len(step.tracks):
+        return None
+    return (scan.rim, scan.pixel, *(() if scan.surveyed is None else scan.surveyed.tolist()))
+
+
+def _restated(steps: Sequence[Step]) -> Floats:
+    """(N, n, n) stated covariances of the tracks of steps with scans that are alike."""
+    scan, place = steps[0].scan, list(steps[0].tracks.position)
+    pixel = scan.pixel
+    whole, box, group, measurement = (
+        np.concatenate([getattr(step.tracks, name) for step in steps]) for name in ("P", "box", "group", "measurement")
+    )
+    P = whole[:, place][:, :, place]
+    shared, own = group >= 0, measurement >= 0
+    side = np.maximum(box[:, 2:] - 2 * scan.rim, 2 * pixel)
     edges = (_EDGE_SHARE * side) ** 2 + (_EDGE_PIXEL * pixel) ** 2
     measured = np.where(shared[:, None], 1 / edges, np.where(own[:, None], (_PIXEL * pixel) ** -2, 0.0))
-    differs, lacks = _contradicted(step)
-    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks, differs + _beside(step, side))
+    differs, lacks = (np.concatenate(parts) for parts in zip(*map(_contradicted, steps), strict=True))
+    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks, differs + _beside(scan, box, side))
     eye = np.eye(len(place))
     updated = np.linalg.solve(eye + P * measured[:, None, :], P)  # (P^-1 + W^-1)^-1, for a singular P too
     updated = (updated + np.swapaxes(updated, 1, 2)) / 2
-    return replace(tracks, P=_with_position(tracks.P, place, updated + _diagonal(lasting), pixel))
+    return _with_position(whole, place, updated + _diagonal(lasting), pixel)
 
 
 def _outline(side: Floats, pixel: float) -> Floats:
@@ -92,9 +117,9 @@ def _contradicted(step: Step) -> tuple[Floats, Floats]:
     return _UNIFORM * (more**2 + off**2), np.minimum(more, 0.0) ** 2 / 4
 
 
-def _beside(step: Step, side: Floats) -> Floats:
-    """(T, 2) variances along the border of the picture, where it cuts boxes."""
-    cut = Border().of(step.scan).sides(step.tracks.box)
+def _beside(scan: Scan, box: Floats, side: Floats) -> Floats:
+    """(T, 2) variances along the border of the picture, where it cuts boxes (T, 4)."""
+    cut = Border().of(scan).sides(box)
     return (_BESIDE * side) ** 2 * np.column_stack([cut[:, 1] | cut[:, 3], cut[:, 0] | cut[:, 2]])
 
 

@@ -16,7 +16,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.parquet import ParquetParts
 from vidtrack.output.sink import Step, seen
-from vidtrack.output.stated import stated
+from vidtrack.output.stated import all_stated
 from vidtrack.tracks import Status
 
 if TYPE_CHECKING:  # loads SciPy; needed only at calibrated sites
@@ -135,7 +135,7 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
 
     road  computes the columns of ROAD, in coordinates of the scene, which do not move with the camera
     """
-    steps = [stated(step) for step in steps]
+    steps = all_stated(steps)
     counts = [len(step.tracks) for step in steps]
     position, velocity = list(steps[0].tracks.position), list(steps[0].tracks.velocity)
     edge = seen(steps)

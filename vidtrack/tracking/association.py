@@ -42,7 +42,8 @@ class Association(NamedTuple):
     @property
     def measurement(self) -> Ints:
         """(K,) measurement of each successor, alone or shared; -1: none."""
-        return np.where(self.shared >= 0, self.shared, self.taken)
+        on = self.shared >= 0
+        return np.where(on, self.shared, self.taken) if np.count_nonzero(on) else self.taken
 
 
 class Timing(Protocol):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.errors import ScanError
 from vidtrack.estimate.noise import BOX_JITTER, box_noise
 from vidtrack.scan import Scan
@@ -44,6 +44,16 @@ def absolute(box: Floats, xy: Floats) -> Floats:
     for i in range(len(box)):
         for axis in range(min(2, xy.shape[1])):
             placed[i, axis] += xy[i, axis]
+    return placed
+
+
+@kernel
+def around(x: Floats, box: Floats) -> Floats:
+    """(T, 4) boxes in the picture, from boxes relative to the positions of states [x, vx, y, vy, ...] (T, n)."""
+    placed = box.copy()
+    for t in range(len(box)):
+        for axis in range(min(2, x.shape[1] // 2)):
+            placed[t, axis] += x[t, 2 * axis]
     return placed
 
 
@@ -92,7 +102,7 @@ def covers(inner: Floats, outer: Floats, order: Ints) -> tuple[Ints, Floats]:
     return index, share
 
 
-@part
+@inlined
 def common(a: Floats, b: Floats) -> float:
     """Area that two boxes (4,) have in common; 0 where one of them is not known."""
     wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.gate import Pairs
-from vidtrack.associate.problem import Problem
+from vidtrack.associate.problem import Problem, logs
 from vidtrack.compiled import kernel
 from vidtrack.decision import Choices, Decision
 
@@ -30,7 +30,7 @@ def evidence(problem: Problem, decision: Decision, taken: Ints) -> tuple[Floats,
     """
     pairs = problem.pairs
     return _of_taken(
-        taken, pairs.row, pairs.measurement, pairs.nis, problem.log_ratio, problem.log_missed,
+        taken, pairs.row, pairs.measurement, pairs.nis, pairs.log_l, problem.detection, problem.inside, problem.clutter,
         decision.row, decision.measurement, decision.beta, decision.beta0,
     )  # fmt: skip
 
@@ -46,11 +46,13 @@ def _heaviest(row: Ints, measurement: Ints, beta: Floats, beta0: Floats) -> Ints
 
 @kernel
 def _of_taken(
-    taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_ratio: Floats, log_missed: Floats,
+    taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_l: Floats,
+    detection: Floats, inside: Floats, clutter: Floats,
     chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """(T,) log-likelihood ratio and NIS of the measurement taken by each row; pairs and weights in row order."""
-    ratio, share, nis = log_missed.copy(), np.ones(len(taken)), np.full(len(taken), np.nan)
+    ratio, log_ratio = logs(detection, inside, clutter, row, log_l)
+    share, nis = np.ones(len(taken)), np.full(len(taken), np.nan)
     for t in range(len(taken)):
         if taken[t] < 0:
             share[t] = beta0[t]

@@ -31,9 +31,9 @@ class EvenClutter:
     def reach(self, z: Floats) -> None:
         """What is surveyed has no box."""
 
-    def at(self, z: Floats) -> Floats:
-        """Ones."""
-        return np.ones(len(z))
+    def at(self, z: Floats) -> float | Floats:
+        """One."""
+        return 1.0
 
     def forget(self, fade: float) -> None:
         """Nothing is remembered."""

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.rows import every
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.associate.hard import GNN, HARD, Associator
+from vidtrack.associate.hard import GNN, HARD, Associator, one_hot
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.two_stage import TwoStage
 from vidtrack.compiled import kernel
-from vidtrack.decision import Event
+from vidtrack.decision import Decision, Event
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import distinct
 from vidtrack.tracking.choices import heaviest
@@ -45,24 +46,52 @@ class Immediate:
         self, whole: Problem, shared: Ints, view: View | None, register: Register, events: list[Event]
     ) -> Association:
         """Confirmed tracks first, then the measurements that they share, then tentative tracks."""
-        problem, unresolved = whole.apart(shared), shared
-        pairs, count = problem.pairs, problem.measurements
+        problem = whole.apart(shared)
         confirmed = register.status != TENTATIVE
-        decision = self.two_stage.decide(self.rule, problem, confirmed)
-        shared, hides = self.sharing.claim(view, decision, confirmed, count)
-        decision = decision.without(shared >= 0)
-        free = _unclaimed(hides, decision.measurement, decision.beta, unresolved)
-        tentative = ~confirmed
-        open_to_all = free.take(pairs.measurement) & tentative.take(pairs.row)
-        if np.count_nonzero(open_to_all):
-            second = self.two_stage.decide(self._starter, problem.only(open_to_all), tentative)
-            free = _unclaimed(free, second.measurement, second.beta, unresolved)
-            decision = decision.joined(second)
-        shared, free = self.sharing.catch(view, decision, np.maximum(shared, unresolved), free)
-        free &= self.two_stage.sure(problem.scan) & self.births
+        single = self.two_stage.single(problem.scan)
+        if single and isinstance(self.rule, GNN):
+            found = self._by_turns(self.rule, problem, shared, view, confirmed)
+        else:
+            found = self._by_weights(problem, shared, view, confirmed)
+        decision, taken, shared, hides, free = found
+        if not (self.births and single):
+            free &= self.two_stage.sure(problem.scan) & self.births
         if not self.rule.gated_births:
             free[whole.pairs.measurement] = False
-        return Association(whole, decision, heaviest(decision), shared, hides, distinct(problem.scan, free))
+        return Association(whole, decision, taken, shared, hides, distinct(problem.scan, free))
+
+    def _by_turns(
+        self, rule: GNN, problem: Problem, unresolved: Ints, view: View | None, confirmed: Mask
+    ) -> tuple[Decision, Ints, Ints, Mask, Mask]:
+        """Decision, taken (T,), shared (T,), hides (M,) and free (M,), where each measurement is taken as a whole."""
+        taken = rule.taken(problem, confirmed, every(problem.measurements))
+        shared, hides = self.sharing.claim(view, taken, confirmed, problem.measurements)
+        taken, free = _given(taken, shared, hides, unresolved)
+        tentative = ~confirmed
+        if np.count_nonzero(tentative):
+            second = rule.taken(problem, tentative, free)
+            taken, free = _given(np.maximum(taken, second), shared, free, unresolved)
+        shared, free = self.sharing.catch(view, taken, np.maximum(shared, unresolved), free)
+        return one_hot(taken), taken, shared, hides, free
+
+    def _by_weights(
+        self, problem: Problem, unresolved: Ints, view: View | None, confirmed: Mask
+    ) -> tuple[Decision, Ints, Ints, Mask, Mask]:
+        """The same, where tracks may have shares of measurements, or take them by their scores."""
+        pairs = problem.pairs
+        decision = self.two_stage.decide(self.rule, problem, confirmed)
+        shared, hides = self.sharing.claim(view, heaviest(decision), confirmed, problem.measurements)
+        decision = decision.without(shared >= 0)
+        free, left = _left_over(
+            hides, decision.measurement, decision.beta, unresolved, confirmed, pairs.row, pairs.measurement
+        )
+        if np.count_nonzero(left):
+            second = self.two_stage.decide(self._starter, problem.only(left), ~confirmed)
+            free = _unclaimed(free, second.measurement, second.beta, unresolved)
+            decision = decision.joined(second)
+        taken = heaviest(decision)
+        shared, free = self.sharing.catch(view, taken, np.maximum(shared, unresolved), free)
+        return decision, taken, shared, hides, free
 
     @property
     def _starter(self) -> Associator:
@@ -71,7 +100,7 @@ class Immediate:
 
     def shown(self, rows: int) -> Mask:
         """(rows,) all."""
-        return np.ones(rows, bool)
+        return every(rows)
 
     def visible(self, tracks: Tracks) -> Tracks:
         """All."""
@@ -94,6 +123,30 @@ class Immediate:
 
     def add(self, count: int) -> None:
         """Nothing is remembered of a row."""
+
+
+@kernel
+def _given(taken: Ints, shared: Ints, free: Mask, unresolved: Ints) -> tuple[Ints, Mask]:
+    """(T,) `taken` without the rows that share (T,); (M,) those of the free measurements that are still free."""
+    kept, left = np.empty_like(taken), free.copy()
+    for t in range(len(taken)):
+        kept[t] = -1 if shared[t] >= 0 else taken[t]
+        for j in (kept[t], unresolved[t]):
+            if j >= 0:
+                left[j] = False
+    return kept, left
+
+
+@kernel
+def _left_over(
+    free: Mask, measurement: Ints, beta: Floats, unresolved: Ints, confirmed: Mask, row: Ints, of_pair: Ints
+) -> tuple[Mask, Mask]:
+    """(M,) the unclaimed measurements, and (N,) the pairs that they leave to tracks which are not confirmed (T,)."""
+    left = _unclaimed(free, measurement, beta, unresolved)
+    open_ = np.empty(len(row), np.bool_)
+    for k in range(len(row)):
+        open_[k] = left[of_pair[k]] and not confirmed[row[k]]
+    return left, open_
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import bdtrc
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.errors import ConfigError
 from vidtrack.tracking.register import Register
 from vidtrack.tracks import MERGED, TENTATIVE
@@ -95,8 +95,10 @@ class LifeCycle:
 
     def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
         """(T,) tentative rows with enough hits, age and travel (T,); size (T,) of the objects."""
-        often = _often(register.history, self.confirm_window, self.confirm_hits)
-        return often & grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
+        return _often(
+            register.history, self.confirm_window, self.confirm_hits,
+            register.status, register.born_s, travel, t, _full(self.confirm_s), self.confirm_travel * size,
+        )  # fmt: skip
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
@@ -117,7 +119,12 @@ class LifeCycle:
 
 def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
     """(T,) tentative rows that are old enough and whose travel (T,) is at least `least` (T,)."""
-    return _grown(register.status, register.born_s, travel, t, age_s * (1 - 1e-9), least)
+    return _grown(register.status, register.born_s, travel, t, _full(age_s), least)
+
+
+def _full(age_s: float) -> float:
+    """An age that counts as this one, in spite of rounding."""
+    return age_s * (1 - 1e-9)
 
 
 def unseen(
@@ -190,11 +197,14 @@ def _idle(entered: Mask, travelled: Floats, box: Floats, rest_s: Floats, now: fl
 
 
 @kernel
-def _often(history: Ints, window: int, least: int) -> Mask:
-    """(T,) rows with at least `least` hits within the window."""
-    often = np.zeros(len(history), np.bool_)
+def _often(
+    history: Ints, window: int, hits: int,
+    status: np.ndarray, born_s: Floats, travel: Floats, now: float, old: float, least: Floats,
+) -> Mask:  # fmt: skip
+    """(T,) grown rows with so many hits within the window."""
+    often = _grown(status, born_s, travel, now, old, least)
     for t in range(len(history)):
-        often[t] = _counts(history[t], window)[0] >= least
+        often[t] = often[t] and _counts(history[t], window)[0] >= hits
     return often
 
 
@@ -207,7 +217,7 @@ def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> M
     return hopeless
 
 
-@part
+@inlined
 def _counts(history: int, window: int) -> tuple[int, int]:
     """Hits and misses of a row in its last `window` scans; its birth is the highest bit of its history."""
     hits, misses = 0, 0

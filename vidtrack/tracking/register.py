@@ -37,10 +37,16 @@ class Register:
              "rest_s", "missed", "visible")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
+    _TABLES = (
+        ("born_s", "updated_s", "merged_since_s", "exchange", "score", "best", "alone_s", "travelled", "rest_s"),
+        ("id", "history", "merged", "run", "label"),
+    )
+    """Columns of one type, which are kept and made longer together; the others one by one."""
 
     def __init__(self, dim: int, smooth: bool = False, stations: int = 1) -> None:
         """dim of the positions; whether a smoother needs more; number of stations."""
-        self.columns = self.STATE[1:] + (self.LINKS if smooth else ())
+        together = {name for names in self._TABLES for name in names}
+        self._others = tuple(n for n in self.STATE[1:] if n not in together) + (self.LINKS if smooth else ())
         self.next_id = 1
         self.id = np.empty(0, np.int64)
         self.status = np.empty(0, np.int8)
@@ -152,12 +158,20 @@ class Register:
             "rest_s": t,
             "missed": 0,
         }
-        for name in self.columns:
+        first = len(self)
+        for names in self._TABLES:
+            table = self._table(names)
+            longer = np.empty((len(names), first + count), table.dtype)
+            longer[:, :first] = table
+            for name, column in zip(names, longer, strict=True):
+                column[first:] = new.get(name, np.nan)
+                setattr(self, name, column)
+        for name in self._others:
             old = getattr(self, name)
-            longer = np.empty((len(old) + count, *old.shape[1:]), old.dtype)
-            longer[: len(old)] = old
-            longer[len(old) :] = new.get(name, np.nan)
-            setattr(self, name, longer)
+            wider = np.empty((first + count, *old.shape[1:]), old.dtype)
+            wider[:first] = old
+            wider[first:] = new.get(name, np.nan)
+            setattr(self, name, wider)
         return ids
 
     def rename(self, rows: np.ndarray) -> tuple[Ints, Ints]:
@@ -170,8 +184,15 @@ class Register:
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
-        for name in self.columns:
+        for names in self._TABLES:
+            for name, column in zip(names, self._table(names).take(rows, axis=1), strict=True):
+                setattr(self, name, column)
+        for name in self._others:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
+
+    def _table(self, names: tuple[str, ...]) -> np.ndarray:
+        """(columns, T) columns of one type."""
+        return np.array([getattr(self, name) for name in names])
 
 
 @kernel

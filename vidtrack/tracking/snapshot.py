@@ -6,7 +6,7 @@ from typing import Any
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.estimate.motion.model import Motion
-from vidtrack.tracking.boxes import absolute
+from vidtrack.tracking.boxes import around
 from vidtrack.tracking.register import Register
 from vidtrack.tracks import Tracks
 
@@ -24,7 +24,7 @@ def snapshot(
         status=register.status.copy(),
         x=x.copy(),
         P=P.copy(),
-        box=absolute(register.box, xy),
+        box=around(x, register.box),
         group=register.merged.copy(),
         group_since_s=register.merged_since_s.copy(),
         age_s=t - register.born_s,

@@ -90,11 +90,13 @@ class Stations:
         lasting_s = self.each[scan.station].lasting_s
         return min(1.0, since / lasting_s) if lasting_s > 0 else 1.0
 
-    def share(self, scan: Scan, x: Floats, model: Motion) -> Floats:
-        """(T,) share of its detection probability with which the scan's station covers states x (T, n) of a model."""
+    def share(self, scan: Scan, x: Floats, model: Motion) -> float | Floats:
+        """Share of its detection probability with which the scan's station covers states x (T, n) of a model: (T,), or
+        one for all.
+        """
         coverage = self.each[scan.station].coverage
         if coverage is None:
-            return np.ones(len(x))
+            return 1.0
         return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
 
     def take(self, scan: Scan) -> float:
@@ -106,9 +108,9 @@ class Stations:
         return 0.0 if np.isnan(before) else scan.t - before
 
     def expected(
-        self, scan: Scan, zhat: Floats, register: Register, share: Floats, since: float
-    ) -> tuple[Floats, float | Floats]:
-        """P_D (T,) of the rows of which the station covers a share (T,), and its clutter density there.
+        self, scan: Scan, zhat: Floats, register: Register, share: float | Floats, since: float
+    ) -> tuple[float | Floats, float | Floats]:
+        """P_D of the rows of which the station covers a share, and its clutter density there.
 
         zhat (T, m) predicted measurements; since: seconds after the station's last scan
         """
@@ -123,9 +125,9 @@ class Stations:
         return detection * share, clutter
 
     def record(
-        self, scan: Scan, register: Register, share: Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
+        self, scan: Scan, register: Register, share: float | Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
     ) -> Mask:
-        """Note which rows (T,) the scan shows, of a covered share and an expected P_D (T,); returns those looked at."""
+        """Note which rows (T,) the scan shows, of a covered share and an expected P_D; returns those looked at."""
         number = scan.station
         looked = hit | (share >= 0.5)
         register.record_hits(hit, sure, looked, number, scan.t, dt)

@@ -27,7 +27,7 @@ from vidtrack.estimate.sensor import POSITION
 from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association, Timing
-from vidtrack.tracking.boxes import absolute, longer
+from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.choices import choices, evidence
 from vidtrack.tracking.deferred.deferred import Deferred
 from vidtrack.tracking.deferred.forest import ForestRule
@@ -59,7 +59,7 @@ class Outcome(NamedTuple):
     def after(self, kept: Mask, born: Ints) -> Outcome:
         """The outcome of the tracks kept (T,), then of those born from measurements (B,)."""
         measurement, nis = self.measurement, self.nis
-        if not kept.all():
+        if np.count_nonzero(kept) < len(kept):
             measurement, nis = measurement[kept], nis[kept]
         if len(born):
             measurement, nis = np.concatenate([measurement, born]), np.concatenate([nis, each(np.nan, len(born))])
@@ -299,7 +299,9 @@ class Tracker:
     def _delete(self, found: Association, t: float, events: list[Event]) -> Mask:
         """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         register = self.register
-        left = (register.history & 1 == 0) & (self.picture.in_view(self.bank) < 0.5)  # unseen, and likelier outside
+        left = register.history & 1 == 0
+        if np.count_nonzero(left):
+            left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
         register.come_in(self.picture.cut(self._boxes()))
@@ -315,7 +317,8 @@ class Tracker:
                 (idle & ~left & ~hopeless, "never travelled and stands still"),
                 (parts & ~left, "part of the vehicle that it never left"),
             ):
-                events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))
+                if np.count_nonzero(gone):
+                    events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))
             self._keep(~going)
         self.sharing.merge(shared, register, t, events)
         return ~going
@@ -324,7 +327,7 @@ class Tracker:
         """Start tentative tracks from free measurements (B,), which are returned, and confirm those that qualify."""
         born = found.free.nonzero()[0]
         if len(born):
-            born = self.sharing.newcomers(born, view, self._boxes()[self.register.status != TENTATIVE])
+            born = self.sharing.newcomers(born, view, self.register, self.bank)
         if len(born):
             self._start(born, scan, events)
         self._confirm(scan.t, events)
@@ -370,10 +373,6 @@ class Tracker:
     def _xy(self) -> Floats:
         """(T, d) the tracks' positions."""
         return self.bank.x.take(self.model.position, axis=1)
-
-    def _boxes(self) -> Floats:
-        """(T, 4) the tracks' boxes in the picture."""
-        return absolute(self.register.box, self._xy())
 
     def _keep(self, kept: Mask) -> None:
         self.timing.keep(kept)

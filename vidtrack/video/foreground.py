@@ -14,7 +14,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.video.frame import Frame, Image
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Foreground:
     """Foreground of one frame at the processed size.
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Ints
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.frame import Image
 
 Runs = NDArray[np.int32]
@@ -39,7 +39,7 @@ def find_runs(mask: Image, holes: np.bool_) -> tuple[Runs, Runs, Runs]:
     return row[:n], start[:n], stop[:n]
 
 
-@part
+@inlined
 def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: Runs, start: Runs, stop: Runs) -> int:
     """Fill row, start, stop and return the number of runs.
 
@@ -72,7 +72,7 @@ def _find_runs(words: Words, rest: np.uint64, outside: np.uint64, w: int, row: R
     return n
 
 
-@part
+@inlined
 def _rest(pixels: Image, filler: np.bool_) -> np.uint64:
     """The last pixels, fewer than eight, as a padded word."""
     rest = np.full(8, filler, np.uint8)
@@ -81,13 +81,13 @@ def _rest(pixels: Image, filler: np.bool_) -> np.uint64:
     return rest.view(np.uint64)[0]
 
 
-@part
+@inlined
 def _not_zero(word: np.uint64) -> np.uint64:
     """The highest bit of each byte that is not 0."""
     return ((word & ~_HIGHS) + ~_HIGHS | word) & _HIGHS
 
 
-@part
+@inlined
 def _lowest_byte(word: np.uint64) -> int:
     """Number of the lowest byte that is not 0, of a word that is not 0."""
     number = 0
@@ -98,7 +98,7 @@ def _lowest_byte(word: np.uint64) -> int:
     return number + 1 if word & np.uint64(0xFF) == 0 else number
 
 
-@part
+@inlined
 def _after_zeros(words: Words, k: int) -> int:
     """Index of the first word from k on that is not 0; len(words) if there is none."""
     while k + 8 <= len(words) and _all_zero(words, k):
@@ -108,7 +108,7 @@ def _after_zeros(words: Words, k: int) -> int:
     return k
 
 
-@part
+@inlined
 def _all_zero(words: Words, k: int) -> bool:
     """Whether the eight words from k on are all 0."""
     total = _NONE
@@ -163,7 +163,7 @@ def join(parent: Ints, a: int, b: int) -> None:
         parent[a] = b
 
 
-@part
+@inlined
 def _root(parent: Ints, k: int) -> int:
     while parent[k] != k:
         parent[k] = parent[parent[k]]

@@ -6,7 +6,6 @@ from blob_scene import centred, confirmed_ids, default_tracker, events, nearest_
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.tracking.boxes import overlapping
 from vidtrack.tracking.occlusion.edges import from_edges
@@ -175,10 +174,8 @@ def test_a_lone_members_edges_are_those_of_its_blob():
 def catch(tracks, blobs, idle, free):
     """The blob that each track (T,) continues on, and which of the free blobs (M,) still are."""
     view = View(blobs, blobs, tracks, np.full(len(tracks), 9), Border(), 0.3)
-    busy = np.flatnonzero(~idle)
-    elsewhere = np.full(len(busy), len(blobs))
-    got = Decision(np.arange(len(tracks)), busy, elsewhere, np.ones(len(busy)), idle.astype(float))
-    shared, still = Occlusion().catch(view, got, np.full(len(tracks), -1), free.copy())
+    taken = np.where(idle, -1, len(blobs))
+    shared, still = Occlusion().catch(view, taken, np.full(len(tracks), -1), free.copy())
     return shared.tolist(), still.tolist()
 
 

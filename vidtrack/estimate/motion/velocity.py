@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -73,12 +74,10 @@ class ConstantVelocity(Columns):
         return at_rest(position, cov, np.repeat((self.speed * scale)[:, None], self.states, axis=1))
 
 
-@kernel
+@lru_cache(maxsize=16)
 def _moved_on(dim: int, dt: float) -> Floats:
-    """(1, n, n) identity, plus dt from each velocity to its position."""
-    F = np.zeros((1, 2 * dim, 2 * dim))
-    for a in range(2 * dim):
-        F[0, a, a] = 1.0
+    """(1, n, n) identity, plus dt from each velocity to its position; cached: do not write to it."""
+    F = np.eye(2 * dim)[None]
     for a in range(0, 2 * dim, 2):
         F[0, a, a + 1] = dt
     return F

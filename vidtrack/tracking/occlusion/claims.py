@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.estimate.noise import edge_sigma
 from vidtrack.tracking.boxes import covers
 
@@ -38,7 +38,7 @@ def claims(
     return shared, hides
 
 
-@part
+@inlined
 def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, order: Ints, cover: float) -> Ints:
     """(T,) the blob each track shares with others, or lies on without being assigned it; -1 for all others."""
     shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
@@ -62,7 +62,7 @@ def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, ord
     return shared
 
 
-@part
+@inlined
 def _changed(box: Floats, blob: Floats, growth: float, edge: float, pixel: float) -> bool:
     """Whether a blob (4,) has another size than the vehicle's box (4,), or one edge where it was and the other not."""
     ratio = blob[2] * blob[3] / (box[2] * box[3])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
 from vidtrack.errors import ConfigError
@@ -23,13 +23,13 @@ from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import pieces
-from vidtrack.tracking.boxes import absolute, overlapping
-from vidtrack.tracking.choices import heaviest
+from vidtrack.tracking.boxes import absolute, around, overlapping
 from vidtrack.tracking.occlusion.claims import claims
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.sharing import Exclusive
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracks import TENTATIVE
 
 SETTLED = 5
 """Updates after which a track's box is reliable."""
@@ -75,28 +75,30 @@ class Occlusion:
         """(T,) none: blobs have edges, and are claimed after the association."""
         return ALONE.unresolved(problem, shown, register, bank, dt)
 
-    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+    def claim(self, view: View | None, taken: Ints, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.
 
         The edges count where a track shares its blob with others, lies on a blob that it was not assigned, or where
         its blob no longer fits the vehicle.
         """
         if view is None:
-            return ALONE.claim(view, decision, confirmed, count)
+            return ALONE.claim(view, taken, confirmed, count)
         reliable = (view.hits > SETTLED) & ~view.border.cut(view.predicted)
         return claims(
-            view.predicted, heaviest(decision), confirmed, reliable, view.blobs,
+            view.predicted, taken, confirmed, reliable, view.blobs,
             view.blobs[:, 0].argsort(kind="stable"), self.cover, self.growth, self.edge, view.border.pixel,
         )  # fmt: skip
 
-    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+    def catch(self, view: View | None, taken: Ints, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """`shared` (T,) and `free` (M,) after tracks that got nothing took the free blob that each overlaps most.
 
         The blob's shape has changed so much that its centroid left the gate; it is still where the vehicle is.
         """
         if view is None:
             return shared, free
-        idle = (heaviest(decision) < 0) & (shared < 0)
+        idle = (taken < 0) & (shared < 0)
+        if not np.count_nonzero(idle):
+            return shared, free
         untaken = free & (np.bincount(shared[shared >= 0], minlength=len(free)) == 0)
         caught = overlapping(view.predicted, view.blobs, idle, untaken, self.overlap)
         free[caught[caught >= 0]] = False
@@ -172,6 +174,9 @@ class Occlusion:
         events.extend(Event.each(t, register.id[alone], "split", "alone on its blob again"))
         register.merged = merged
 
-    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
-        """Those of the blobs born (B,) that are no pieces of known vehicles, boxes (V, 4)."""
-        return born if view is None else born[~pieces(view.blobs[born], known)]
+    def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
+        """Those of the blobs born (B,) that are no pieces of known vehicles."""
+        if view is None:
+            return born
+        known = around(bank.x, register.box)[register.status != TENTATIVE]
+        return born[~pieces(view.blobs[born], known)]

@@ -7,10 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
-from vidtrack.arrays.rows import no_index
-from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.arrays.rows import every, no_index
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
-from vidtrack.decision import Decision, Event
+from vidtrack.decision import Event
 from vidtrack.estimate.bank import Estimator
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.picture.picture import View
@@ -29,13 +29,13 @@ class Sharing(Protocol):
         shown  (T,) rows that are output; dt seconds after the last scan
         """
 
-    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+    def claim(self, view: View | None, taken: Ints, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """(T,) the measurement whose edges update each track, -1: none; (M,) those that may hide another target.
 
-        decision  about the confirmed (T,) tracks and all `count` measurements
+        taken  (T,) which of all `count` measurements each of the confirmed (T,) tracks has; -1: none
         """
 
-    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+    def catch(self, view: View | None, taken: Ints, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """`shared` (T,) and `free` (M,) after tracks that got nothing took free measurements that they overlap."""
 
     def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
@@ -47,8 +47,8 @@ class Sharing(Protocol):
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """Update the groups of tracks on the same shared (T,) measurement, with events."""
 
-    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
-        """Those of the free measurements born (B,) that are no pieces of known targets, boxes (V, 4)."""
+    def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
+        """Those of the free measurements born (B,) that are no pieces of known targets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +61,11 @@ class Exclusive:
         """(T,) none."""
         return no_index(problem.rows)
 
-    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+    def claim(self, view: View | None, taken: Ints, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """No track shares a measurement, and all measurements may be of new targets."""
-        return no_index(len(confirmed)), np.ones(count, bool)
+        return no_index(len(confirmed)), every(count)
 
-    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+    def catch(self, view: View | None, taken: Ints, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """No track continues on what its gate does not hold."""
         return shared, free
 
@@ -79,6 +79,6 @@ class Exclusive:
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """No tracks are merged."""
 
-    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
+    def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
         """All of them."""
         return born

@@ -12,7 +12,7 @@ from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.bank import Estimator
 from vidtrack.scan import Scan
-from vidtrack.tracking.boxes import absolute, follow, longer
+from vidtrack.tracking.boxes import absolute, around, follow, longer
 from vidtrack.tracking.picture.border import Border
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
@@ -147,16 +147,15 @@ class Picture:
 
     def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
         """Far vehicles look small: boxes grow on their way from states `before` (T, n)."""
-        if self.road:
-            boxes = (absolute(register.box, x.take(bank.model.position, axis=1)) for x in (before, bank.x))
-            register.box *= self.road.growth(*boxes)
+        if self.road and self.road.sizes.known:
+            register.box *= self.road.growth(around(before, register.box), around(bank.x, register.box))
 
     def view(self, scan: Scan, register: Register, bank: Estimator) -> View | None:
         """What the scan shows within its border; None where measurements have no boxes."""
         self.border = self.border.of(scan)
         if scan.box is None:
             return None
-        predicted = absolute(register.box, bank.x.take(bank.model.position, axis=1))
+        predicted = around(bank.x, register.box)
         return View(absolute(scan.box, scan.z), scan.box, predicted, bank.hits, self.border, self.box_s)
 
     def weigh(self, problem: Problem, view: View | None) -> Problem:

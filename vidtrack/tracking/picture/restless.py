@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import located
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.tracking.boxes import best_cover, longer
 from vidtrack.tracks import TENTATIVE, Tracks
 
@@ -76,6 +76,6 @@ def _count_ended(starts: Floats, cell: float, alive: Ints, xy: Floats) -> None:
             starts[_cell(xy[i, 1], cell, starts.shape[0]), _cell(xy[i, 0], cell, starts.shape[1])] += 1.0
 
 
-@part
+@inlined
 def _cell(place: float, cell: float, count: int) -> int:
     return min(max(int(place / cell), 0), count - 1)

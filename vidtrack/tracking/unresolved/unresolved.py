@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
 from vidtrack.estimate.bank import Estimator, Mixture
@@ -65,11 +65,11 @@ class Unresolved:
             shared[register.id == register.id[row]] = shared[row]
         return shared
 
-    def claim(self, view: View | None, decision: Decision, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
+    def claim(self, view: View | None, taken: Ints, confirmed: Mask, count: int) -> tuple[Ints, Mask]:
         """Nothing is shared beyond what `unresolved` found."""
         return np.full(len(confirmed), -1), np.ones(count, bool)
 
-    def catch(self, view: View | None, decision: Decision, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
+    def catch(self, view: View | None, taken: Ints, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """No track continues on what its gate does not hold."""
         return shared, free
 
@@ -134,7 +134,7 @@ class Unresolved:
         register.merged_since_s[joined], register.merged_since_s[alone] = t, np.nan
         register.merged = merged
 
-    def newcomers(self, born: Ints, view: View | None, known: Floats) -> Ints:
+    def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
         """All of them."""
         return born
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.scene import BEAM, Levels
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import OBJECTS, SIDES, connect, find_runs
@@ -73,6 +73,6 @@ def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> Non
             hit[row[k], start[k] : stop[k]] = BEAM
 
 
-@part
+@inlined
 def _blur(before: np.float32, middle: np.float32, after: np.float32) -> np.float32:
     return np.float32(0.25) * before + np.float32(0.5) * middle + np.float32(0.25) * after

@@ -6,7 +6,7 @@ import numpy as np
 
 from vidtrack.arrays.median import median
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import Levels, Scene
 from vidtrack.video.frame import Image
@@ -28,13 +28,13 @@ def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
                 _amplify(plane[y], g, black)
 
 
-@part
+@inlined
 def _amplify(row: Levels, g: np.float32, black: np.float32) -> None:
     for x in range(len(row)):
         row[x] = min(black + g * (row[x] - black), np.float32(255))
 
 
-@part
+@inlined
 def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     """Median of (Y - black) / (B - black) over points that were not covered in the last picture; 1 if too few.
 
@@ -56,7 +56,7 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
     return g if 1 / _LARGEST < g < _LARGEST else np.float32(1)
 
 
-@part
+@inlined
 def _mostly_steady(ratio: Floats) -> bool:
     """Whether the median of ratio (N,) is within _STEP of 1."""
     above = below = 0

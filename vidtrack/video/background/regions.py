@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.scene import Scene
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import CORNERS, HOLES, OBJECTS, SIDES, Runs, connect, find_runs
@@ -85,7 +85,7 @@ def find_ghosts(mask: Image, luma: Image, scene: Scene, settled_s: np.float32) -
     return row[:n], start[:n], stop[:n]
 
 
-@part
+@inlined
 def _contrast(luma: NDArray, y: int, x: int) -> np.float32:
     across = abs(np.float32(luma[y, x + _REACH]) - np.float32(luma[y, x - _REACH]))
     return across + abs(np.float32(luma[y + _REACH, x]) - np.float32(luma[y - _REACH, x]))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import Runs
@@ -107,7 +107,7 @@ def learn(
                 scene.cr[y // 2, x] += share * (np.float32(picture.cr[y // 2, x]) - scene.cr[y // 2, x])
 
 
-@part
+@inlined
 def _count(luma: Image, scene: Scene, y: int, taken: Image, weight: np.float32, dt: np.float32) -> None:
     """Count the seconds of cover in row y, where taken (w,) is not 0, and average the cover."""
     for x in range(len(luma)):
@@ -158,7 +158,7 @@ def spare(covered_s: Levels, box: Floats, longest_s: np.float32) -> None:
                 covered_s[y, x] = min(covered_s[y, x], longest_s)
 
 
-@part
+@inlined
 def _adopt(picture: Picture, scene: Scene, y: int, x: int) -> None:
     scene.former[y, x] = scene.luma[y, x]
     scene.luma[y, x] = picture.luma[y, x]

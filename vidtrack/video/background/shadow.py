@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
@@ -120,7 +120,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     return count
 
 
-@part
+@inlined
 def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
     """Deviation [grey levels] of the colour from the scene's colour times r, and the scene's colour."""
     blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
@@ -129,7 +129,7 @@ def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tu
     return max(abs(off_blue), abs(off_red)), max(abs(blue), abs(red))
 
 
-@part
+@inlined
 def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
     """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
     h, w = luma.shape

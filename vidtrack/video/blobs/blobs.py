@@ -22,7 +22,7 @@ _RIM = 1.5
 compared: the median at drawn sites (tools/score_speeds.py)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Blobs:
     """Connected regions, in source pixels; a pixel is a unit square around its integer position.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import CORNERS, OBJECTS, Runs, components, connect, find_runs
 
@@ -45,7 +45,7 @@ def links(row: Runs, start: Runs, stop: Runs, label: Ints, total: int, weak: Ima
     return link
 
 
-@part
+@inlined
 def _run_at(row: Runs, start: Runs, stop: Runs, y: int, x: int) -> int:
     """Index of the run, of those in raster order, that holds the pixel (x, y); -1: none."""
     low, high = 0, len(row)  # the last run that begins there or before lies in low - 1
@@ -125,7 +125,7 @@ def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical
     return True
 
 
-@part
+@inlined
 def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
     """Whether a small box and a near one together are no larger than a vehicle of typical (2,) width and height."""
     if np.isnan(typical[0]):
@@ -135,7 +135,7 @@ def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
     return small and _union(a, b) <= _WHOLE * usual and _gap(a, b) <= _NEAR * max(typical[0], typical[1])
 
 
-@part
+@inlined
 def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
     """Whether two linked boxes together are no larger than a vehicle of typical (2,) width and height."""
     if np.isnan(typical[0]):
@@ -144,7 +144,7 @@ def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
     return _union(a, b) <= _WHOLE * typical[0] * typical[1]
 
 
-@part
+@inlined
 def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -> bool:
     """Whether two regions are each like a vehicle."""
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
@@ -156,7 +156,7 @@ def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
 
 
-@part
+@inlined
 def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     """Index of the predicted box that contains most of this box (4,); -1 for none, or if others overlap it too."""
     vehicle, sharers = -1, 0
@@ -168,7 +168,7 @@ def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
     return vehicle if sharers == 1 else -1
 
 
-@part
+@inlined
 def _share_inside(box: Floats, other: Floats) -> float:
     """Share of a box's area inside the other box, enlarged by _SPREAD."""
     common = 1.0
@@ -179,14 +179,14 @@ def _share_inside(box: Floats, other: Floats) -> float:
     return common / (box[2] * box[3])
 
 
-@part
+@inlined
 def _union(a: Floats, b: Floats) -> float:
     """Area of the bounding box of both."""
     wide = max(a[0] + a[2], b[0] + b[2]) - min(a[0], b[0])
     return wide * (max(a[1] + a[3], b[1] + b[3]) - min(a[1], b[1]))
 
 
-@part
+@inlined
 def _gap(a: Floats, b: Floats) -> float:
     """Distance between two boxes along the axis that separates them more; negative where they overlap."""
     across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.tracking.boxes import common
 from vidtrack.video.frame import Image
 
@@ -50,7 +50,7 @@ def nearest_box(inside: Image, box: Ints, predicted: Floats) -> tuple[Ints, int]
     return label, count
 
 
-@part
+@inlined
 def _filled(inside: Image, box: Ints, p: Floats) -> float:
     """Share of the box p (4,) that the region fills."""
     h, w = inside.shape
@@ -63,7 +63,7 @@ def _filled(inside: Image, box: Ints, p: Floats) -> float:
     return filled / (p[2] * p[3])
 
 
-@part
+@inlined
 def _share(a: Floats, b: Floats) -> float:
     """Intersection of two boxes as a share of the smaller one."""
     return common(a, b) / min(a[2] * a[3], b[2] * b[3])

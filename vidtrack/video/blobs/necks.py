@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.frame import Image
 
 _LEVELS = np.float32(8)  # per pixel of distance, for sorting
@@ -87,7 +87,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
     return _numbered(basin, parent)
 
 
-@part
+@inlined
 def _deepest_first(depth: NDArray[np.float32]) -> Ints:
     """The pixels of (N,) inside the region by decreasing depth; counting sort."""
     deepest = np.float32(0)
@@ -109,7 +109,7 @@ def _deepest_first(depth: NDArray[np.float32]) -> Ints:
     return order
 
 
-@part
+@inlined
 def _extents(basin: Ints, count: int) -> Ints:
     """(count, 4) left, top, right, bottom of each basin (h, w), last pixels included."""
     h, w = basin.shape
@@ -128,7 +128,7 @@ def _extents(basin: Ints, count: int) -> Ints:
     return extent
 
 
-@part
+@inlined
 def _absorb_small(
     extent: Ints, parent: Ints, one: list[int], other: list[int], saddle: list[float], least: float
 ) -> None:
@@ -157,7 +157,7 @@ def _absorb_small(
         _widen(extent, into, smallest)
 
 
-@part
+@inlined
 def _widen(extent: Ints, basin: int, by: int) -> None:
     """Let the extent of a basin include that of another one."""
     for axis in range(2):
@@ -165,7 +165,7 @@ def _widen(extent: Ints, basin: int, by: int) -> None:
         extent[basin, 2 + axis] = max(extent[basin, 2 + axis], extent[by, 2 + axis])
 
 
-@part
+@inlined
 def _numbered(basin: Ints, parent: Ints) -> tuple[Ints, int]:
     """(h, w) part of each pixel, numbered by their first pixels in raster order, and the number of parts."""
     number, part = np.full(len(parent), -1), np.full(len(parent), -1)  # of a root, of a basin
@@ -185,7 +185,7 @@ def _numbered(basin: Ints, parent: Ints) -> tuple[Ints, int]:
     return label, count
 
 
-@part
+@inlined
 def _root(parent: Ints, k: int) -> int:
     while parent[k] != k:
         k = parent[k]

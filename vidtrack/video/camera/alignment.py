@@ -11,7 +11,7 @@ import numpy as np
 from vidtrack.arrays import affine
 from vidtrack.arrays.median import median
 from vidtrack.arrays.types import Floats, Mask
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.filters import area_average
 from vidtrack.video.background.scene import Levels
 from vidtrack.video.camera.points import CELLS, Points
@@ -139,7 +139,7 @@ def _fit(
     return A, fits / max(inside, 1)
 
 
-@part
+@inlined
 def _used(points: Points, free: Mask, part: tuple[int, int, int]) -> tuple[Levels, Levels, Levels, Levels, Levels]:
     """x, y, value, gx, gy (N,) of the free points of a part."""
     x, y, value = np.empty_like(points.x), np.empty_like(points.x), np.empty_like(points.x)
@@ -151,7 +151,7 @@ def _used(points: Points, free: Mask, part: tuple[int, int, int]) -> tuple[Level
     return x[:n], y[:n], value[:n], gx[:n], gy[:n]
 
 
-@part
+@inlined
 def _extent(x: Levels, y: Levels) -> tuple[float, float, float]:
     """Middle of points (N,), and root mean square distance from it."""
     middle_x, middle_y, square = 0.0, 0.0, 0.0
@@ -163,7 +163,7 @@ def _extent(x: Levels, y: Levels) -> tuple[float, float, float]:
     return middle_x, middle_y, np.sqrt(square) + 1.0
 
 
-@part
+@inlined
 def _solve(A: Floats, b: Floats) -> None:
     """Replace b (n,) by A^-1 b; A (n, n) is positive definite, and its lower triangle becomes its Cholesky factor."""
     n = len(b)
@@ -181,7 +181,7 @@ def _solve(A: Floats, b: Floats) -> None:
         b[i] /= A[i, i]
 
 
-@part
+@inlined
 def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[float, float]:
     """Median and robust standard deviation of the residuals, from a sample of the points."""
     stride = max(1, len(seen) // _SAMPLED)
@@ -199,7 +199,7 @@ def _spread(seen: Floats, gain: float, bias: float, value: Levels) -> tuple[floa
     return centre, max(1.4826 * median(off[:n]), _SIGMA)
 
 
-@part
+@inlined
 def _undone(A: Floats, tx: float, ty: float, c: float, s: float, middle_x: float, middle_y: float) -> Floats:
     """A composed with the inverse of q -> middle + (c, -s; s, c) (q - middle) + t."""
     norm = c * c + s * s
@@ -214,7 +214,7 @@ def _undone(A: Floats, tx: float, ty: float, c: float, s: float, middle_x: float
     return undone
 
 
-@part
+@inlined
 def _sample(luma: Image, size: float, x: Levels, y: Levels, A: Floats, seen: Floats) -> int:
     """Fill seen (N,) with the luminance at the points, bilinear, NaN outside the picture; returns the number inside."""
     h, w = luma.shape

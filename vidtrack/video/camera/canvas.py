@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel, part
+from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import NEVER, UNKNOWN, UNSEEN, Levels, Scene
 from vidtrack.video.frame import Image
@@ -144,7 +144,7 @@ def _lay(source: Image, motion: Floats, rim: float, scene: Levels, laid: Image, 
             _blend(source[j, i : i + n + 1], source[j + 1, i : i + n + 1], px - i, py - j, laid[y, x : x + n])
 
 
-@part
+@inlined
 def _blend(upper: Image, lower: Image, u: float, v: float, out: Image) -> None:
     """Fill out (n,) by bilinear interpolation of two rows (n + 1,), with fractions u to the right and v down."""
     ends = np.uint16(256 * u * v + 0.5)
@@ -155,7 +155,7 @@ def _blend(upper: Image, lower: Image, u: float, v: float, out: Image) -> None:
         out[k] = (row + below * lower[k] + ends * lower[k + 1] + 128) >> 8
 
 
-@part
+@inlined
 def _narrowed(low: float, high: float, slope: float, offset: float, least: float, most: float) -> tuple[float, float]:
     """The part of low..high in which slope x + offset is within least..most."""
     if abs(slope) < 1e-9:

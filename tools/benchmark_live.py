@@ -1,0 +1,187 @@
+"""How many cameras one core watches, and how late their tracks are.
+
+    python tools/benchmark_live.py CLIP ... [--fps 10 25] [--cameras 1 2 4] [--seconds 20] [--core 0]
+
+Each clip becomes an H.264 stream without B-frames, as cameras send it, in MPEG-TS over HTTP, round and round in real
+time. It is watched by so many live runs at once, each a process of its own, as `vidtrack live` starts them, all on one
+core; what sends the stream is on the others. The first 5 s of a run do not count.
+
+A row for each clip, rate and number of cameras: the mean number of vehicles, processor time per camera and frame (user
+and system, all threads, with decoding), the share of the core that they need, frames that were dropped, and the time
+from a picture's arrival to its tracks in the last frames of a run: median, and the 99th percentile of the worst camera.
+`a core` is how many cameras the processor time of one leaves room for. Latencies hold on a machine that does nothing
+else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import tempfile
+import time
+from dataclasses import dataclass
+from fractions import Fraction
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
+
+import av
+import numpy as np
+
+from vidtrack.config.settings import Settings
+from vidtrack.run.live.run import LiveRun
+from vidtrack.tracks import TENTATIVE
+
+SETTLING_S = 5.0
+
+
+@dataclass(frozen=True)
+class Watched:
+    """One camera's run: duration and processor time [s], frames, dropped ones, mean number of vehicles, latencies."""
+
+    seconds: float
+    used_s: float
+    frames: int
+    dropped: int
+    vehicles: float
+    median_ms: float
+    late_ms: float
+
+
+def stream_of(clip: Path, fps: int) -> list[bytes]:
+    """The pictures of a clip at this rate as H.264, one bytes object each; the first is a key picture."""
+    encoder = av.CodecContext.create("libx264", "w")
+    with av.open(str(clip)) as film:
+        video = film.streams.video[0]
+        encoder.width, encoder.height, encoder.pix_fmt = video.width, video.height, "yuv420p"
+        encoder.time_base, encoder.framerate = Fraction(1, fps), Fraction(fps)
+        encoder.options = {"preset": "veryfast", "tune": "zerolatency", "g": str(2 * fps)}
+        sent, packets = 0, []
+        for picture in film.decode(video):
+            if picture.time is None or picture.time * fps < sent - 1e-6:
+                continue
+            shown = picture.reformat(format="yuv420p")
+            shown.pts, shown.time_base = sent, Fraction(1, fps)
+            sent += 1
+            packets += encoder.encode(shown)
+    return [bytes(packet) for packet in [*packets, *encoder.encode(None)]]
+
+
+def send(pictures: list[bytes], size: tuple[int, int], fps: int, told: Connection) -> None:
+    """Serve the stream over HTTP until the process ends; tells the port."""
+
+    class Camera(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "video/mp2t")
+            self.end_headers()
+            try:
+                self._stream()
+            except OSError:  # the viewer has gone
+                return
+
+        def _stream(self) -> None:
+            buffer = io.BytesIO()
+            with av.open(buffer, "w", format="mpegts") as out:
+                video = out.add_stream("libx264", rate=fps)
+                video.width, video.height, video.pix_fmt = *size, "yuv420p"
+                begin = time.monotonic()
+                for k in range(10**9):
+                    packet = av.Packet(pictures[k % len(pictures)])
+                    packet.stream, packet.time_base = video, Fraction(1, fps)
+                    packet.pts = packet.dts = k
+                    packet.is_keyframe = k % len(pictures) == 0
+                    out.mux_one(packet)
+                    self.wfile.write(buffer.getvalue())
+                    buffer.seek(0)
+                    buffer.truncate()
+                    time.sleep(max(0.0, begin + (k + 1) / fps - time.monotonic()))
+
+        def log_message(self, *_: object) -> None:
+            """Nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Camera)
+    told.send(server.server_port)
+    server.serve_forever()
+
+
+def watch(address: str, seconds: float, told: Connection) -> None:
+    """A live run; tells what it needed."""
+    vehicles, begin, frames, dropped = [], 0.0, 0, 0
+    with tempfile.TemporaryDirectory() as folder, LiveRun(address, Settings(), Path(folder) / "run") as run:
+        first_s = time.monotonic()
+        for step in run:
+            now = time.monotonic() - first_s
+            if now < SETTLING_S:
+                begin, dropped = _used(), run.board.now().reading["frames_dropped"]
+                continue
+            frames += 1
+            vehicles.append(np.count_nonzero(step.tracks.status != TENTATIVE))
+            if now > SETTLING_S + seconds:
+                used = _used() - begin
+                dropped = run.board.now().reading["frames_dropped"] - dropped
+                latency = run.board.latency_ms()
+                break
+    told.send(
+        Watched(now - SETTLING_S, used, frames, dropped, float(np.mean(vehicles)), latency["p50"], latency["p99"])
+    )
+
+
+def _used() -> float:
+    usage = getrusage(RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> list[Watched]:
+    """So many cameras at once."""
+    context = get_context("spawn")
+    with av.open(str(clip)) as film:
+        size = film.streams.video[0].width, film.streams.video[0].height
+    here, there = context.Pipe()
+    sender = context.Process(target=send, args=(stream_of(clip, fps), size, fps, there), daemon=True)
+    sender.start()
+    address = f"http://127.0.0.1:{here.recv()}/"
+    pipes = [context.Pipe() for _ in range(cameras)]
+    runs = [context.Process(target=watch, args=(address, seconds, told)) for _, told in pipes]
+    every_core = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {core})  # inherited by what starts now, with all its threads
+    for run in runs:
+        run.start()
+    os.sched_setaffinity(0, every_core)
+    found = [heard.recv() for heard, _ in pipes]
+    for run in runs:
+        run.join()
+    sender.terminate()
+    return found
+
+
+def main() -> None:
+    """A row for each clip, rate and number of cameras."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("clips", type=Path, nargs="+", metavar="CLIP")
+    parser.add_argument("--fps", type=int, nargs="+", default=[10, 25])
+    parser.add_argument("--cameras", type=int, nargs="+", default=[1, 2, 4])
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--core", type=int, default=0)
+    options = parser.parse_args()
+    print("clip             fps  cameras  vehicles  ms/frame  a core   load  dropped    p50    p99 ms")
+    for clip in options.clips:
+        for fps in options.fps:
+            for cameras in options.cameras:
+                found = measure(clip, fps, cameras, options.seconds, options.core)
+                ms = 1e3 * float(np.mean([each.used_s / each.frames for each in found]))
+                load = sum(each.used_s / each.seconds for each in found)
+                vehicles = float(np.mean([each.vehicles for each in found]))
+                middle, late = np.median([each.median_ms for each in found]), max(each.late_ms for each in found)
+                print(
+                    f"{clip.stem[:16]:16s} {fps:3d} {cameras:8d} {vehicles:9.1f} {ms:9.2f} {1e3 / (ms * fps):7.1f}"
+                    f" {load:6.0%} {sum(each.dropped for each in found):8d} {middle:6.0f} {late:6.0f}",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()
