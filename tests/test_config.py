@@ -184,3 +184,10 @@ def test_any_path_survives_the_way_through_a_file(tmp_path):
     settings = load(assignments=[("source.mask", "Größe 😀.png")])
     (tmp_path / "settings.toml").write_text(as_toml(settings), encoding="utf-8")
     assert load(tmp_path / "settings.toml") == settings
+
+
+def test_what_is_assigned_stays_out_of_the_settings_that_it_overrides():
+    """They are those of the next camera too."""
+    base = {"live": {"retry_first": True}}
+    assert not load(assignments=["live.retry_first=false"], base=base).live.retry_first
+    assert base == {"live": {"retry_first": True}}

@@ -57,10 +57,16 @@ def parse(tree: Mapping[str, Any]) -> Settings:
 
 
 def merged(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested settings: `base` overridden by `tree`."""
-    both = dict(base) | dict(tree)
-    groups = (name for name in tree if isinstance(base.get(name), dict) and isinstance(tree[name], dict))
-    return both | {name: merged(base[name], tree[name]) for name in groups}
+    """Nested settings: `base` overridden by `tree`. No group of the result is one of theirs."""
+
+    def group(name: str) -> Any:
+        newest = tree.get(name, base.get(name))
+        if not isinstance(newest, dict):
+            return newest
+        older = base.get(name)
+        return merged(older if isinstance(older, dict) else {}, newest)
+
+    return {name: group(name) for name in (*base, *tree)}
 
 
 def value_of(settings: BaseModel, name: str) -> Any:
