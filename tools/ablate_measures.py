@@ -50,7 +50,6 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "joins of vehicles that others hide while they stand": {(joins, "hidden"): lambda _, __, a, ___: np.zeros(len(a))},
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
     "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},
-    "exits of others in a shared blob": {(journeys, "_of_others"): none_of(1)},
     "to and fro within 2 s": {(passing, "_BACK_S"): 0.0},
     "the same over breaks of a track": {(journeys, "lasting"): lambda track, *_: np.ones(len(track), bool)},
     "gates passed beside": {(journeys, "_needed"): none_of(1)},
