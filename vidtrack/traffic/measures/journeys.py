@@ -50,8 +50,6 @@ def journeys(
     may = _may(gates, allowed)
     passed = passed.only(~passed.beside | _needed(gates, passed, may))
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
-    if metres:
-        passed = passed.only(~_of_others(gates, passed, lives, may))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins, passed)
@@ -104,16 +102,6 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
     enters &= beside & inwards & (entry < 0) & (t[exit_] > passed.t) & may[leg, leg_of[exit_]]
     leaves &= beside & ~inwards & (exit_ < 0) & (t[entry] < passed.t) & may[leg_of[entry], leg]
     return np.asarray(enters | leaves)
-
-
-def _of_others(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
-    """(P,) exits of a movement that may not be, passed after the stretch was seen alone for the last time."""
-    enters, leaves = gates.ways(passed.gate, passed.side)
-    leg = gates.leg[passed.gate]
-    came = np.full(len(lives.track), -1)
-    entry = np.flatnonzero(enters)[::-1]
-    came[passed.track[entry]] = leg[entry]
-    return np.asarray(leaves & (passed.t > lives.tail.t[passed.track]) & ~may[came[passed.track], leg])
 
 
 def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:

@@ -47,28 +47,18 @@ class Trips:
 
 
 def trips_of(passed: Passed, gates: Gates, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
-    """The trip of each vehicle: from its first entry to the last exit after it.
-
-    Who is not known to enter, or to leave, by a gate for this may pass one of another leg the wrong way: in over an
-    exit, or out over an entry, as a place that is a lane off has it.
+    """The trip of each vehicle: from its first entry to the last exit after it, or as `against` has it.
 
     vehicle      (P,) of each passing
     begin, end   (T,) s; first and last row of vehicles by number
     spans        (S, 2) s; what was watched
     """
-    leg = np.append(gates.leg[passed.gate], -1)
-    inwards = gates.inward[passed.gate] == passed.side
     enters, leaves = (gates.role(role, "both")[passed.gate] for role in ("entry", "exit"))
     entry = first_of(vehicle, np.flatnonzero(enters), len(begin))
     t = np.append(passed.t, np.nan)
     exit_ = first_of(vehicle, np.flatnonzero(leaves & ~(passed.t <= t[entry][vehicle]))[::-1], len(begin))
-    wrong_in = first_of(vehicle, np.flatnonzero(gates.role("exit")[passed.gate] & inwards), len(begin))
-    left = (entry < 0) & (exit_ >= 0) & (t[wrong_in] < t[exit_]) & (leg[wrong_in] != leg[exit_])
-    entry = np.where(left, wrong_in, entry)
+    entry, exit_ = against(passed, gates, vehicle, entry, exit_)
     entered = t[entry]  # NaN without an entry
-    wrong_out = gates.role("entry")[passed.gate] & ~inwards & (passed.t > entered[vehicle])
-    wrong_out &= leg[:-1] != leg[entry][vehicle]
-    exit_ = np.where(exit_ < 0, first_of(vehicle, np.flatnonzero(wrong_out)[::-1], len(begin)), exit_)
     who = np.flatnonzero((entry >= 0) | (exit_ >= 0))
     from_s = np.where(entry[who] >= 0, entered[who], begin[who])
     to_s = np.where(exit_[who] >= 0, t[exit_[who]], end[who])
@@ -77,6 +67,22 @@ def trips_of(passed: Passed, gates: Gates, vehicle: Ints, begin: Floats, end: Fl
     appeared = (entry[who] < 0) & ~at_edge(begin[who], spans[:, 0])
     vanished = (exit_[who] < 0) & ~at_edge(end[who], spans[:, 1])
     return Trips(who, entry[who], exit_[who], from_s, to_s, appeared, vanished)
+
+
+def against(passed: Passed, gates: Gates, vehicle: Ints, entry: Ints, exit_: Ints) -> tuple[Ints, Ints]:
+    """Entry and exit (T,) of vehicles, over gates the wrong way where there is none the right way.
+
+    Who is not known to enter, or to leave, by a gate for this may pass one of another leg the wrong way: in over an
+    exit, or out over an entry, as a place that is a lane off has it.
+    """
+    leg, t = np.append(gates.leg[passed.gate], -1), np.append(passed.t, np.nan)
+    inwards = gates.inward[passed.gate] == passed.side
+    wrong_in = first_of(vehicle, np.flatnonzero(gates.role("exit")[passed.gate] & inwards), len(entry))
+    left = (entry < 0) & (exit_ >= 0) & (t[wrong_in] < t[exit_]) & (leg[wrong_in] != leg[exit_])
+    entry = np.where(left, wrong_in, entry)
+    wrong_out = gates.role("entry")[passed.gate] & ~inwards & (passed.t > t[entry][vehicle])
+    wrong_out &= leg[:-1] != leg[entry][vehicle]
+    return entry, np.where(exit_ < 0, first_of(vehicle, np.flatnonzero(wrong_out)[::-1], len(entry)), exit_)
 
 
 def at_edge(t: Floats, edges: Floats) -> Mask:

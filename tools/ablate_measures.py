@@ -1,0 +1,162 @@
+"""What each rule of `vidtrack measure` is worth: crossings and trips of simulated roads, one rule left out at a time.
+
+    python tools/ablate_measures.py CLIP...
+
+Each CLIP is a folder of `vidtrack simulate`, with its tracks in CLIP/run, as in `score_measures.py`. A crossing is
+right within 1 s at its gate and direction; a trip with both legs and both times within 5 s, as a turning count asks
+for it.
+The second table has the trips made of several tracks: what `join_confidence` says, and how many of them are right.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+import score_measures
+from score_measures import paired, rows_of
+
+from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.measures import beyond, joins, journeys, passing, stretches, trips
+from vidtrack.traffic.measures.crossings import way_names
+from vidtrack.traffic.measures.gates import Gates, gates_of
+from vidtrack.traffic.measures.passing import Passing, reaches
+from vidtrack.traffic.measures.rows import Reader
+from vidtrack.traffic.measures.runs import open_day
+from vidtrack.traffic.measures.stretches import Lives, Stretches
+from vidtrack.traffic.site import read_site
+
+CROSSING_S, TRIP_S = 1.0, 5.0
+BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
+
+
+def none_of(*shape_of: int) -> Any:
+    """A rule that chooses nothing; its result has the length of that argument."""
+    return lambda *given: np.zeros(len(given[shape_of[0]]), bool)
+
+
+FOLLOW = (stretches._follow, stretches._backs)
+RULES: dict[str, dict[tuple[Any, str], Any]] = {
+    "nothing": {},
+    "breaks where the motion is that of another vehicle": {(stretches, "_OTHER"): np.inf},
+    "breaks where a track drives back (`_backs`)": {(stretches, "_BACK"): -2.0},
+    "joins": {(journeys, "_joins"): lambda *_: journeys._NONE},
+    "joins of vehicles that others hide while they stand": {(joins, "hidden"): lambda _, __, a, ___: np.zeros(len(a))},
+    "joins of one track are likelier": {(joins, "SAME"): 1.0},
+    "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},
+    "to and fro within 2 s": {(passing, "_BACK_S"): 0.0},
+    "the same over breaks of a track": {(journeys, "lasting"): lambda track, *_: np.ones(len(track), bool)},
+    "gates passed beside": {(journeys, "_needed"): none_of(1)},
+    "gates within a gap": {(journeys, "_across"): lambda *given: given[3].only(np.zeros(len(given[3]), bool))},
+    "gates just beyond the end of a track": {(beyond, "_extended"): lambda g, end, free, *_: beyond._stood(
+        g, end, *np.zeros((2, 0), int), *np.zeros((2, 0)), True)},
+    "inferred passings only the right way": {(beyond, "_as_meant"): lambda gates, found: np.ones(len(found), bool)},
+    "inferred passings only where nobody else passes": {(beyond, "_alone"): lambda found, _: np.ones(len(found), bool)},
+    "gates where a track begins or ends": {(beyond, "_AT_M"): 0.0},
+    "trips over gates the wrong way": {(trips, "against"): lambda passed, gates, vehicle, entry, exit_: (entry, exit_)},
+    "two trips of a track that comes in again": {(journeys, "_comes_again"): none_of(2)},
+}  # fmt: skip
+
+
+class Seen(NamedTuple):
+    """What the tracks of a clip passed, before anything is decided; true crossings and movements."""
+
+    gates: Gates
+    passing: Passing
+    lives: Lives
+    spans: np.ndarray
+    allowed: tuple[tuple[str, str], ...]
+    crossed: list[tuple]
+    moved: list[tuple]
+
+
+def seen(clip: Path) -> Seen:
+    site = read_site(clip / "site.toml")
+    day = open_day([str(clip / "run")], site.camera.start)
+    grounds = {one.size: calibrated(site.scaled(*one.size)) for one in day.recordings}
+    gates = gates_of(site, calibrated(site))
+    broken, passes = Stretches(metres=True), Passing(gates, *reaches(metres=True))
+    for rows in Reader(day, dict(grounds)):
+        passes.add(broken.add(rows))
+    events = rows_of(clip / "road_events.csv")
+    crossed = [((e["place"], e["direction"]), float(e["time_s"])) for e in events if e["event"] == "crossing"]
+    moved = [
+        ((e["from_leg"], e["to_leg"]), float(e["time_s"]), float(e["end_s"]))
+        for e in events
+        if e["event"] == "movement"
+    ]
+    return Seen(gates, passes, broken.lives(), day.spans, site.movements.allowed, crossed, moved)
+
+
+def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool]]]:
+    """True, told and right crossings, then trips (6,); of the trips of several tracks the confidence, and if right."""
+    found = journeys.journeys(one.gates, one.passing.passed(), one.lives, one.spans, True, one.allowed)
+    passed, told = found.passed, found.trips
+    score_measures.TOLERANCE_S = CROSSING_S
+    crossed = [(way, t) for way, t in zip(zip(*way_names(one.gates, passed), strict=True), passed.t, strict=True)]
+    hits = len(paired(one.crossed, crossed))
+    who = np.flatnonzero(told.complete)
+    legs = [[one.gates.legs[gate] for gate in passed.gate[end[who]]] for end in (told.entry, told.exit)]
+    moved = list(zip(zip(*legs, strict=True), told.from_s[who], told.to_s[who], strict=True))
+    score_measures.TOLERANCE_S = TRIP_S
+    right = {k for _, k in paired(one.moved, moved)}
+    sure, parts = np.ones(len(found.vehicle)), np.ones(len(found.vehicle), int)
+    np.multiply.at(sure, found.vehicle[found.joins.after], found.joins.probability)
+    np.add.at(parts, found.vehicle[found.joins.after], 1)
+    vehicle = told.vehicle[who]
+    joined = [(float(sure[v]), k in right) for k, v in enumerate(vehicle) if parts[v] > 1]
+    return np.array([len(one.crossed), len(crossed), hits, len(one.moved), len(moved), len(right)]), joined
+
+
+@contextmanager
+def without(rule: dict[tuple[Any, str], Any]) -> Iterator[None]:
+    """Leave a rule out. The kernels of `stretches` are compiled anew where it is one of theirs, and not kept."""
+    before = {place: getattr(*place) for place in rule}
+    for (module, name), value in rule.items():
+        setattr(module, name, value)
+    follow, backs = FOLLOW
+    if any(module is stretches for module, _ in rule):
+        stretches._backs = numba.njit(error_model="numpy")(backs.py_func)
+        stretches._follow = numba.njit(error_model="numpy")(follow.py_func)
+    try:
+        yield
+    finally:
+        stretches._follow, stretches._backs = follow, backs
+        for place, value in before.items():
+            setattr(*place, value)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("clips", nargs="+", type=Path)
+    clips = parser.parse_args().clips
+    whole = [seen(clip) for clip in clips]
+    joined: list[tuple[float, bool]] = []
+    print("| left out | crossings: right of told | trips: right of told |")
+    print("|---|---|---|")
+    for name, rule in RULES.items():
+        with without(rule):
+            looked = [seen(clip) for clip in clips] if any(module is stretches for module, _ in rule) else whole
+            results = [judged(one) for one in looked]
+        true, told, right, moved, trips_, right_trips = sum(counts for counts, _ in results)
+        if not rule:
+            joined = [one for _, some in results for one in some]
+            print(f"of {true} crossings and {moved} trips:")
+        print(f"| {name} | {right} of {told} | {right_trips} of {trips_} |", flush=True)
+    print("\n| join_confidence | trips | mean of it | right |")
+    print("|---|---|---|---|")
+    sure, good = np.array([s for s, _ in joined]), np.array([r for _, r in joined])
+    for low, high in pairwise(BINS):
+        mine = (sure > low) & (sure <= high)
+        if mine.any():
+            print(f"| {low:g} to {high:g} | {mine.sum()} | {sure[mine].mean():.2f} | {good[mine].mean():.2f} |")
+
+
+if __name__ == "__main__":
+    main()
