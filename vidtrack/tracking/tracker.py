@@ -302,6 +302,7 @@ class Tracker:
         left = (register.history & 1 == 0) & (self.picture.in_view(self.bank) < 0.5)  # unseen, and likelier outside
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
+        register.come_in(self.picture.cut(self._boxes()))
         idle = self.life.idle(register, t)
         parts = self.sharing.parts(register, t)
         going = hopeless | left | parts | idle
@@ -338,7 +339,8 @@ class Tracker:
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
         label = None if scan.label is None else scan.label[born]
         ids = None if self.number is None else self.number(scan, born)
-        ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids)
+        cut = self.picture.cut(absolute(box, position))
+        ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids, cut)
         for track, j in zip(ids.tolist(), born.tolist(), strict=True):
             events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
 
