@@ -111,10 +111,10 @@ class Tab:
 
     def click_on(self, selector):
         """Click on the middle of an element."""
-        self.js(f"document.querySelector({json.dumps(selector)}).scrollIntoView({{block: 'nearest'}})")
         x, y = self.js(
-            f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])"
-            f"(document.querySelector({json.dumps(selector)}).getBoundingClientRect())"
+            "(one => { one.scrollIntoView({block: 'nearest'});"
+            " const {x, y, width, height} = one.getBoundingClientRect();"
+            f" return [x + width / 2, y + height / 2]; }})(document.querySelector({json.dumps(selector)}))"
         )
         self.click(x, y)
 

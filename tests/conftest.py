@@ -14,12 +14,33 @@ CLOCKED = ("tests/run/live/", "tests/serve/")
 UNCLOCKED = tuple(
     f"tests/{name}.py"
     for name in (
-        *(f"run/live/test_live_{of}" for of in ("clock", "leave", "level", "muxer", "station_day", "status")),
-        *(f"serve/test_serve_{of}" for of in ("counts", "review", "site", "site_browser", "site_file")),
+        *(
+            f"run/live/test_live_{of}"
+            for of in ("clock", "leave", "level", "muxer", "parts", "places", "station_day", "status", "trouble")
+        ),
+        *(f"serve/test_serve_{of}" for of in ("browser", "counts", "review", "site", "site_browser", "site_file")),
         "serve/test_serve_site_command",
     )
 )
-"""Files there with neither a camera nor a limit of time: their pages are of finished runs"""
+"""Files there with neither a camera nor a limit of time: their pages are of finished runs, or of cameras made up"""
+LONG = tuple(
+    f"tests/{name}.py"
+    for name in (
+        "serve/test_serve_site_browser", "doctor/test_doctor_advice", "test_frame_rate", "traffic/test_site_runs",
+        "papers/test_registry", "test_samples", "run/batch/test_command", "serve/test_serve_browser",
+        "run/live/test_live_trouble",
+    )
+)  # fmt: skip
+"""Files that no worker should begin when the others are nearly done"""
+
+
+def _is_clocked(nodeid):
+    return nodeid.startswith(CLOCKED) and not nodeid.startswith(UNCLOCKED)
+
+
+def pytest_collection_modifyitems(items):
+    """What takes longest comes first."""
+    items.sort(key=lambda item: (not _is_clocked(item.nodeid), not item.nodeid.startswith(LONG)))
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -29,9 +50,9 @@ def pytest_xdist_make_scheduler(config, log):
 
     class Scheduling(LoadFileScheduling):
         def _split_scope(self, nodeid):
-            clocked = nodeid.startswith(CLOCKED) and not nodeid.startswith(UNCLOCKED)
-            return "clocked" if clocked else super()._split_scope(nodeid)
+            return "clocked" if _is_clocked(nodeid) else super()._split_scope(nodeid)
 
+    config.option.loadscopereorder = False  # the order of the items, not the number of tests in a file
     return Scheduling(config, log)
 
 

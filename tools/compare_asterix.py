@@ -89,9 +89,10 @@ def main() -> None:
     parser.add_argument("capture", type=Path)
     parser.add_argument("--peers-in", type=Path, required=True, metavar="DIR")
     options = parser.parse_args()
+    from vidtrack.radar.feeds.messages import Losses
     from vidtrack.radar.feeds.packets import payloads
 
-    found = list(payloads(options.capture.read_bytes()))
+    found = list(payloads(options.capture.read_bytes(), Losses()))
     sent = "\n".join(payload.hex() for payload in found)
     sys.stdout.write(f"{'vidtrack':16} {ours(found)}\n")
     for name, decode in PEERS.items():

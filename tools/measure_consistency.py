@@ -1,7 +1,9 @@
-"""Whether the errors that runs over video state are true: NEES of the position by kind of row, `simulate junction`.
+"""Whether the errors that runs over video state are true: NEES of the position by kind of row.
 
     python tools/measure_consistency.py --seeds 101-110
+    python tools/measure_consistency.py road --size 640x360 --seconds 20 --seeds 1-3
 
+The scene is one of `vidtrack simulate` with a video; `junction` by default.
 A row is a row of tracks.parquet that a box of the truth matches (IoU from 0.3). NEES is e' P^-1 e, with e from the
 middle of the true box, which ends at the border of the picture; its mean is 2 if P is right. `rms` is of both axes,
 and `stated` what P says of it. Kinds by the true box: its area, and how much of it is visible. Rows of a vehicle
@@ -26,18 +28,26 @@ from vidtrack.run.files import run_file
 from vidtrack.score.clear import correspondences
 from vidtrack.score.consistency import nees
 from vidtrack.score.matching import match_boxes
-from vidtrack.simulate.clip import simulate
-from vidtrack.simulate.video_write import write
+from vidtrack.simulate import simulate, simulate_road, write, write_road
 
 IOU = 0.3
 AREAS = (0, 100, 200, 400, 800, np.inf)
 
 
-def rows(seed: int, folder: Path, settings: list[str]) -> dict[str, np.ndarray]:
+def draw(options: argparse.Namespace, seed: int, folder: Path) -> None:
+    """Write the video of a seed and its truth."""
+    size = None if options.size is None else tuple(map(int, options.size.split("x")))
+    if options.scene == "junction":
+        write(simulate("junction", seed=seed, size=size), folder)
+    else:
+        write_road(simulate_road(options.scene, seed=seed, size=size, seconds=options.seconds), folder)
+
+
+def rows(seed: int, folder: Path, options: argparse.Namespace) -> dict[str, np.ndarray]:
     """What is known of each matched row of a seed."""
     folder.mkdir()
-    write(simulate("junction", seed=seed), folder)
-    with run_file(str(folder / "video.avi"), load(assignments=settings), folder / "run") as run:
+    draw(options, seed, folder)
+    with run_file(str(folder / "video.avi"), load(assignments=options.set), folder / "run") as run:
         for _ in run:
             pass
     found, status = formats.read_states(folder / "run"), pyarrow.parquet.read_table(folder / "run" / "tracks.parquet")
@@ -74,12 +84,15 @@ def kinds(known: dict[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", nargs="?", default="junction")
+    parser.add_argument("--size", metavar="WxH", help="pixels of the picture")
+    parser.add_argument("--seconds", type=float, help="of the video; not of the junction")
     parser.add_argument("--seeds", default="101-110", metavar="FIRST-LAST")
     parser.add_argument("--set", action="append", default=[], metavar="A.B=VALUE", help="one setting")
     arguments = parser.parse_args()
     first, last = map(int, arguments.seeds.split("-"))
     with tempfile.TemporaryDirectory() as place:
-        each = [rows(seed, Path(place, str(seed)), arguments.set) for seed in range(first, last + 1)]
+        each = [rows(seed, Path(place, str(seed)), arguments) for seed in range(first, last + 1)]
     known = {name: np.concatenate([one[name] for one in each]) for name in each[0]}
     sys.stdout.write(f"{'':24}{'NEES':>8}{'median':>8}{'rms':>8}{'stated':>8}{'rows':>8}{'vehicles':>10}\n")
     for name, mask in kinds(known):

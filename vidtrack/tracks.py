@@ -45,6 +45,7 @@ class Tracks:
     nis            (T,) normalised innovation squared of this update; NaN for none
     position, velocity   columns of x, one per axis
     run            (T,) Monte Carlo run
+    entered        (T,) whether the border of the picture cut the track at first, and no longer does: it came in
     events         births, confirmations, merges, splits and deletions of this scan
     choices        reasons of the association; None unless the tracker has `explain`
     prior_x, prior_P, gain   (T, n), (T, n, n), (T, n, n) for smoothing, else None: the prediction for this scan, and
@@ -68,6 +69,7 @@ class Tracks:
     velocity: tuple[int, ...] = (1, 3)
     run: Ints | None = None
     exchange: Floats | None = None
+    entered: Mask | None = None
     events: tuple[Event, ...] = field(default=())
     choices: Choices | None = None
     prior_x: Floats | None = None

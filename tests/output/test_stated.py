@@ -14,14 +14,19 @@ from vidtrack.scan import Scan
 ROWS = {"own": (1, "c", 100.0, 50.0), "shared": (2, "m", 60.0, 60.0), "coasting": (3, "o", 100.0, 50.0)}
 
 
-def step_of(kind, P, pixel=1.0, rim=1.5, surveyed=(0.0, 0, 200, 100), side=(23.0, 13.0)):
-    """A step with one track of a covariance, whose box is `side` wide and high about its position."""
+def step_of(kind, P, pixel=1.0, rim=1.5, surveyed=(0.0, 0, 200, 100), side=(23.0, 13.0), more=(0, 0), off=(0, 0)):
+    """A step with one track of a covariance, whose box is `side` wide and high about its position.
+
+    more, off  (2,) by how much the blob's box is larger than the track's, and where its middle is from the track's
+    """
     step = make_step(0, [ROWS[kind]])
     xy = step.tracks.xy[0]
     box = np.array([[*(xy - np.divide(side, 2)), *side]])
     group = np.array([1 if kind == "shared" else -1])
     taken = np.array([-1 if kind == "coasting" else 0])
-    scan = Scan(0.0, xy[None], np.eye(2), pixel=pixel, rim=rim, surveyed=np.array(surveyed))
+    seen = np.add(side, more)
+    blob = np.concatenate([np.subtract(off, seen / 2), seen])[None]
+    scan = Scan(0.0, xy[None], np.eye(2), box=blob, pixel=pixel, rim=rim, surveyed=np.array(surveyed))
     return replace(step, scan=scan, tracks=replace(step.tracks, P=P[None], box=box, group=group, measurement=taken))
 
 
@@ -36,9 +41,10 @@ def test_measurements_without_outlines_keep_the_filter_s_errors():
 
 def test_a_blob_of_its_own_limits_the_error_whatever_the_filter_says():
     unsure, sure = position(step_of("own", 1e6 * np.eye(4))), position(step_of("own", 1e-6 * np.eye(4)))
-    lasting = np.array([400.0, 100.0]) / 12 * (0.05**2 + (12.25 / 200) ** 2)  # sides of 20 and 10 px within the rim
+    share = 0.05 * np.sqrt(200) / 22  # sides of 20 and 10 px within the rim
+    lasting = np.array([400.0, 100.0]) / 12 * (share**2 + (15 / 200) ** 2)
     np.testing.assert_allclose(np.diag(sure), lasting, rtol=1e-3)
-    np.testing.assert_allclose(np.diag(unsure), lasting + 0.45**2, rtol=1e-3)
+    np.testing.assert_allclose(np.diag(unsure), lasting + 0.15**2, rtol=1e-3)
 
 
 def test_a_coasting_track_has_the_filter_s_error_and_that_of_its_outline():
@@ -47,14 +53,43 @@ def test_a_coasting_track_has_the_filter_s_error_and_that_of_its_outline():
     np.testing.assert_allclose(np.diag(coasting), [9 + sure[0, 0], 4 + sure[1, 1]], rtol=1e-6)
 
 
+def outline():
+    """Variances of an outline that is wrong for long."""
+    return np.diag(position(step_of("own", 1e-12 * np.eye(4))))
+
+
 def test_edges_measure_a_track_on_a_shared_blob():
-    assert np.diag(position(step_of("shared", 1e6 * np.eye(4)))) == pytest.approx(
-        [1.7**2 + 0.85**2, 2 * 0.85**2], rel=1e-4
-    )
+    found = np.diag(position(step_of("shared", 1e6 * np.eye(4)))) - outline()
+    assert found == pytest.approx([1.0**2 + 0.6**2, 0.5**2 + 0.6**2], rel=1e-4)
+
+
+@pytest.mark.parametrize(("more", "off"), [((-6, 0), (0, 0)), ((3, -4), (0, 0)), ((0, 0), (2, -1)), ((-6, 2), (3, 1))])
+def test_a_blob_that_is_not_the_vehicle_s_outline_makes_its_place_uncertain(more, off):
+    by = np.diag(position(step_of("own", 1e-12 * np.eye(4), more=more, off=off))) - outline()
+    assert by == pytest.approx((np.square(more) + np.square(off)) / 12, abs=1e-9)
+
+
+def test_a_shared_blob_smaller_than_the_vehicle_lacks_an_end_of_it():
+    def by(more):
+        return np.diag(position(step_of("shared", 1e-12 * np.eye(4), more=more))) - outline()
+
+    assert by((-8.0, 30.0)) == pytest.approx([16.0, 0.0], abs=1e-9)
+    assert by((20.0, 30.0)) == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", sorted(ROWS))
+@pytest.mark.parametrize("known", [np.zeros(4), np.array([1.0, 1, 0, 1]), np.array([1.0, 0, -1, 0])])
+def test_a_filter_that_is_certain_of_something_is_no_error(kind, known):
+    P = np.outer(known, known)
+    found = stated(step_of(kind, P)).tracks.P[0]
+    assert np.isfinite(found).all()
+    assert np.linalg.eigvalsh(found).min() > -1e-9
+    assert np.diag(found)[[0, 2]] == pytest.approx(np.diag(position(step_of(kind, P + 1e-9 * np.eye(4)))), rel=1e-3)
 
 
 @pytest.mark.parametrize(
-    ("surveyed", "more"), [((89.0, 0, 200, 100), [0, 1]), ((0, 44, 200, 100), [2, 0]), ((89, 44, 200, 100), [2, 1])]
+    ("surveyed", "more"),
+    [((89.0, 0, 200, 100), [0, 1.3]), ((0, 44, 200, 100), [2.6, 0]), ((89, 44, 200, 100), [2.6, 1.3])],
 )
 def test_a_box_that_the_border_cuts_is_less_certain_along_it(surveyed, more):
     P = np.eye(4)

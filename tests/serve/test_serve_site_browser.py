@@ -84,12 +84,16 @@ class Page:
 
     def at(self, x, y, pane="scene"):
         """Where a point of a picture is in the window."""
+        return self.all_at([(x, y)], pane)[0]
+
+    def all_at(self, points, pane="scene"):
+        """Where points of a picture are in the window."""
         pane = f"document.querySelector('#{pane}')"
         view, left, top = self.tab.js(
             f"(({{left, top}}) => [{pane}.dataset.view, left, top])({pane}.getBoundingClientRect())"
         )
         k, x0, y0 = map(float, view.split(","))
-        return left + x0 + k * (x + 0.5), top + y0 + k * (y + 0.5)
+        return [(left + x0 + k * (x + 0.5), top + y0 + k * (y + 0.5)) for x, y in points]
 
     def write(self, key, text):
         """Type into the input with this key, in place of what is there."""
@@ -151,7 +155,7 @@ def test_a_junction_from_nothing_has_the_right_sheet(tab, run, tmp_path):
         assert tab.js("document.querySelectorAll('#scene .grid').length") > 15
         tab.press("g")
         for name, (start, end) in GATES.items():
-            tab.drag(page.at(*start), page.at((start[0] + end[0]) / 2, (start[1] + end[1]) / 2), page.at(*end))
+            tab.drag(*page.all_at([start, ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2), end]))
             tab.until("Boolean(document.querySelector('[data-key=\"gate name gate 1\"]'))")
             page.write("gate name gate 1", name)
             leg, role = name.split()

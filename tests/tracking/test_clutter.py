@@ -45,24 +45,47 @@ def test_the_mean_density_is_one_whatever_was_seen(seed, count):
     assert learnt.density.min() > 0
 
 
-@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 50))
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(10, 50))
 def test_the_box_grows_to_what_is_outside_and_keeps_what_was_counted(seed, count):
     learnt, rng = new_map(), np.random.default_rng(seed)
     learnt.learn(rng.uniform(0, SIDE, (100, 2)), np.ones(100))
     z = rng.uniform(-SIDE, 2 * SIDE, (count, 2))
-    learnt.reach(z)
-    assert ((learnt.low <= z.min(axis=0)) & (z.max(axis=0) <= learnt.high)).all()
+    for _ in range(60):
+        before = learnt.grown
+        learnt.reach(z)
+        assert learnt.grown <= 1.2**2 * before * (1 + 1e-12)  # a tenth at each of four sides
+    beyond = (z < learnt.low) | (learnt.high < z)
+    assert beyond.mean(axis=0).max() <= 0.02
     assert learnt.grown == pytest.approx((learnt.high - learnt.low).prod() / SIDE**2)
     assert learnt.count.sum() == pytest.approx(100)
-    again = learnt.grown
-    learnt.reach(z)
-    assert learnt.grown == again
+
+
+@pytest.mark.parametrize("where", [new_map, lambda: EvenBox(np.zeros(2), np.full(2, SIDE))])
+def test_wild_measurements_do_not_change_the_density(where):
+    box, rng = where(), np.random.default_rng(0)
+    for k in range(300):
+        z = rng.uniform(0, SIDE, (20, 2))
+        if k % 10 == 0:  # one in two hundred
+            z[0] = 1e7, -1e7
+        box.reach(z)
+        box.forget(np.exp(-4 / 300))
+    assert box.grown == 1.0
+
+
+@given(far=st.floats(1.01 * SIDE, 1e7), times=st.integers(1, 30))
+def test_a_measurement_changes_the_mean_density_by_a_tenth_along_each_axis_at_most(far, times):
+    box = EvenBox(np.zeros(2), np.full(2, SIDE))
+    for _ in range(times):
+        before = box.grown
+        box.reach(np.array([[far, -far]]))
+        assert before <= box.grown <= 1.1**2 * before * (1 + 1e-12)
 
 
 def test_a_patch_stays_at_its_place_when_the_box_grows():
     learnt = new_map()
     learnt.learn(np.random.default_rng(0).uniform(0, SIDE / 4, (5000, 2)), np.ones(5000))
-    learnt.reach(np.array([[2.5 * SIDE, -SIDE]]))
+    for _ in range(60):
+        learnt.reach(np.array([[2.5 * SIDE, -SIDE]]))
     inside, outside = np.array([[0.125, 0.125]]) * SIDE, np.array([[0.6, 0.6], [2.0, -0.5]]) * SIDE
     assert learnt.at(inside)[0] > 20 * learnt.at(outside).max()
 

@@ -19,6 +19,21 @@ def test_what_never_travelled_and_stands_still_ends():
     assert reason == "never travelled and stands still"
 
 
+def test_a_vehicle_that_came_in_over_the_border_may_stand_at_once():
+    """It has travelled 0.7 of its size; one that appeared amid the picture and moved as far ends."""
+
+    def stops(t):
+        x = -95 + 60 * min(t, 2)
+        return [[max(x, 0), 60, min(x + 100, 100), 50], [150 + 60 * min(t, 1), 160, 100, 50]]
+
+    seen = play(default_tracker(), stops, 12.0, fps=10)
+    came, appeared = nearest_id(seen[30], 75, 85), nearest_id(seen[30], 260, 185)
+    assert nearest_id(seen[-1], 75, 85) == came
+    ended = [number for _, number in events(seen, "delete")]
+    assert ended[0] == appeared
+    assert came not in ended
+
+
 def test_without_idle_s_it_stays():
     life = LifeCycle(coast_s=1.0, coast_scans=None)
     tracker = Tracker(life=life, picture=Picture((320.0, 240.0)))

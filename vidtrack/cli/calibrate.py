@@ -53,7 +53,7 @@ def command(options: CalibrateOptions) -> int:
 
     The exit code is 1 when the points contradict each other, or the traffic contradicts them.
     """
-    from vidtrack.cli.measure import doubts
+    from vidtrack.cli.by_traffic import doubts
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_folder
     from vidtrack.traffic.calibration.account import examined
@@ -109,6 +109,8 @@ def _print(report: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from vidtrack.cli.by_traffic import sayings
+
     console = Console()
     if report["pairs"]:
         table = Table("pair", "picture px", "ground m", "off px", "off m", "without it px", "without it m", "d2")
@@ -138,29 +140,7 @@ def _print(report: dict[str, Any]) -> None:
             f"{camera['height_sigma_m']:.2f} m); its focal length is {camera['focal_px']:.0f} px."
         )
     if "traffic" in report:
-        for line in _agreed(report["traffic"]):
-            console.print(line)
+        for saying in sayings(report["traffic"]):
+            console.print(f"{saying.found[0].upper()}{saying.found[1:]}.")
     for line in report["warnings"]:
         console.print(f"[bold]Note:[/bold] {line}")
-
-
-def _agreed(traffic: dict[str, Any]) -> list[str]:
-    """Lines: what the traffic was asked."""
-    scale, straight = traffic["scale"], traffic["straightness"]
-    if scale is None:
-        lines = ["Too few vehicles to check the scale by their sizes."]
-    else:
-        lines = [
-            f"Vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
-            f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles)."
-        ]
-    if straight is None:
-        return [*lines, "Too few straight paths along one road to check whether they converge or bend."]
-    return [
-        *lines,
-        f"Straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
-        f"{straight['converging_deg']:.2f} degrees (standard deviation {straight['converging_sigma_deg']:.2f}, "
-        f"{straight['paths']} paths); by a lens the corner of the picture is off by "
-        f"{straight['lens_px']:.0f} px (standard deviation "
-        f"{straight['lens_sigma_px']:.0f}).",
-    ]

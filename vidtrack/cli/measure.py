@@ -49,6 +49,7 @@ def command(options: MeasureOptions) -> None:
     A single RUN may be the folder or address of a batch: then each site and day is measured by itself.
     """
     from vidtrack.cli.archive import measure_archive
+    from vidtrack.cli.by_traffic import doubts
     from vidtrack.cli.json_file import write_json
     from vidtrack.errors import ConfigError
     from vidtrack.output.figures import write_figures
@@ -102,28 +103,3 @@ def _told(report: dict[str, Any]) -> str:
         f"{wrong} trips over impossible movements, {report['appeared']} vehicles appeared between the gates, "
         f"{report['vanished']} vanished; {close}"
     )
-
-
-def doubts(report: dict[str, Any]) -> list[str]:
-    """What the sizes and the straight paths of vehicles say against the calibration, one line each."""
-    scale, straight, lines = report["scale"], report["straightness"], []
-    if scale and scale["off"]:
-        lines.append(
-            f"vehicles come out {scale['factor']:.2f} times as large as vehicles are (standard deviation "
-            f"{scale['sigma']:.2f}, {scale['vehicles']} vehicles); check the lengths and their unit in the "
-            "calibration: speeds are off by as much"
-        )
-    if straight and straight["converges"]:
-        lines.append(
-            f"straight paths along one road, {straight['apart_m']:.1f} m apart, converge by "
-            f"{abs(straight['converging_deg']):.1f} degrees (standard deviation "
-            f"{straight['converging_sigma_deg']:.1f}, {straight['paths']} paths); if its lanes are parallel, a "
-            "point of the calibration is wrong: run vidtrack calibrate"
-        )
-    if straight and straight["bends"]:
-        lines.append(
-            f"straight paths bend as by a lens that moves the corner of the picture by {straight['lens_px']:.0f} px "
-            f"(standard deviation {straight['lens_sigma_px']:.0f}, {straight['paths']} paths); give the calibration "
-            "the lens's distortion"
-        )
-    return lines

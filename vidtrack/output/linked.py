@@ -211,7 +211,7 @@ def _within(ends: Floats, begins: Floats, longest_s: float) -> tuple[Ints, Ints,
 
 COLUMNS = (
     "id", "status", "x", "P", "box", "group", "group_since_s", "age_s", "travel", "existence", "measurement", "nis",
-    "run", "exchange",
+    "run", "exchange", "entered",
 )  # fmt: skip
 
 

@@ -8,10 +8,15 @@ vehicle, and too certain where the blob differs from it for long. With P of the 
 
 W   error of this picture's measurement that does not last: `_PIXEL` for a blob of the vehicle's own, the edges' error
     for a shared one; a track that coasts is not measured
-L   lasting error of the outline of a blob of its own. Of the blob's area A a part may be missing or added at one end:
-    what the majority in the detector's window decides (`_PATCH`), and a share of the extent, by shadow and by what
-    looks like the road (`_SHARE`). Where the border of the picture cuts the box, what is outside may lie to one side
-    (`_BESIDE`).
+L   what lasts, and what this picture contradicts:
+
+    outline  of the blob's area a part may be missing or added at one end: what the majority in the detector's window
+             decides about (`_PATCH`), and a share of the extent (`_SHARE`), by shadow and by what looks like the road.
+             The share is larger for larger vehicles, which are higher: their shadows reach farther
+    border   where the border of the picture cuts the box, what is outside may lie to one side (`_BESIDE`)
+    blob     a blob of another size than the vehicle lacks the difference at one end, or has too much there; and where
+             its middle is not that of the vehicle's box, the truth may be anywhere between: uniform errors. A shared
+             blob that is smaller than the vehicle lacks the difference at one end
 """
 
 from __future__ import annotations
@@ -27,18 +32,21 @@ from vidtrack.output.sink import Step
 from vidtrack.scan import Scan
 from vidtrack.tracking.picture.border import Border
 
-_PIXEL = 0.45
+_PIXEL = 0.15
 """Processed pixels; standard deviation of a centroid from picture to picture."""
-_PATCH = 7 * 7 / 4
+_PATCH = 15.0
 """Processed pixels. Ends that fill less than half of the detector's window of 7 x 7 are lost: from none to half of it.
-The mean is the same at both ends; the rest, uniform within a quarter of the window, moves the centroid by its share of
-the area times the standard deviation of the extent."""
-_SHARE = 0.05
-"""Standard deviation of a centroid per standard deviation of the extent."""
-_BESIDE = 0.1
+The mean is the same at both ends; the rest moves the centroid by its share of the area times the standard deviation of
+the extent."""
+_SHARE, _SIZE, _MOST = 0.05, 22.0, 2.0
+"""Standard deviation of a centroid per standard deviation of the extent, for vehicles of this size (root of the area,
+processed pixels); in proportion for others, up to so many times as much."""
+_BESIDE = 0.13
 """Standard deviation, per side of a cut box, of the middle along the border."""
-_EDGE_SHARE, _EDGE_PIXEL = 0.085, 0.85
+_EDGE_SHARE, _EDGE_PIXEL = 0.05, 0.6
 """Standard deviation of the middle between two edges of a shared blob: shares of the vehicle's side, and pixels."""
+_UNIFORM = 1 / 12
+"""Variance of what is uniform over an interval of one."""
 
 
 def stated(step: Step) -> Step:
@@ -80,15 +88,33 @@ def _restated(steps: Sequence[Step]) -> Floats:
     side = np.maximum(box[:, 2:] - 2 * scan.rim, 2 * pixel)
     edges = (_EDGE_SHARE * side) ** 2 + (_EDGE_PIXEL * pixel) ** 2
     measured = np.where(shared[:, None], 1 / edges, np.where(own[:, None], (_PIXEL * pixel) ** -2, 0.0))
-    lasting = np.where(shared[:, None], 0.0, _outline(side, pixel) + _beside(scan, box, side))
-    cov = np.linalg.inv(np.linalg.inv(P) + _diagonal(measured)) + _diagonal(lasting)
-    return _with_position(whole, place, cov)
+    differs, lacks = (np.concatenate(parts) for parts in zip(*map(_contradicted, steps), strict=True))
+    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks, differs + _beside(scan, box, side))
+    eye = np.eye(len(place))
+    updated = np.linalg.solve(eye + P * measured[:, None, :], P)  # (P^-1 + W^-1)^-1, for a singular P too
+    updated = (updated + np.swapaxes(updated, 1, 2)) / 2
+    return _with_position(whole, place, updated + _diagonal(lasting), pixel)
 
 
 def _outline(side: Floats, pixel: float) -> Floats:
     """(T, 2) variances of the middles of boxes with these sides (T, 2), whose outlines are wrong for long."""
-    patch = _PATCH * pixel**2 / side.prod(axis=1)
-    return side**2 / 12 * (patch**2 + _SHARE**2)[:, None]
+    area = side.prod(axis=1) / pixel**2
+    share = _SHARE * np.minimum(np.sqrt(area) / _SIZE, _MOST)
+    return side**2 * (_UNIFORM * ((_PATCH / area) ** 2 + share**2))[:, None]
+
+
+def _contradicted(step: Step) -> tuple[Floats, Floats]:
+    """(T, 2) variances by the boxes of measurements: with a blob of its own, and with a shared one."""
+    tracks, scan = step.tracks, step.scan
+    seen = tracks.measurement >= 0
+    if scan.box is None or not seen.any():
+        return np.zeros((len(tracks), 2)), np.zeros((len(tracks), 2))
+    taken = np.maximum(tracks.measurement, 0)
+    blob = scan.box[taken]
+    more = np.where(seen[:, None], blob[:, 2:] - tracks.box[:, 2:], 0.0)
+    middle = scan.z[taken, :2] + blob[:, :2] + blob[:, 2:] / 2
+    off = np.where(seen[:, None], middle - tracks.box[:, :2] - tracks.box[:, 2:] / 2, 0.0)
+    return _UNIFORM * (more**2 + off**2), np.minimum(more, 0.0) ** 2 / 4
 
 
 def _beside(scan: Scan, box: Floats, side: Floats) -> Floats:
@@ -101,12 +127,15 @@ def _diagonal(values: Floats) -> Floats:
     return values[:, :, None] * np.eye(values.shape[1])
 
 
-def _with_position(P: Floats, place: list[int], cov: Floats) -> Floats:
+def _with_position(P: Floats, place: list[int], cov: Floats, pixel: float) -> Floats:
     """P (T, n, n) with the covariances cov (T, d, d) of the positions, which are the columns `place`.
 
     Velocities keep their covariance, and their correlations with the whitened positions: the whole stays a covariance.
+    A filter's error below a millionth of a pixel counts as that.
     """
     turn = np.broadcast_to(np.eye(P.shape[1]), P.shape).copy()
-    old = np.linalg.cholesky(P[:, place][:, :, place])
+    old = np.linalg.cholesky(P[:, place][:, :, place] + (1e-6 * pixel) ** 2 * np.eye(len(place)))
     turn[:, np.array(place)[:, None], place] = np.linalg.cholesky(cov) @ np.linalg.inv(old)
-    return turn @ P @ np.swapaxes(turn, 1, 2)
+    whole = turn @ P @ np.swapaxes(turn, 1, 2)
+    whole[:, np.array(place)[:, None], place] = cov
+    return np.asarray(whole)

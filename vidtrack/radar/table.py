@@ -75,12 +75,17 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     try:
         table = pyarrow.parquet.read_table(path) if parquet else _read_csv(path, faults)
     except (pa.ArrowException, UnicodeDecodeError) as error:
-        reason = str(error).strip().splitlines()[0]
-        raise PlotFormatError(f"{path} is not a readable CSV or Parquet file of plots: {reason}") from None
+        binary = isinstance(error, UnicodeDecodeError)
+        reason = "its content is not text" if binary else str(error).strip().splitlines()[0]
+        raise PlotFormatError(
+            f"{path} is neither a table of plots (CSV, Parquet) nor a recording of ASTERIX or NMEA: {reason}; give one"
+        ) from None
     table = table.rename_columns([name.strip() for name in table.column_names])
     _refuse_repeated_names(path, table.column_names)
     if not len(table):
-        raise PlotFormatError(_complaint(path, unit, faults) if faults else f"{path} holds no plots")
+        raise PlotFormatError(
+            _complaint(path, unit, faults) if faults else f"{path} holds no plots but a line of names"
+        )
     line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
     columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
     return Table(path, table.column_names, columns, line, unit, faults)

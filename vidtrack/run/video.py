@@ -180,8 +180,10 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
 
 
 def has_driven(tracks: Tracks) -> Mask:
-    """(T,) confirmed tracks that have travelled farther than one and a half times their size.
+    """(T,) confirmed tracks that came in over the border, or travelled farther than one and a half times their size.
 
-    A ghost, the mark that a departed vehicle leaves in the scene, never travels, and must be absorbed.
+    A ghost, the mark that a departed vehicle leaves in the scene, does neither, and must be absorbed. So must leaves
+    at the border, and what they join with.
     """
-    return (tracks.status != TENTATIVE) & (tracks.travel > 1.5 * longer(tracks.box))
+    assert tracks.entered is not None
+    return (tracks.status != TENTATIVE) & (tracks.entered | (tracks.travel > 1.5 * longer(tracks.box)))

@@ -14,8 +14,11 @@ for clutter at their places before they are confirmed."""
 _NEW = 0.1
 """Measurements of new targets per false one, as in LogRatio and LikelihoodGate; they begin anywhere."""
 
-_BEYOND = 0.1
-"""Share of the side of the surveyed box; it grows by so much beyond a measurement outside it."""
+_STEP = 0.1
+"""Share of its length by which the surveyed box grows at once at one of its sides: one measurement changes the mean
+density by at most 1.1 along each axis."""
+_FEW, _RARE = 2.0, 0.01
+"""So many of the remembered measurements, or this share of them, may be beyond a side before the box grows there."""
 
 
 class EvenClutter:
@@ -42,24 +45,37 @@ class EvenClutter:
 class EvenBox(EvenClutter):
     """The same density everywhere in a box, which grows where measurements are outside.
 
+    A few wild measurements do not move it: a side moves by `_STEP` of the box's length, at most once a scan, and only
+    when more than `_FEW` of the remembered measurements, and a share of more than `_RARE`, have been beyond it.
+
     low, high  (2,) corners of the box, on the first two axes of the measurements
     """
 
-    STATE: tuple[str, ...] = ("low", "high", "grown")
+    STATE: tuple[str, ...] = ("low", "high", "grown", "beyond", "seen")
 
     def __init__(self, low: Floats, high: Floats) -> None:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
         self.grown = 1.0
+        self.beyond: Floats = np.zeros((2, 2))
+        """Measurements remembered below the box and above it (rows), along each axis, since its side moved."""
+        self.seen = 0.0
+        """Measurements remembered."""
 
     def reach(self, z: Floats) -> None:
-        """Extend the box to measurements (N, m), and by `_BEYOND` of its side where one is outside."""
-        if not len(z):
-            return
-        side = self.high - self.low
-        first, last = z[:, :2].min(axis=0), z[:, :2].max(axis=0)
-        self.low = np.where(first < self.low, first - _BEYOND * side, self.low)
-        self.high = np.where(last > self.high, last + _BEYOND * side, self.high)
+        """Note which of measurements (N, m) are outside, and move the sides that too many have been beyond."""
+        side, place = self.high - self.low, z[:, :2]
+        self.seen += len(z)
+        self.beyond += [(place < self.low).sum(axis=0), (place > self.high).sum(axis=0)]
+        below, above = move = self.beyond > max(_FEW, _RARE * self.seen)
+        self.beyond[move] = 0.0
+        self.low = np.where(below, self.low - _STEP * side, self.low)
+        self.high = np.where(above, self.high + _STEP * side, self.high)
         self.grown *= float(((self.high - self.low) / side).prod())
+
+    def forget(self, fade: float) -> None:
+        """Keep this share of what is remembered."""
+        self.beyond *= fade
+        self.seen *= fade
 
 
 class ClutterMap(EvenBox):
@@ -75,7 +91,7 @@ class ClutterMap(EvenBox):
     polar      whether these are range and azimuth, and not positions
     """
 
-    STATE = ("count", "low", "high", "grown")
+    STATE = ("count", *EvenBox.STATE)
 
     def __init__(self, low: Floats, high: Floats, polar: bool = False) -> None:
         super().__init__(low, high)
@@ -95,7 +111,7 @@ class ClutterMap(EvenBox):
         return (density + _NEW) / (1 + _NEW)
 
     def reach(self, z: Floats) -> None:
-        """Extend the box to measurements (N, m); what was counted in a cell is spread evenly over its place."""
+        """As of an even box; what was counted in a cell is spread evenly over its place."""
         low, high = self.low, self.high
         super().reach(z)
         for axis in np.flatnonzero((low != self.low) | (high != self.high)):
@@ -111,6 +127,7 @@ class ClutterMap(EvenBox):
 
     def forget(self, fade: float) -> None:
         """Keep this share of what is remembered."""
+        super().forget(fade)
         self.count *= fade
 
     def learn(self, z: Floats, false: Floats) -> None:

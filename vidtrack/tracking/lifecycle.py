@@ -58,7 +58,7 @@ class LifeCycle:
     hidden_s        s; the same for a track inside a blob that it shares, where nothing could be seen of it
     coast_scans     or after this many scans without evidence in a row; None: by time only
     idle_s          s; a track that has stood still for so long and never travelled `idle_travel` ends; None: it stays
-    idle_travel     object sizes
+    idle_travel     object sizes; one that entered over the border of the picture has travelled
     """
 
     confirm_hits: int = 3
@@ -109,7 +109,8 @@ class LifeCycle:
         """(T,) rows that never travelled and no longer move: errors of the scene, not vehicles."""
         if self.idle_s is None:
             return np.zeros(len(register), bool)
-        return _idle(register.travelled, register.box, register.rest_s, t, self.idle_travel, float(self.idle_s))
+        near, long = self.idle_travel, float(self.idle_s)
+        return _idle(register.entered, register.travelled, register.box, register.rest_s, t, near, long)
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""
@@ -186,11 +187,12 @@ def _unseen(
 
 
 @kernel
-def _idle(travelled: Floats, box: Floats, rest_s: Floats, now: float, near: float, long: float) -> Mask:
-    """(T,) rows that travelled less than `near` of their sizes and have rested for `long` seconds."""
+def _idle(entered: Mask, travelled: Floats, box: Floats, rest_s: Floats, now: float, near: float, long: float) -> Mask:
+    """(T,) rows that did not enter, travelled less than `near` of their sizes and have rested for `long` seconds."""
     idle = np.zeros(len(rest_s), np.bool_)
     for t in range(len(rest_s)):
-        idle[t] = travelled[t] < near * max(box[t, 2], box[t, 3]) and now - rest_s[t] > long
+        stayed = not entered[t] and travelled[t] < near * max(box[t, 2], box[t, 3])
+        idle[t] = stayed and now - rest_s[t] > long
     return idle
 
 

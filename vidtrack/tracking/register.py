@@ -20,20 +20,21 @@ SCANS = (1 << 63) - 1
 class Register:
     """Identity and history of each row; rows are in the order of the estimator's.
 
-    id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest),
-    start (T, d) position at birth, box (T, 4) left, top, width, height relative to the position,
-    merged (number of the tracks on its measurement, -1 alone) and merged_since_s, exchange (probability that the target
-    is another's, since they were not resolved), score (log-odds that it is a target), best (highest score since it was
-    confirmed, before that the first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its
-    own), travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by
-    REST of its size), missed (T, S) scans of each station without it since it was last seen,
-    visible (T, S) probability that each station could see it, NaN while nothing is known.
+    id, status, born_s, updated_s (last evidence), history (hits of the last 63 scans as bits, newest lowest), start (T,
+    d) position at birth, box (T, 4) left, top, width, height relative to the position, merged (number of the tracks on
+    its measurement, -1 alone) and merged_since_s, exchange (probability that the target is another's, since they were
+    not resolved), score (log-odds that it is a target), best (highest score since it was confirmed, before that the
+    first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its own), outside (the border of
+    the picture has cut it since it began), entered (it began so, and came in), travelled (farthest it ever was from its
+    start), rest (T, d) and rest_s (where and when it last moved on by REST of its size), missed (T, S) scans of each
+    station without it since it was last seen, visible (T, S) probability that each station could see it, NaN while
+    nothing is known.
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
-             "exchange", "score", "best", "run", "label", "alone_s", "travelled", "rest", "rest_s",
-             "missed", "visible")  # fmt: skip
+             "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "travelled", "rest",
+             "rest_s", "missed", "visible")  # fmt: skip
 
     LINKS = ("prior_x", "prior_P", "gain")
     _TABLES = (
@@ -62,6 +63,8 @@ class Register:
         self.run = np.empty(0, np.int64)
         self.label = np.empty(0, np.int64)
         self.alone_s = np.empty(0)
+        self.outside = np.empty(0, bool)
+        self.entered = np.empty(0, bool)
         self.travelled = np.empty(0)
         self.rest = np.empty((0, dim))
         self.rest_s = np.empty(0)
@@ -93,6 +96,11 @@ class Register:
         """Note where the rows are at t: xy (T, d)."""
         _move(xy, self.start, self.travelled, self.box, self.rest, self.rest_s, t)
 
+    def come_in(self, cut: Mask) -> None:
+        """Note which rows the border of the picture cuts (T,)."""
+        self.entered |= self.outside & ~cut
+        self.outside &= cut
+
     def record_hits(self, hit: Mask, sure: Mask, looked: Mask, station: int, t: float, dt: float) -> None:
         """Note which rows (T,) the scan of a station at t shows, dt seconds after the last, and which of them for sure.
 
@@ -122,6 +130,7 @@ class Register:
         run: Ints,
         label: Ints | None = None,
         ids: Ints | None = None,
+        outside: Mask | None = None,
     ) -> Ints:
         """Register new tentative tracks; returns their ids, the next ones unless given."""
         count = len(position)
@@ -142,6 +151,8 @@ class Register:
             "run": run,
             "label": -1 if label is None else label,
             "alone_s": 0.0,
+            "outside": False if outside is None else outside,
+            "entered": False,
             "travelled": 0.0,
             "rest": position,
             "rest_s": t,

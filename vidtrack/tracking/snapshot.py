@@ -36,5 +36,6 @@ def snapshot(
         velocity=model.velocity,
         run=register.run.copy(),
         exchange=register.exchange.copy(),
+        entered=register.entered.copy(),
         **more,
     )

@@ -2,12 +2,18 @@
 
 import struct
 
+import numpy as np
 import pytest
 
-from vidtrack.radar.feeds.packets import payloads
+from vidtrack.radar.feeds import packets
+from vidtrack.radar.feeds.messages import Losses
 
 PAYLOADS = [b"first payload", b"2", b"the third one"]
 ETHERNET = bytes(12) + b"\x08\x00"
+
+
+def payloads(content):
+    return packets.payloads(content, Losses())
 
 
 def udp(payload):
@@ -78,6 +84,34 @@ def test_every_truncation_of_a_capture_is_read_without_a_crash():
     for whole in (pcap([ETHERNET + ipv4(p) for p in PAYLOADS]), pcapng([ETHERNET + ipv4(p) for p in PAYLOADS])):
         for end in range(4, len(whole)):
             assert len(list(payloads(whole[:end]))) <= len(PAYLOADS)
+
+
+FRAMES = [ETHERNET + ipv4(f"payload number {k}".encode()) for k in range(6)]
+
+
+@pytest.mark.parametrize("capture", [pcap, lambda frames: pcap(frames, order=">"), pcapng])
+@pytest.mark.parametrize(
+    "damage", [b"\xff" * 16, bytes(12) + b"\xff" * 4, b"trash " * 500], ids=["head", "size", "trash"]
+)
+def test_a_capture_is_read_past_a_damaged_header(capture, damage):
+    whole, losses = capture(FRAMES), Losses()
+    at = whole.index(FRAMES[2]) - 28 * (capture is pcapng) - 16 * (capture is not pcapng)
+    found = list(packets.payloads(whole[:at] + damage + whole[at + len(damage[:16]) :], losses))
+    expected = [f"payload number {k}".encode() for k in range(6)]
+    assert found[:2] == expected[:2]
+    assert found[-3:] == expected[-3:]
+    assert len(found) <= 6
+    assert losses.damaged >= 1
+
+
+def test_a_capture_with_damage_anywhere_is_read_without_a_crash():
+    rng = np.random.default_rng(0)
+    for whole in (pcap(FRAMES), pcapng(FRAMES)):
+        for _ in range(300):
+            damaged = bytearray(whole)
+            for at in rng.integers(4, len(whole), 3):
+                damaged[at] = rng.integers(256)
+            assert len(list(payloads(bytes(damaged)))) <= 2 * len(FRAMES)
 
 
 def test_a_final_recording_is_read_past_a_damaged_block():

@@ -82,7 +82,7 @@ class RtspCamera:
 
 
 class _Site(BaseHTTPRequestHandler):
-    """/video.mjpg, /video.ts, /film.avi, /page, /silent, /private, and 404 for the rest."""
+    """/video.mjpg, /video.ts, /film.avi, /page, /silent, /closed, /private, and 404 for the rest."""
 
     def do_GET(self):
         server = self.server
@@ -109,7 +109,7 @@ class _Site(BaseHTTPRequestHandler):
         elif self.path == "/silent":
             self._start("multipart/x-mixed-replace; boundary=part")
             server.closing.wait(2 * HANG_S)
-        else:
+        elif self.path != "/closed":
             self.send_error(404)
 
     def _start(self, kind):

@@ -4,7 +4,6 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
-import pytest
 from browser import browser, needs_browser
 from live_runs import NEVER_ROLLS, play, rows, settings
 
@@ -55,8 +54,8 @@ def has_tracks(folder):
 
 
 @needs_browser
-@pytest.mark.parametrize("size", [(1440, 900), (390, 844)], ids=["desk", "phone"])
-def test_a_gate_counts_and_then_a_mask_ends_all(camera, tmp_path, size):
+def test_a_gate_counts_and_then_a_mask_ends_all(camera, tmp_path):
+    """The gate is drawn at the size of a desk, the mask at that of a phone."""
     site, folder = tmp_path / "yard.toml", tmp_path / "out"
     site.write_text('[site]\nname = "yard"\nwidth = 320\nheight = 240\n')
     chosen = settings(NEVER_ROLLS, f"output.site={site}", "tracker.confirm_s=0.1")
@@ -73,6 +72,9 @@ def test_a_gate_counts_and_then_a_mask_ends_all(camera, tmp_path, size):
 
     def mask(page):
         tab = page.tab
+        tab.size(390, 844)
+        tab.until("innerWidth === 390")
+        tab.press("0")
         tab.press("z")
         for corner in ((1, 1), (318, 1), (318, 238), (1, 238)):
             tab.click(*page.at(*corner))
@@ -85,7 +87,7 @@ def test_a_gate_counts_and_then_a_mask_ends_all(camera, tmp_path, size):
         tab.screenshot(tmp_path / "page.png")
         page.server.close()
 
-    with browser(tmp_path, *size) as tab, ThreadPoolExecutor(1) as hand, LiveRun(camera.url(), chosen, folder) as run:
+    with browser(tmp_path) as tab, ThreadPoolExecutor(1) as hand, LiveRun(camera.url(), chosen, folder) as run:
 
         def story(seen):
             yield rows(20)

@@ -51,6 +51,7 @@ def test_the_spacing_is_the_one_of_the_stamps(camera):
         ("film.avi", "", "is a recording, not live"),
         ("private", "", "refuses the user"),
         ("nothing", "", "no such path"),
+        ("closed", "", "the camera ends the connection without a picture"),
         ("silent", "u:secret@", "no answer in 0.2 s"),
     ],
 )

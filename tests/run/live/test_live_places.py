@@ -25,6 +25,14 @@ def test_state_and_recording_may_lie_in_the_folder(tmp_path, in_parts):
     assert folder_for(output, extras, in_parts) == output
 
 
+@pytest.mark.parametrize("in_parts", [False, True])
+@pytest.mark.parametrize("name", ["intervals", "outbox", "pictures"])
+def test_what_outlasts_runs_is_gone_on_with_where_no_part_is_left(tmp_path, name, in_parts):
+    """As after a kill before the first part, or when an operator deleted all parts."""
+    (tmp_path / "cam" / name / "2026-11-22").mkdir(parents=True)
+    assert folder_for(tmp_path / "cam", LiveExtras(), in_parts) == tmp_path / "cam"
+
+
 def test_what_another_run_left_is_not_written_over(tmp_path):
     output = tmp_path / "cam"
     extras = LiveExtras(state=output / "cam.state")

@@ -131,6 +131,16 @@ def test_it_reconnects_and_the_gap_is_true(caplog):
     assert "pictures come again" in caplog.text
 
 
+def test_an_outage_takes_few_lines_of_the_last_problems_however_long_it_is():
+    quick = LiveSettings(backoff_s=1e-4, backoff_longest_s=1e-3, every_frame=True)
+    refused = [SourceError("connection refused")] * 50
+    story = (SourceError("lost"), *refused, SourceError("404"), *refused, Script(*pictures([20]), SILENT))
+    with open_script(Script(*pictures([10], LIVE), story[0]), *story[1:], settings=quick) as source:
+        take(source, 2)
+        told = [what for _, what in source.stats.problems]
+    assert told[1:] == ["connection refused", "404", "connection refused"]
+
+
 def test_a_silent_connection_is_a_stall():
     with open_script(Script(*pictures([10])), Script(*pictures([20]), SILENT)) as source:
         take(source, 2)

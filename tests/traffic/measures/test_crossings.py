@@ -171,7 +171,7 @@ def distance(point, gates):
 def passed_of(t, gate, side, along, speed):
     n = len(t)
     ones, yes = np.ones(n), np.ones(n, bool)
-    return Passed(t, gate, np.arange(n), side, along, ones, ones, ones, yes, ~yes, speed, ones, ones, ones)
+    return Passed(t, gate, np.arange(n), side, along, ones, ones, ones, yes, ~yes, speed, ones, ones, ones, ~yes)
 
 
 @settings(max_examples=40, deadline=None)

@@ -114,8 +114,9 @@ def test_figures_are_those_of_their_definitions(events):
     n = len(t)
     yes = np.ones(n, bool)
     passed = Passed(
-        t, way // 2, np.arange(n), way % 2, *(np.ones((4, n))), yes, ~yes, v, 0.3 * np.ones(n), 0.2 * np.ones(n), 0 * t
-    )
+        t, way // 2, np.arange(n), way % 2, *(np.ones((4, n))), yes, ~yes,
+        v, 0.3 * np.ones(n), 0.2 * np.ones(n), 0 * t, ~yes,
+    )  # fmt: skip
     edges, watched = np.arange(5) * 10.0, np.array([1.0, 1.0, 0.5, 0.0])
     found = figures(passed, np.full(n, 0.9), np.full(n, 4.0), edges, watched, ways=4)
     for w in range(4):

@@ -75,6 +75,24 @@ def test_a_lorry_is_not_divided_without_a_neck(road):
     assert len(explain(foreground((80, 90, 100, 35)), NONE, road, SETTINGS)) == 1
 
 
+LORRY = [(100, 100, 42, 35), (152, 100, 48, 35), (142, 116, 10, 4)]  # it looks like the road where it is narrow
+
+
+def test_a_neck_of_a_lorry_that_another_touches_does_not_break_it(road):
+    picture = foreground(*LORRY, (160, 135, 12, 20))
+    alone = explain(picture, tracks_of(0.0, [[100.0, 100, 100, 35]]), road, SETTINGS)
+    assert len(alone) > 1
+    both = explain(picture, tracks_of(0.0, [[100.0, 100, 100, 35], [159.0, 134, 14, 21]]), road, SETTINGS)
+    np.testing.assert_allclose(found(both), [[100, 100, 100, 35], [160, 135, 12, 20]], atol=6)
+
+
+def test_a_neck_between_two_known_vehicles_is_cut(road):
+    picture = foreground((100, 100, 38, 20), (142, 100, 38, 20), (138, 108, 4, 3))
+    expected = tracks_of(0.0, [[96.0, 100, 40, 20], [136.0, 100, 40, 20]])
+    blobs = explain(picture, expected, road, BlobSettings(divide=False))
+    np.testing.assert_allclose(found(blobs), [[100, 100, 38, 20], [142, 100, 38, 20]], atol=4)
+
+
 def test_pieces_of_a_vehicle_are_one(road):
     assert found(explain(foreground((100, 100, 30, 20), (134, 103, 6, 12)), NONE, road, SETTINGS)) == [
         [100, 100, 40, 20]

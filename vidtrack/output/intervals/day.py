@@ -195,7 +195,7 @@ def _passed(crossings: pa.Table, unix: Floats, way: np.ndarray) -> Passed:
     )
     return Passed(
         unix, way // 2, np.arange(n), way % 2, unknown, unknown, unknown, unknown, surely, ~surely, speed, own, shared,
-        unknown,
+        unknown, ~surely,
     )  # fmt: skip
 
 

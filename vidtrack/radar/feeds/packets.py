@@ -9,26 +9,39 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
+import numpy as np
+
+from vidtrack.radar.feeds.messages import Losses
+
 _PCAP = {b"\xd4\xc3\xb2\xa1": "<", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4": ">", b"\xa1\xb2\x3c\x4d": ">"}
 _PCAPNG = b"\x0a\x0d\x0d\x0a"
 _FINAL_HEAD, _FINAL_END = 8, b"\xa5\xa5\xa5\xa5"
 _LINK_HEADS = {0: 4, 1: 14, 12: 0, 101: 0, 113: 16, 228: 0, 229: 0, 276: 20}
 """Octets before the IP packet by link type: loopback, Ethernet, raw IP, Linux cooked 1, IPv4, IPv6, Linux cooked 2."""
+_PCAP_HEAD, _LONGEST = 16, 1 << 18
+"""Octets of the header of a packet, and of the longest packet that capture programs write."""
+_PARTS = 10**9
+"""A header's fraction of a second is less, in nanoseconds."""
+_SEARCHED = 1 << 16
+"""Octets that are searched at once for the next sound header."""
+_KINDS = (0x0A0D0D0A, 1, 3, 6)
+"""Types of pcapng blocks that matter: section, interface, simple and enhanced packet."""
 _VLAN = (b"\x81\x00", b"\x88\xa8")
 _UDP = 17
 
 
-def payloads(content: bytes) -> Iterator[bytes]:
+def payloads(content: bytes, losses: Losses) -> Iterator[bytes]:
     """The payloads of all UDP datagrams of a capture, of all blocks of a FINAL recording, or else the whole content.
 
-    What a capture holds beside UDP is passed over, and so are fragments of datagrams. A cut end is left out.
+    What a capture holds beside UDP is passed over, and so are fragments of datagrams. A cut end is left out. After a
+    damaged header it goes on with the next sound one; `losses` counts each such place.
     """
     if content[:4] in _PCAP:
-        frames = _pcap(content, _PCAP[content[:4]])
+        frames = _pcap(content, _PCAP[content[:4]], losses)
     elif content[:4] == _PCAPNG:
-        frames = _pcapng(content)
+        frames = _pcapng(content, losses)
     elif _is_final(content):
-        yield from _final(content)
+        yield from _final(content, losses)
         return
     else:
         yield content
@@ -39,19 +52,43 @@ def payloads(content: bytes) -> Iterator[bytes]:
             yield payload
 
 
-def _pcap(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+def _pcap(content: bytes, order: str, losses: Losses) -> Iterator[tuple[int, bytes]]:
     """Link type and frame of each packet."""
     if len(content) < 24:
         return
     link = struct.unpack_from(f"{order}I", content, 20)[0] & 0xFFFF
+    head = struct.Struct(f"{order}4I")
     at = 24
-    while at + 16 <= len(content):
-        size = struct.unpack_from(f"{order}I", content, at + 8)[0]
-        yield link, content[at + 16 : at + 16 + size]
-        at += 16 + size
+    while at + _PCAP_HEAD <= len(content):
+        _, fraction, size, whole = head.unpack_from(content, at)
+        if fraction < _PARTS and size <= whole <= _LONGEST:
+            yield link, content[at + _PCAP_HEAD : at + _PCAP_HEAD + size]
+            at += _PCAP_HEAD + size
+        else:
+            losses.damaged += 1
+            at = _next_packet(content, head, at + 1)
 
 
-def _pcapng(content: bytes) -> Iterator[tuple[int, bytes]]:
+def _next_packet(content: bytes, head: struct.Struct, at: int) -> int:
+    """Where the next packet is after which there is another, or the end; the end if there is none."""
+    while at + _PCAP_HEAD <= len(content):
+        part = np.frombuffer(content, np.uint8, min(_SEARCHED + _PCAP_HEAD - 1, len(content) - at), at)
+        word = np.lib.stride_tricks.sliding_window_view(part, 4).copy().view(f"{head.format[0]}u4")[:, 0]
+        fraction, size, whole = (word[k : len(word) - 12 + k] for k in (4, 8, 12))
+        sound = (fraction < _PARTS) & (size > 0) & (size <= whole) & (whole <= _LONGEST)
+        for start in (at + np.flatnonzero(sound)).tolist():
+            after = start + _PCAP_HEAD + head.unpack_from(content, start)[2]
+            if after == len(content):
+                return int(start)
+            if after + _PCAP_HEAD <= len(content):
+                _, fraction, size, whole = head.unpack_from(content, after)
+                if fraction < _PARTS and size <= whole <= _LONGEST:
+                    return int(start)
+        at += len(sound)
+    return len(content)
+
+
+def _pcapng(content: bytes, losses: Losses) -> Iterator[tuple[int, bytes]]:
     """Link type and frame of each packet in enhanced and simple packet blocks."""
     order, at = "<", 0
     links: list[int] = []
@@ -59,6 +96,10 @@ def _pcapng(content: bytes) -> Iterator[tuple[int, bytes]]:
         if content[at : at + 4] == _PCAPNG:
             order = "<" if content[at + 8 : at + 12] == b"\x4d\x3c\x2b\x1a" else ">"
             links = []
+        if not _is_block(content, order, at):
+            losses.damaged += 1
+            at = _next_block(content, order, at + 4)
+            continue
         kind, size = struct.unpack_from(f"{order}II", content, at)
         body = content[at + 8 : at + size - 4]
         if kind == 1 and len(body) >= 2:
@@ -69,7 +110,29 @@ def _pcapng(content: bytes) -> Iterator[tuple[int, bytes]]:
                 yield links[interface], body[20 : 20 + kept]
         elif kind == 3 and links:
             yield links[0], body[4:]
-        at += max(12, size)
+        at += size
+
+
+def _is_block(content: bytes, order: str, at: int) -> bool:
+    """Whether a block is there: its length is said at both ends, if the end is not cut off."""
+    size = struct.unpack_from(f"{order}I", content, at + 4)[0]
+    if size < 12 or size % 4:
+        return False
+    if at + size > len(content):
+        return bool(size <= _LONGEST)
+    return bool(struct.unpack_from(f"{order}I", content, at + size - 4)[0] == size)
+
+
+def _next_block(content: bytes, order: str, at: int) -> int:
+    """Where the next whole block is that matters; the end if there is none. Their lengths are multiples of four."""
+    while at + 12 <= len(content):
+        words = np.frombuffer(content, f"{order}u4", min(_SEARCHED, len(content) - at) // 4, at)
+        for start in (at + 4 * np.flatnonzero(np.isin(words, _KINDS))).tolist():
+            whole = start + 12 <= len(content) and _is_block(content, order, start)
+            if whole and start + struct.unpack_from(f"{order}I", content, start + 4)[0] <= len(content):
+                return int(start)
+        at += 4 * len(words)
+    return len(content)
 
 
 def _datagram(link: int, frame: bytes) -> bytes:
@@ -97,7 +160,7 @@ def _is_final(content: bytes) -> bool:
     return size > _FINAL_HEAD + 4 and content[size - 4 : size] == _FINAL_END
 
 
-def _final(content: bytes) -> Iterator[bytes]:
+def _final(content: bytes, losses: Losses) -> Iterator[bytes]:
     """The data of each block; after a damaged one, from the next end mark on."""
     at = 0
     while at < len(content):
@@ -106,5 +169,6 @@ def _final(content: bytes) -> Iterator[bytes]:
             yield content[at + _FINAL_HEAD : at + size - 4]
             at += size
         else:
+            losses.damaged += 1
             mark = content.find(_FINAL_END, at)
             at = len(content) if mark < 0 else mark + len(_FINAL_END)

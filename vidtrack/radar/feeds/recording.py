@@ -50,7 +50,7 @@ def decoder_of(payload: bytes) -> type[Decoder] | None:
 
 def _kind(content: bytes) -> type[Decoder] | None:
     """The decoder for most of the first payloads."""
-    found = Counter(decoder_of(payload) for payload in islice(payloads(content), _PAYLOADS))
+    found = Counter(decoder_of(payload) for payload in islice(payloads(content, Losses()), _PAYLOADS))
     found.pop(None, None)
     return found.most_common(1)[0][0] if found else None
 
@@ -67,10 +67,10 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
         raise SourceError(f"cannot open {path}: {error.strerror}") from None
     kind = _kind(content[:_LOOKED_AT])
     if kind is None:
-        raise PlotFormatError(f"{path} is neither ASTERIX (raw, pcap, FINAL) nor NMEA")
+        raise PlotFormatError(f"{path} is neither a recording of ASTERIX (raw, pcap, FINAL) nor of NMEA; give one")
     decoder = _informed(kind, content)
     decoder.losses = losses
-    found = [message for payload in payloads(content) for message in decoder.messages(payload)]
+    found = [message for payload in payloads(content, losses) for message in decoder.messages(payload)]
     if not found:
         raise PlotFormatError(f"{path} holds no message of a radar; {losses.damaged} damaged ones")
     return Messages.of(found)
@@ -86,7 +86,7 @@ def senders(path: str | Path) -> list[tuple[int, int]]:
 def _informed(kind: type[Decoder], content: bytes) -> Decoder:
     """A decoder that has read the beginning: some messages need a time of day that others say later."""
     decoder = kind(Losses())
-    for payload in islice(payloads(content), _PAYLOADS):
+    for payload in islice(payloads(content, Losses()), _PAYLOADS):
         deque(decoder.messages(payload[:_LOOKED_AT_AGAIN]), maxlen=0)
     return decoder
 

@@ -23,7 +23,7 @@ COUNTS = "intervals"
 """Folder of the counts by interval"""
 
 _MARGIN_S = 1.0  # for a vehicle to be clear of the line
-_SURE = 0.8  # share of the time that tracks coast in which they are surely found again
+_SURE = 0.6  # share of the time that tracks coast in which they are surely found again: later a box may miss its own
 _UNUSUAL, _LATELY = 2.5, 0.2  # times the usual pause between frames; weight of the last one in it
 _STEP_S = 0.5  # the wall clock was set if it moved by more than this
 _SPEEDS = ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")

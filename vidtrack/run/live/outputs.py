@@ -10,6 +10,7 @@ from time import monotonic
 
 from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import LIVE_HOLD_S, Confirmed
+from vidtrack.output.events.event import PICTURES
 from vidtrack.output.folder import open_run, usable
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
@@ -17,7 +18,7 @@ from vidtrack.recording.event_pictures import EventPictures
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Retention, parts_of
 from vidtrack.run.live.background_writer import BackgroundWriter
-from vidtrack.run.live.counting import Counting
+from vidtrack.run.live.counting import COUNTS, Counting
 from vidtrack.run.live.events import OUTBOX, LiveEvents, Receivers
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.live.site import FollowedSite
@@ -124,8 +125,8 @@ def lock_folder(
 
 
 def _is_ours(folder: Path, extras: LiveExtras) -> bool:
-    """Whether a folder contains at most this run's state file and recording."""
-    kept = [extras.record] if extras.record else []
+    """Whether a folder contains at most what outlasts runs, and this run's state file and recording."""
+    kept = [folder / name for name in (COUNTS, OUTBOX, PICTURES)]
+    kept += [extras.record] if extras.record else []
     kept += [extras.state, lock_file(extras.state)] if extras.state else []
-    kept += [folder / OUTBOX] if extras.receivers else []
     return all(any(path.resolve().is_relative_to(entry.resolve()) for path in kept) for entry in folder.iterdir())

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
@@ -61,6 +61,9 @@ class Surroundings(Protocol):
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
         """Move the boxes of tracks towards those of the measurements that they have taken (T,)."""
 
+    def cut(self, box: Floats) -> Mask:
+        """(N,) whether the border of what the scan surveyed cuts boxes (N, 4)."""
+
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is where the scan looks; elsewhere P_D is zero."""
 
@@ -96,6 +99,10 @@ class NoPicture:
 
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
         """Nothing has a box."""
+
+    def cut(self, box: Floats) -> Mask:
+        """(N,) none."""
+        return np.zeros(len(box), bool)
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) ones."""
@@ -165,6 +172,10 @@ class Picture:
         follow(register.box, view.relative, taken, self.border.cut(view.blobs), least, bank.hits)
         if bank.model.per_size:
             np.copyto(bank.scale, longer(register.box), where=taken >= 0)
+
+    def cut(self, box: Floats) -> Mask:
+        """(N,) boxes (N, 4) that the border of the last scan cuts."""
+        return self.border.cut(box)
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is within the border of the last scan."""

@@ -69,7 +69,8 @@ def _stood(gates: Gates, end: End, track: Ints, gate: Ints, along: Floats, far: 
     no, unknown = np.zeros(len(track), bool), np.full(len(track), np.nan)
     sigma = np.sqrt(end.spread[track, 0])
     side = inward if inwards else 1 - inward
-    return Passed(end.t[track], gate, track, side, along, sigma, far, far, no, no, unknown, unknown, unknown, unknown)
+    speed = unknown, unknown, unknown
+    return Passed(end.t[track], gate, track, side, along, sigma, far, far, no, no, *speed, unknown, no)
 
 
 def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats) -> tuple[Passed, Floats]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.measures.rows import Reader
+from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import open_day
 from vidtrack.traffic.measures.stretches import Stretches
 from vidtrack.traffic.site import Site
@@ -23,10 +23,17 @@ def by_traffic(runs: Sequence[str], site: Site) -> dict[str, Any]:
     day = open_day(runs, site.camera.start)
     grounds = {size: calibrated(site.scaled(*size)) for size in sorted({one.size for one in day.recordings})}
     stretches, vehicles = Stretches(metres=True), Vehicles(grounds[min(grounds)])
-    for whole in Reader(day, dict(grounds)):
+    for _ in by_stretches(Reader(day, dict(grounds)), stretches, vehicles):
+        pass
+    return contradicting(vehicles.fitted(np.arange(len(stretches.lives().track)), np.empty(0, int), np.empty(0)))
+
+
+def by_stretches(blocks: Iterable[Rows], stretches: Stretches, vehicles: Vehicles) -> Iterator[Rows]:
+    """The rows with the numbers of stretches as those of tracks; stretches and vehicles take them in on the way."""
+    for whole in blocks:
         rows = stretches.add(whole)
         vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
-    return contradicting(vehicles.fitted(np.arange(len(stretches.lives().track)), np.empty(0, int), np.empty(0)))
+        yield rows
 
 
 def contradicting(found: Fitted | None) -> dict[str, Any]:

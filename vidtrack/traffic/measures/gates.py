@@ -61,10 +61,6 @@ class Gates:
         last = self.first[1:] - 1
         return np.asarray(self.begin[last] + np.linalg.norm(self.segment[last, 2:] - self.segment[last, :2], axis=1))
 
-    def beside(self, gate: Ints, along: Floats) -> Mask:
-        """(N,) whether places on gates (N,), so far along them (N,), are beyond their ends."""
-        return np.asarray((along < 0) | (along > self.length[gate]))
-
     def with_beside(self, by: float) -> tuple[Floats, Floats, Ints]:
         """`segment`, `begin` and `first` of these gates, and then of as many that lie at both ends of each."""
         first, last = self.first[:-1], self.first[1:] - 1

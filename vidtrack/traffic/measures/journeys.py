@@ -48,16 +48,15 @@ def journeys(
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
     may = _may(gates, allowed)
-    passed = passed.only(~gates.beside(passed.gate, passed.along) | _needed(gates, passed, may))
+    passed = passed.only(~passed.beside | _needed(gates, passed, may))
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     if metres:
         passed = passed.only(~_of_others(gates, passed, lives, may))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins, passed)
-    beside = gates.beside(passed.gate, passed.along)
-    sure = np.where(beside, INFERRED_SURE, 1.0) * confidence(passed)
-    told = ["inferred" if off else reason for off, reason in zip(beside.tolist(), reasons(passed), strict=True)]
+    sure = np.where(passed.beside, INFERRED_SURE, 1.0) * confidence(passed)
+    told = ["inferred" if off else reason for off, reason in zip(passed.beside.tolist(), reasons(passed), strict=True)]
     probability = np.concatenate([sure, joins.probability[across.track]])
     reason = [*told, *(["joined"] * len(across))]
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
@@ -91,8 +90,7 @@ def _may(gates: Gates, allowed: Sequence[tuple[str, str]]) -> Mask:
 
 def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
     """(P,) passings beside a gate without which a trip that may be would have no entry, or no exit."""
-    beside = gates.beside(passed.gate, passed.along)
-    drawn = ~beside
+    drawn, beside = ~passed.beside, passed.beside.copy()
     k = np.flatnonzero(beside)
     beside[k] = gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0] == passed.gate[k]
     leg, inwards = gates.leg[passed.gate], gates.inward[passed.gate] == passed.side

@@ -13,7 +13,7 @@ from vidtrack.arrays.types import Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.measures.by_traffic import contradicting
+from vidtrack.traffic.measures.by_traffic import by_stretches, contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
@@ -57,11 +57,9 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     metres, ground = site.calibration is not None, grounds[sizes[0]]
     reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, *reaches(metres))
     staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
-    for whole in reader:
-        rows = stretches.add(whole)
+    for rows in by_stretches(reader, stretches, vehicles):
         for part in (passing, staying, meeting):
             part.add(rows)
-        vehicles.add(rows.track, rows.t, rows.xy, rows.edge)
     lives = stretches.lives()
     return _Figures(day, site, gates, ground, reader, passing, lives, staying, meeting, vehicles).measures()
 

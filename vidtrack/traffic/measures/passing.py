@@ -3,7 +3,7 @@
 A track passes a gate when the step between two of its positions meets the gate's line. If it then comes back before it
 was away from the gate by its margin, neither passing counts: it jitters or stands on the line. One that is last seen
 beyond the gate has passed, however near. Gates may be looked at as if they were longer at both ends: what passes beside
-them has a place on the gate below 0 or beyond its length.
+them, `beside`, has a place on the gate below 0 or beyond its length.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ class Passed:
     shown, merged (P,) the picture shows the track just then; it shares a blob
     speed, speed_sigma, speed_shared   (P,) in the unit of positions per second
     way           (P,) what the track had driven since it began; NaN where that is not known
+    beside        (P,) it passed beyond an end of the gate
     """
 
     t: Floats
@@ -61,6 +62,7 @@ class Passed:
     speed_sigma: Floats
     speed_shared: Floats
     way: Floats
+    beside: Mask
 
     def __len__(self) -> int:
         return len(self.t)
@@ -175,6 +177,7 @@ class Passing:
             speed_sigma=real[:, SPEED_SIGMA],
             speed_shared=real[:, SPEED_SHARED],
             way=real[:, WAY],
+            beside=whole[:, GATE] >= len(self._gates),
         )
 
     def ways(self, tracks: int) -> Floats:

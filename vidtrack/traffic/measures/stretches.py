@@ -277,23 +277,29 @@ def _predict(state: Floats, dt: float, to: Floats) -> None:
 
 @kernel
 def _step(state: Floats, row: Floats) -> float:
-    """Predict and update with a row (4,), unless it is far off; returns its squared distance."""
-    now = np.empty(9)
-    _predict(state, row[0] - state[T], now)
-    dx, dy, s = row[1] - now[X], row[2] - now[Y], now[PXX] + row[3]
+    """Predict and update with a row (4,), unless it is far off; returns its squared distance.
+
+    Several are made of each row: the prediction of `_predict` is written out, so that no array is made for it.
+    """
+    dt, vx, vy = row[0] - state[T], state[VX], state[VY]
+    jolt = STANDING_JOLT + JOLT_PER_M_S * np.hypot(vx, vy)
+    x, y = state[X] + dt * vx, state[Y] + dt * vy
+    xx = state[PXX] + 2 * dt * state[PXV] + dt * dt * state[PVV] + jolt * dt**3 / 3
+    xv = state[PXV] + dt * state[PVV] + jolt * dt**2 / 2
+    vv = state[PVV] + jolt * dt
+    dx, dy, s = row[1] - x, row[2] - y, xx + row[3]
     distance = (dx * dx + dy * dy) / s
     if distance > _FAR:
         return distance
-    place, pace = now[PXX] / s, now[PXV] / s
-    now[X], now[Y], now[VX], now[VY] = (
-        now[X] + place * dx,
-        now[Y] + place * dy,
-        now[VX] + pace * dx,
-        now[VY] + pace * dy,
+    place, pace = xx / s, xv / s
+    state[T], state[X], state[Y], state[VX], state[VY] = (
+        row[0],
+        x + place * dx,
+        y + place * dy,
+        vx + pace * dx,
+        vy + pace * dy,
     )
-    now[PVV] -= pace * now[PXV]
-    now[PXX], now[PXV], now[LASTING] = (1 - place) * now[PXX], (1 - place) * now[PXV], row[3]
-    state[:] = now
+    state[PXX], state[PXV], state[PVV], state[LASTING] = (1 - place) * xx, (1 - place) * xv, vv - pace * xv, row[3]
     return distance
 
 

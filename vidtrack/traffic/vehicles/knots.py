@@ -23,6 +23,9 @@ class Knots:
     t      (K,) s; mean time
     edge   (K, 4) px; mean left, top, right and lower edges of the boxes, NaN where none was seen
     rows   (K,) how many boxes
+
+    A day has millions of knots: edges in single precision are as good as a thousandth of a pixel. What `between` gives
+    is in double precision.
     """
 
     first: Ints
@@ -34,7 +37,7 @@ class Knots:
         """Those of the tracks begin, begin + 1, ..., end - 1."""
         first = self.first[begin : end + 1]
         rows = slice(first[0], first[-1])
-        return Knots(first - first[0], self.t[rows], self.edge[rows], self.rows[rows])
+        return Knots(first - first[0], self.t[rows], self.edge[rows].astype(float), self.rows[rows].astype(float))
 
     def only(self, chosen: Mask) -> Knots:
         """The knots of a mask (K,)."""
@@ -71,10 +74,9 @@ class Knotting:
         self._done.clear()
         order = np.lexsort((t, who))
         first = np.searchsorted(who[order], np.arange(tracks + 1))
-        return Knots(first, t[order], values[order, :4].astype(float), values[order, 4].astype(float))
+        return Knots(first, t[order], values[order, :4], values[order, 4])
 
     def _keep(self, who: Ints, done: Floats) -> None:
-        """A day has millions of knots: edges in single precision are as good as a thousandth of a pixel."""
         self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))
 
 

@@ -26,6 +26,8 @@ _SURE = 0.15  # no size field is more certain [ln size]
 _ODD = 8.0  # ln; no vehicle is less likely than this for its size: there are lorries
 _ANOTHER = 3.0  # ln; that another vehicle stands so close is less likely by this
 _PART, _CUT_PART = 0.26, 0.11  # share of the typical box area that is a vehicle; where the border cuts it
+_WITHIN, _PIECE = 0.6, 0.2  # share of a part in a predicted box, and of what is in the box in a part: a piece of it
+_COVERED = 0.4  # share of a predicted box that is filled where its vehicle is
 _OPEN = 0.72  # before a typical size is known: a region that fills less of its box may be several vehicles
 _EQUAL, _FULL = 0.25, 0.5  # then a part's least share of the largest part's box, and of its own box
 _LEAST_PX, _LEAST_HOLLOW_PX = 60, 300  # pixels of the mask; the shape of smaller regions is the grid's
@@ -72,7 +74,7 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
     regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
     known = expected.status != TENTATIVE
     if settings.cut:
-        regions = cut_at_necks(regions, measure)
+        regions = cut_at_necks(regions, measure, measure.predicted(expected.box[known]))
     if settings.divide and measure.sizes.known:
         dividing = expected.box[known | (expected.age_s > _YOUNG_S)]
         regions = divided(regions, measure.predicted(dividing), measure)
@@ -92,8 +94,11 @@ def _links(regions: Regions, weak: Image | None) -> Ints:
     return links(*regions, weak)
 
 
-def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
-    """The regions; those large enough for several vehicles are cut at their necks."""
+def cut_at_necks(regions: Regions, measure: _Measure, predicted: Floats) -> Regions:
+    """The regions; those large enough for several vehicles are cut at their necks.
+
+    predicted  (K, 4) boxes of confirmed tracks [px of the mask]; of several vehicles in a region none is broken
+    """
     box, area = regions.boxes(), regions.areas()
     typical = measure.typical(box)
     large = np.any(box[:, 2:] > _LARGE * typical, axis=1)
@@ -108,6 +113,8 @@ def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
                 cut = _cut(depth, _SHALLOW, least, box[i])
                 if not _likelier(cut, box[i], typical[i], measure.sizes):
                     continue
+            if _breaks(cut, predicted):
+                continue
         else:
             cut = _cut(depth, _NECK, np.ones(2), box[i])
             if not _alike(cut):
@@ -119,6 +126,22 @@ def cut_at_necks(regions: Regions, measure: _Measure) -> Regions:
 def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> Regions:
     label, count = parts(depth, neck, least)
     return of_labels(label, count, box)
+
+
+def _breaks(cut: Regions, predicted: Floats) -> bool:
+    """Whether two parts are pieces of one of several vehicles with these predicted boxes (K, 4).
+
+    Where a vehicle looks like the road, as a white lorry on a crossing, it has a neck of its own; when another one
+    touches it, both together are too large for one vehicle.
+    """
+    (left, top), (right, bottom) = predicted[:, :2].T[..., None], (predicted[:, :2] + predicted[:, 2:]).T[..., None]
+    length = np.minimum(cut.stop, right) - np.maximum(cut.start, left)
+    inside = np.where((cut.row >= top) & (cut.row < bottom), np.maximum(length, 0.0), 0.0)
+    common = inside @ (cut.label[:, None] == np.arange(cut.total))  # (K, parts) pixels
+    filled = common.sum(axis=1)
+    there = filled > _COVERED * predicted[:, 2:].prod(axis=1)
+    piece = (common >= _WITHIN * cut.areas()) & (common >= _PIECE * filled[:, None])
+    return bool(there.sum() > 1 and (piece[there].sum(axis=1) > 1).any())
 
 
 def _likelier(cut: Regions, box: Ints, typical: Floats, sizes: SizeField) -> bool:

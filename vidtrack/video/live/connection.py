@@ -167,6 +167,8 @@ def _complaint(address: Address, error: av.FFmpegError, timed_out: bool, timeout
         return Stalled(f"{start} no answer in {timeout_s:g} s")
     if isinstance(error, ConnectionRefusedError):
         return SourceError(f"{start} connection refused; is the camera on, and the port right?")
+    if isinstance(error, av.error.EOFError):
+        return SourceError(f"{start} the camera ends the connection without a picture")
     if error.errno == errno.EIO and not _resolves(address.url):
         return SourceError(f"{start} the host name is unknown")
     if error.errno == errno.EIO or isinstance(error, av.error.InvalidDataError):

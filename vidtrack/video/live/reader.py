@@ -71,6 +71,7 @@ class Reader:
         self._clock = clock
         self._stopping = Event()
         self._failures = 0  # since the last picture
+        self._reason = ""  # of the last failure
         self._connections = 0
         self.alive_s = monotonic()
         # A daemon: FFmpeg cannot always be interrupted, and the program must be able to end.
@@ -101,12 +102,13 @@ class Reader:
         self._stats.state = "ended"
 
     def _report_failure(self, error: SourceError, then: str) -> None:
-        """Warn of the first failure; further failures before the next picture are only noted."""
+        """Warn of the first failure; before the next picture only a change of the reason is noted."""
         self._stats.stalls += isinstance(error, Stalled)
         if self._failures == 1:
             self._stats.warn(f"{error}; {then}")
-        else:
+        elif str(error) != self._reason:
             self._stats.note(str(error))
+        self._reason = str(error)
 
     def _wait(self) -> None:
         self._stats.state = "waiting"

@@ -1,0 +1,133 @@
+"""How two targets that share plots are tracked: before, while and after they give one plot for both.
+
+    python tools/measure_unresolved.py radar-unresolved --seeds 200-219
+    python tools/measure_unresolved.py radar-parting --seeds 400-489 "" radar.unresolved=false
+
+Each argument after the scenario is one choice of settings, as in measure_radar.py. The stretch is from the first to the
+last scan with one plot for both. IDF1, GOSPA (order 2) and matches are within 1 km; NEES is of positions, 2 is right.
+
+kept       runs in which the two tracks that follow the pair before the stretch are there in all its scans and after it
+switches   identity switches over the whole run, and their largest number in one run
+exchanged  of the kept pairs, the share that had exchanged targets by the end, with its standard error; what the tracker
+           stated of it on average; and the Brier score of that with the score of one half, which is .25
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vidtrack import formats, score
+from vidtrack.config.load import load
+from vidtrack.config.settings import Settings
+from vidtrack.run.radar import track_plots
+from vidtrack.simulate.radar_scenarios import simulate_radar
+from vidtrack.simulate.radar_write import write_radar
+from vidtrack.tracks import TENTATIVE, Tracks
+
+NEAR_M = 1000.0
+PARTS = ("before", "during", "after")
+
+
+class Outcome(NamedTuple):
+    """One run: scores by part; whether both tracks were kept, had exchanged targets, and how probable that was."""
+
+    idf1: list[float]
+    nees: list[float]
+    gospa: float
+    switches: float
+    kept: bool
+    exchanged: bool
+    stated: float
+
+
+def outcome(scenario: str, seed: int, settings: Settings) -> Outcome:
+    """The outcome of one seed."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        seen = simulate_radar(scenario, seed)
+        write_radar(seen, folder)
+        truth = formats.read(folder / "truth.csv")
+        steps = list(track_plots(folder / "plots.csv", settings))
+    together = np.flatnonzero(seen.merged[0])
+    first, last = int(together[0]), int(together[-1])
+    result = table(steps)
+    parts = [(-np.inf, first - 1), (first, last), (last + 1, np.inf)]
+    scores = [score.evaluate(cut(result, *part), cut(truth, *part), max_distance=NEAR_M) for part in parts]
+    whole = score.evaluate(result, truth, max_distance=NEAR_M)
+    by_scan = dict(steps)
+    pair = [nearest(by_scan[first - 1], seen.states[k, first - 1, :2]) for k in (0, 1)]
+    end = by_scan[max(by_scan)]
+    kept = pair[0] != pair[1] and all(set(pair) <= set(by_scan[scan].id) for scan in range(first, max(by_scan) + 1))
+    exchanged, stated = False, np.nan
+    if kept:
+        place = [end.xy[end.id == one][0] for one in pair]
+        there = [seen.states[k, -1, :2] for k in (0, 1)]
+        straight, crossed = (sum(np.linalg.norm(place[k] - there[k ^ x]) for k in (0, 1)) for x in (0, 1))
+        exchanged, stated = bool(crossed < straight), float(end.exchange[end.id == pair[0]][0])
+    return Outcome(
+        [float(one["idf1"]) for one in scores], [float(one.get("nees", np.nan)) for one in scores],
+        float(whole["gospa"]), float(whole["switches"]), kept, exchanged, stated,
+    )  # fmt: skip
+
+
+def table(steps: list[tuple[int, Tracks]]) -> formats.Table:
+    """The rows of all tracks that are confirmed at some time."""
+    named = {one for _, tracks in steps for one in tracks.id[tracks.status != TENTATIVE].tolist()}
+    rows = [(scan, tracks, np.isin(tracks.id, list(named))) for scan, tracks in steps]
+    frame = np.concatenate([np.full(kept.sum(), scan) for scan, _, kept in rows])
+    identity, xy, cov = (
+        np.concatenate([getattr(t, one)[kept] for _, t, kept in rows]) for one in ("id", "xy", "xy_cov")
+    )
+    return formats.Table(frame, identity, xy, None, np.ones(len(frame)), cov, None, unit="m")
+
+
+def cut(rows: formats.Table, first: float, last: float) -> formats.Table:
+    """The rows of scans from `first` to `last`."""
+    return rows.select((rows.frame >= first) & (rows.frame <= last))
+
+
+def nearest(tracks: Tracks, xy: np.ndarray) -> int:
+    """The confirmed track nearest to a place (2,); -1: none."""
+    known = tracks.status != TENTATIVE
+    return int(tracks.id[known][np.linalg.norm(tracks.xy[known] - xy, axis=1).argmin()]) if known.any() else -1
+
+
+def show(name: str, found: list[Outcome]) -> None:
+    """Print the means."""
+    idf1, nees = (np.nanmean([getattr(one, what) for one in found], axis=0) for what in ("idf1", "nees"))
+    gospa, switches = (np.array([getattr(one, what) for one in found]) for what in ("gospa", "switches"))
+    sys.stdout.write(f"{name or 'default'}\n    {', '.join(PARTS)}: IDF1 {idf1.round(3)}  NEES {nees.round(2)}\n")
+    kept = [one for one in found if one.kept]
+    sys.stdout.write(f"    GOSPA {gospa.mean():.1f} +- {gospa.std():.1f} m, switches {switches.mean():.2f}, ")
+    sys.stdout.write(f"at most {switches.max():.0f}, kept {len(kept)} of {len(found)}\n")
+    if kept:
+        true, stated = (np.array([getattr(one, what) for one in kept], float) for what in ("exchanged", "stated"))
+        error, brier = (true.mean() * (1 - true.mean()) / len(true)) ** 0.5, ((stated - true) ** 2).mean()
+        sys.stdout.write(f"    exchanged {true.mean():.3f} +- {error:.3f}, stated {stated.mean():.3f}")
+        sys.stdout.write(f" ({stated.min():.2f} to {stated.max():.2f}), Brier {brier:.3f}\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenario", choices=["radar-unresolved", "radar-parting"])
+    parser.add_argument("choices", nargs="*", default=[""], metavar="A.B=VALUE;...")
+    parser.add_argument("--seeds", default="200-219", metavar="FIRST-LAST")
+    options = parser.parse_intermixed_args()
+    logging.disable(logging.WARNING)
+    first, last = map(int, options.seeds.split("-"))
+    for choice in options.choices:
+        settings = load(assignments=[part for part in choice.split(";") if part])
+        show(choice, [outcome(options.scenario, seed, settings) for seed in range(first, last + 1)])
+
+
+if __name__ == "__main__":
+    main()
