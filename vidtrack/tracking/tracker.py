@@ -27,7 +27,7 @@ from vidtrack.estimate.sensor import POSITION
 from vidtrack.estimate.smoother import smoothing_gain
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association, Timing
-from vidtrack.tracking.boxes import longer
+from vidtrack.tracking.boxes import absolute, around, longer
 from vidtrack.tracking.choices import choices, evidence
 from vidtrack.tracking.deferred.deferred import Deferred
 from vidtrack.tracking.deferred.forest import ForestRule
@@ -304,7 +304,7 @@ class Tracker:
             left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
-        register.come_in(self.picture.cut(self._boxes()))
+        register.come_in(self.picture.cut(around(self.bank.x, register.box)))
         idle = self.life.idle(register, t)
         parts = self.sharing.parts(register, t)
         going = hopeless | left | parts | idle
