@@ -111,6 +111,18 @@ def test_a_state_of_an_earlier_version_is_refused_in_one_line(frames):
     assert "\n" not in str(refused.value)
 
 
+def test_a_state_of_the_last_version_goes_on_after_an_update(frames):
+    """Which tracks came in over the border was not known then."""
+    first, second = halves(frames)
+    stopped, resumed = Pipeline(Settings()), Pipeline(Settings())
+    stopped.steps(first)
+    old = {name: value for name, value in gather(stopped).items() if not name.endswith((".outside", ".entered"))}
+    restore(resumed, old)
+    assert len(resumed.tracker.register.entered) == len(resumed.tracker.register) > 0
+    for a, b in zip(stopped.steps(second), resumed.steps(second), strict=True):
+        assert np.array_equal(a.tracks.id, b.tracks.id)
+
+
 def test_arrays_of_another_kind_do_not_reach_compiled_code(frames):
     pipeline = Pipeline(Settings())
     pipeline.steps(frames[:20])

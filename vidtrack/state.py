@@ -1,7 +1,9 @@
 """Saves the state of a pipeline to a file and restores it, so that a run continues with the same results.
 
 A class lists its state in `STATE`: names of attributes that are arrays, numbers, named tuples of arrays, objects with a
-STATE, or tuples of such objects. Settings are not part of the state; the user gives them each time.
+STATE, or tuples of such objects. Settings are not part of the state; the user gives them each time. A class to which
+attributes were added since states of it are kept lists them in `ADDED`, with a function that gives the value from the
+restored object where a state of an older version has none.
 """
 
 from __future__ import annotations
@@ -112,6 +114,8 @@ def _restored(thing: Any, state: State, prefix: str) -> set[str]:
             names = [f"{prefix}{name}.{field}" for field in value._fields]
             setattr(thing, name, type(value)(*(_get(state, each) for each in names)))
             used |= set(names)
+        elif prefix + name not in state and name in getattr(thing, "ADDED", ()):
+            setattr(thing, name, thing.ADDED[name](thing))
         else:
             found = _get(state, prefix + name)
             _check(prefix + name, value, found)

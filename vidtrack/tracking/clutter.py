@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
@@ -52,6 +54,7 @@ class EvenBox(EvenClutter):
     """
 
     STATE: tuple[str, ...] = ("low", "high", "grown", "beyond", "seen")
+    ADDED: ClassVar = {"beyond": lambda box: np.zeros((2, 2)), "seen": lambda box: 0.0}
 
     def __init__(self, low: Floats, high: Floats) -> None:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from scipy.special import expit
 
@@ -35,6 +37,8 @@ class Register:
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
              "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "travelled", "rest",
              "rest_s", "missed", "visible")  # fmt: skip
+
+    ADDED: ClassVar = {name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered")}
 
     LINKS = ("prior_x", "prior_P", "gain")
     _TABLES = (
