@@ -11,6 +11,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, overload
 
+import numpy as np
+
 from vidtrack.arrays.types import Mask
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
@@ -180,10 +182,11 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
 
 
 def has_driven(tracks: Tracks) -> Mask:
-    """(T,) confirmed tracks that came in over the border, or travelled farther than one and a half times their size.
+    """(T,) confirmed tracks that travelled farther than one and a half times their size, half of it over the border.
 
-    A ghost, the mark that a departed vehicle leaves in the scene, does neither, and must be absorbed. So must leaves
-    at the border, and what they join with.
+    A ghost, the mark that a departed vehicle leaves in the scene, never travels, and must be absorbed. So must leaves
+    at the border, what they join with, and light on the road ahead of a vehicle.
     """
     assert tracks.entered is not None
-    return (tracks.status != TENTATIVE) & (tracks.entered | (tracks.travel > 1.5 * longer(tracks.box)))
+    far = np.where(tracks.entered, 0.75, 1.5) * longer(tracks.box)
+    return (tracks.status != TENTATIVE) & (tracks.travel > far)
