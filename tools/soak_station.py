@@ -282,7 +282,7 @@ def compared(reference, camera, film: Film) -> Counter:
     for what, t in lone:
         if not inside(watched, t, NEAR_S):
             result["in a stated gap"] += 1
-        elif paired[what] >= film.times(what):
+        elif 0 < film.times(what) <= paired[what]:
             result["twice in the reference alone"] += 1
         else:
             result["missed in a warm-up" if in_warm_up(t) else "missed"] += 1

@@ -14,6 +14,7 @@ from vidtrack.errors import Error
 from vidtrack.output.annotated_picture import annotated_jpeg
 from vidtrack.output.events.event import PICTURES, Event
 from vidtrack.output.folder import replacing, writing
+from vidtrack.output.intervals.day import day_folders
 from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
 from vidtrack.recording.reserve import Reserve
@@ -90,7 +91,8 @@ class EventPictures:
         if not (self._limits and self._due()):
             return
         taken = 0.0
-        found = [entry for day in (self._root / PICTURES).glob("*") if day.is_dir() for entry in os.scandir(day)]
+        days = [day for day in day_folders(self._root / PICTURES) if day.is_dir()]
+        found = [entry for day in days for entry in os.scandir(day)]
         for entry in sorted(found, key=lambda entry: entry.name, reverse=True):
             with suppress(OSError):
                 status = entry.stat()
@@ -98,6 +100,6 @@ class EventPictures:
                 old = self._limits.seconds is not None and time.time() - status.st_mtime > self._limits.seconds
                 if old or (self._limits.size is not None and taken > self._limits.size):
                     os.unlink(entry.path)
-        for day in (self._root / PICTURES).glob("*"):
+        for day in days:
             with suppress(OSError):
                 day.rmdir()  # if it is empty

@@ -188,10 +188,11 @@ def _unseen(
 
 @kernel
 def _idle(entered: Mask, travelled: Floats, box: Floats, rest_s: Floats, now: float, near: float, long: float) -> Mask:
-    """(T,) rows that did not enter, travelled less than `near` of their sizes and have rested for `long` seconds."""
+    """(T,) rows that rest for `long` seconds and travelled less than `near` of their sizes, entered ones half of it."""
     idle = np.zeros(len(rest_s), np.bool_)
     for t in range(len(rest_s)):
-        stayed = not entered[t] and travelled[t] < near * max(box[t, 2], box[t, 3])
+        least = 0.5 * near if entered[t] else near
+        stayed = travelled[t] < least * max(box[t, 2], box[t, 3])
         idle[t] = stayed and now - rest_s[t] > long
     return idle
 

@@ -33,6 +33,12 @@ def test_what_outlasts_runs_is_gone_on_with_where_no_part_is_left(tmp_path, name
     assert folder_for(tmp_path / "cam", LiveExtras(), in_parts) == tmp_path / "cam"
 
 
+def test_pictures_of_a_user_are_not_taken_for_those_of_events(tmp_path):
+    (tmp_path / "cam" / "pictures" / "holiday").mkdir(parents=True)
+    with pytest.raises(OutputError, match="not empty"):
+        folder_for(tmp_path / "cam", LiveExtras())
+
+
 def test_what_another_run_left_is_not_written_over(tmp_path):
     output = tmp_path / "cam"
     extras = LiveExtras(state=output / "cam.state")

@@ -61,7 +61,7 @@ def _pcap(content: bytes, order: str, losses: Losses) -> Iterator[tuple[int, byt
     at = 24
     while at + _PCAP_HEAD <= len(content):
         _, fraction, size, whole = head.unpack_from(content, at)
-        if fraction < _PARTS and size <= whole <= _LONGEST:
+        if fraction < _PARTS and max(size, whole) <= _LONGEST:
             yield link, content[at + _PCAP_HEAD : at + _PCAP_HEAD + size]
             at += _PCAP_HEAD + size
         else:

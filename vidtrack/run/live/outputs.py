@@ -12,6 +12,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.output.confirmed import LIVE_HOLD_S, Confirmed
 from vidtrack.output.events.event import PICTURES
 from vidtrack.output.folder import open_run, usable
+from vidtrack.output.intervals.day import day_folders
 from vidtrack.output.lock import exclusive, lock_file
 from vidtrack.output.sink import Sink
 from vidtrack.recording.event_pictures import EventPictures
@@ -129,4 +130,7 @@ def _is_ours(folder: Path, extras: LiveExtras) -> bool:
     kept = [folder / name for name in (COUNTS, OUTBOX, PICTURES)]
     kept += [extras.record] if extras.record else []
     kept += [extras.state, lock_file(extras.state)] if extras.state else []
+    pictures = folder / PICTURES
+    if pictures.is_dir() and set(pictures.iterdir()) != set(day_folders(pictures)):
+        return False  # a user's own: ours are deleted beyond their limits
     return all(any(path.resolve().is_relative_to(entry.resolve()) for path in kept) for entry in folder.iterdir())
