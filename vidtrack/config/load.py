@@ -66,7 +66,7 @@ def merged(base: Mapping[str, Any], tree: Mapping[str, Any]) -> dict[str, Any]:
         older = base.get(name)
         return merged(older if isinstance(older, dict) else {}, newest)
 
-    return {name: group(name) for name in (*base, *tree)}
+    return {name: group(name) for name in {**base, **tree}}
 
 
 def value_of(settings: BaseModel, name: str) -> Any:

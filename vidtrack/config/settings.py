@@ -107,7 +107,7 @@ class TrackerSettings(Group):
     idle_s: float | None = Field(4.0, gt=0)
     """s; m-of-n: a track of a video that has stood still for this time and never travelled ends; None: it stays"""
     idle_travel: float = Field(1.2, ge=0)
-    """object sizes; who was this far from the start, or came in over the border, has travelled, and may then stand"""
+    """object sizes; who was this far from the start, or half as far if in over the border, may then stand"""
     restless: bool = True
     """where tracks recently failed, new ones must travel three times as far; none as small as snow is confirmed"""
     blob_overlap: float = Field(0.3, gt=0, le=1)

@@ -39,6 +39,7 @@ class FixedGainBank(KalmanBank):
         """x, P after dt seconds, with the steady-state P; changes nothing."""
         x, P = super().ahead(dt)
         if dt > 0:
+            P = P.copy()  # the bank keeps its own
             P[self.hits >= START] = steady_prediction(self.model, dt, self.sigma)
         return x, P
 

@@ -182,7 +182,7 @@ def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker,
 
 
 def has_driven(tracks: Tracks) -> Mask:
-    """(T,) confirmed tracks that travelled farther than one and a half times their size, half of it over the border.
+    """(T,) confirmed tracks that travelled over 1.5 times their size; over 0.75 if they came in over the border.
 
     A ghost, the mark that a departed vehicle leaves in the scene, never travels, and must be absorbed. So must leaves
     at the border, what they join with, and light on the road ahead of a vehicle.
