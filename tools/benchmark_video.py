@@ -42,6 +42,9 @@ LARGE = (960, 720)
 LOOSE = 0.3  # IoU for the simulated junction, whose people are six pixels wide
 ROADS = ("road", "junction-3d", "roundabout", "motorway")
 
+SMALL: dict[str, object] = {"size": (640, 360), "seconds": 30.0}
+"""The roads in weather."""
+
 CONDITIONS: dict[str, dict[str, object]] = {
     "rain": {"weather": "rain"},
     "snow": {"weather": "snow"},
@@ -61,12 +64,13 @@ Cells = dict[str, str]
 
 def main() -> None:
     """Print the table, row by row."""
-    names = (*FILES, "traffic", "highway", "pets", "junction", "junction-large", "conditions", "roads")
+    names = (*FILES, "traffic", "highway", "pets", "junction", "junction-large", "conditions", "roads", "weather")
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rows", nargs="+", choices=(*names, "events"), default=["events", *names[len(FILES) :]])
     add_options(parser)
     parser.add_argument("--seeds", type=int, default=10, metavar="N", help="junctions of each shake (default 10)")
     parser.add_argument("--road-seeds", type=int, default=2, metavar="N", help="roads of each kind (default 2)")
+    parser.add_argument("--first-seed", type=int, default=0, metavar="N", help="of the roads in weather (default 0)")
     options = parser.parse_args()
     data = data_folder(parser)
     rivals = contenders(options.assignments, options.peers_in)
@@ -83,7 +87,9 @@ def main() -> None:
         clips = simulated(options.clips, label, range(options.seeds), **knobs)
         print_row(label, f"IDF1, mean of {options.seeds}", mean_idf1(clips, rivals))
     for road in ROADS if "roads" in options.rows else ():
-        road_rows(simulated_road(options.clips, road, range(options.road_seeds)), road, rivals)
+        road_rows(simulated_road(options.clips, road, "", range(options.road_seeds)), road, rivals)
+    if "weather" in options.rows:
+        weather_rows(options, rivals)
 
 
 def add_options(parser: argparse.ArgumentParser, *, peers: bool = True) -> None:
@@ -187,6 +193,30 @@ def road_rows(clips: Sequence[Clip], road: str, rivals: dict[str, Contender]) ->
             scores = [score.evaluate(*clip.scored(result.tracks), iou=iou) for clip, result in pairs]
             cells[rival] = " / ".join(f"{mean(float(one[name]) for one in scores):.3f}" for name in ("mota", "idf1"))
         print_row(road, f"MOTA / IDF1 at IoU {iou:g}, mean of {len(clips)}", cells)
+
+
+def weather_rows(options: argparse.Namespace, rivals: dict[str, Contender]) -> None:
+    """Crossings on roads in each weather and light, all roads in turn, and of all of them."""
+    total = {rival: Judged() for rival in rivals}
+    seeds = range(options.first_seed, options.first_seed + options.road_seeds)
+    for place, (label, knobs) in enumerate(CONDITIONS.items()):
+        clips = [
+            clip
+            for seed in seeds
+            for clip in simulated_road(
+                options.clips, ROADS[(place + seed) % len(ROADS)], f"-{label}", [seed], **SMALL, **knobs
+            )
+        ]
+        counted = {rival: Judged() for rival in rivals}
+        for rival, run in rivals.items():
+            for clip, result in zip(clips, run(clips), strict=True):
+                judged = judge(result.counts, clip.events)
+                counted[rival] += judged
+                if options.events:
+                    print(f"{clip.name}, {rival}: {judged}")
+        print_row(f"roads, {label}", f"hit/missed/false, {len(clips)} seeds", {r: str(j) for r, j in counted.items()})
+        total = {rival: total[rival] + judged for rival, judged in counted.items()}
+    print_row("roads, all of these", "hit/missed/false", {rival: str(judged) for rival, judged in total.items()})
 
 
 def mean_idf1(clips: Sequence[Clip], rivals: dict[str, Contender]) -> Cells:

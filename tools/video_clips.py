@@ -100,13 +100,13 @@ def simulated(folder: Path, label: str, seeds: Iterable[int], **knobs: Any) -> l
     return [_drawn(folder, f"junction-{label}", seed, draw, last="gt.txt") for seed in seeds]
 
 
-def simulated_road(folder: Path, road: str, seeds: Iterable[int]) -> list[Clip]:
-    """A simulated road in perspective, drawn into `folder` where it is not there yet."""
+def simulated_road(folder: Path, road: str, label: str, seeds: Iterable[int], **knobs: Any) -> list[Clip]:
+    """A simulated road in perspective, drawn into `folder` where it is not there yet; `label` tells the knobs apart."""
 
     def draw(place: Path, seed: int) -> None:
-        write_road(simulate_road(road, seed=seed), place)
+        write_road(simulate_road(road, seed=seed, **knobs), place)
 
-    drawn = [_drawn(folder, road, seed, draw, last="site.toml") for seed in seeds]
+    drawn = [_drawn(folder, f"{road}{label}", seed, draw, last="site.toml") for seed in seeds]
     return [with_legs(clip) for clip in drawn]
 
 

@@ -15,6 +15,7 @@ from vidtrack.config.video import BlobSettings, DetectorSettings
 from vidtrack.output.sink import Step
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
+from vidtrack.simulate import simulate_road
 from vidtrack.traffic.lines import Line, LineCounter
 from vidtrack.video.background import create
 from vidtrack.video.background.picture import Picture
@@ -110,6 +111,15 @@ def test_a_camera_that_stands_is_left_alone():
 
 def sway(k):
     return affine.shift(6 * np.sin(0.9 * k), 4 * np.cos(0.7 * k) - 4)
+
+
+def test_headlamps_that_sweep_over_a_dark_road_are_no_motion_of_the_camera():
+    found = detector()
+    for k, picture in enumerate(simulate_road("motorway", seed=1, size=(320, 180), seconds=4.0, light="night")):
+        planes = cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420)
+        u, v = planes[180:].reshape(2, 90, 160)
+        foreground = found.apply(Frame(k, k / FPS, planes[:180], u, v, full_range=False), NONE_KNOWN)
+        assert foreground.motion is None
 
 
 def test_a_swaying_camera_sees_nothing_on_an_empty_street_and_a_vehicle_where_it_is_in_the_scene():

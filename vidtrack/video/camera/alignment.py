@@ -28,6 +28,9 @@ _GAIN = 5.0  # largest change of exposure
 _INSIDE = 0.3  # share of the points that must be in the picture
 _SETTLED_PX = 0.03  # a smaller step is the last one
 _FITS_LEVELS, _FITS_PX = 4.0, 0.3  # a point fits if residual < the first + the second * gradient
+_STILL = affine.IDENTITY
+_TELLING = 2.0  # grey levels; a smaller difference does not tell a motion from standing still
+_LEFT = 0.3  # least share of an edge's step that must be left
 
 
 class Fit(NamedTuple):
@@ -76,6 +79,44 @@ def leap(scene: Levels, luma: Image, motion: Floats) -> Floats:
     window = cv2.createHanningWindow((w, h), cv2.CV_32F)
     (x, y), _ = cv2.phaseCorrelate(expected - expected.mean(), seen - seen.mean(), window)
     return affine.after(affine.shift(4 * x, 4 * y), motion)
+
+
+@kernel
+def agreement(luma: Image, points: Points, free: Mask, motion: Floats) -> float:
+    """Share of the points which the motion explains better than standing still, among those that tell the two apart.
+
+    All points of a camera that moves tell of the same motion. Light that sweeps over a still scene makes some points
+    seem to move; at the others the motion is seen to be wrong.
+    """
+    x, y, value, _, _ = _used(points, free, (points.start[0], points.start[1], 1))
+    stood, moved = np.empty(len(x)), np.empty(len(x))
+    _sample(luma, 1.0, x, y, _STILL, stood)
+    _sample(luma, 1.0, x, y, motion, moved)
+    light, _ = _spread(moved, 1.0, 0.0, value)
+    telling, better = 0, 0
+    for k in range(len(x)):
+        gain = abs(stood[k] - value[k] - light) - abs(moved[k] - value[k] - light)
+        if abs(gain) > _TELLING:  # false for NaN, too
+            telling += 1
+            better += gain > 0
+    return better / telling if telling >= FEWEST else 0.0
+
+
+@kernel
+def edges_seen(luma: Image, points: Points) -> float:
+    """Share of the scene's edges that are in the picture at the same place, in whatever light."""
+    h, w = luma.shape
+    seen, inside = 0, 0
+    for k in range(points.start[1]):
+        i, j = int(points.x[k] + np.float32(0.5)), int(points.y[k] + np.float32(0.5))
+        if not (1 <= i < w - 1 and 1 <= j < h - 1):
+            continue
+        gx, gy = points.gx[k], points.gy[k]
+        across = (np.float32(luma[j, i + 1]) - luma[j, i - 1]) / 2
+        down = (np.float32(luma[j + 1, i]) - luma[j - 1, i]) / 2
+        inside += 1
+        seen += gx * across + gy * down > _LEFT * (gx * gx + gy * gy)
+    return seen / max(inside, 1)
 
 
 @kernel

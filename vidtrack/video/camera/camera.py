@@ -10,12 +10,14 @@ from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
 from vidtrack.video.background.scene import Levels, Scene
-from vidtrack.video.camera.alignment import FEWEST, Fit, align, leap, pyramid
+from vidtrack.video.camera.alignment import FEWEST, Fit, agreement, align, edges_seen, leap, pyramid
 from vidtrack.video.camera.canvas import fitting, recut, settled
 from vidtrack.video.camera.points import CELLS, Points, choose, no_points, shifted
 from vidtrack.video.frame import Image
 
 _GOOD = 0.5  # share of the points that fit
+_AGREED = 0.8  # share of the points that must tell of a motion; seen: .84 to 1 of true ones, up to .73 of lamps
+_THERE = 0.5  # share of the edges; where more are at their place, the scene is seen, in whatever light
 _STRANGE = 0.3  # with a smaller share the view has changed; a vehicle before the camera leaves more
 _SURE = 0.65  # the same if the search starts from the last motion only
 _LEAST_PX = 0.75  # displacement of a corner from which the picture is resampled
@@ -137,20 +139,27 @@ class Camera:
         """Check a still camera for motion, with few points."""
         some = _free(self._points, scene.covered_s, known, self._points.start[1], _EVERY)
         fit = align([luma], self._points, some, affine.IDENTITY, _EVERY)
-        self.fits = fit.share > _GOOD
+        self.fits = fit.share > _GOOD or edges_seen(luma, self._points) > _THERE
         moved = self._off(fit, luma) > _LEAST_PX
         if (moved or not self.fits) and time_s - self._tried_s > _TRY_S:
+            self._tried_s = time_s
             fit = self._search(luma, scene, known)
-            self.fits = fit.share > _GOOD
-            if self.fits and self._off(fit, luma) > _LEAST_PX:
-                self.moves = True
+            if self._begins(fit, luma, scene, known):
+                self.moves = self.fits = True
                 self._still_s = time_s
                 return self._moved(luma, scene, fit, time_s)
-            if not self.fits:
-                self._tried_s, self._strange = time_s, fit.share < _STRANGE
+            self.fits = self.fits or fit.share > _GOOD
+            self._strange = fit.share < _STRANGE
         if time_s - self._chosen_s > _HELD_S:
             self._check_drift(luma, scene, known, time_s)
         return scene
+
+    def _begins(self, fit: Fit, luma: Image, scene: Scene, known: Floats) -> bool:
+        """Whether a still camera has begun to move like this."""
+        if fit.share <= _GOOD or self._off(fit, luma) <= _LEAST_PX:
+            return False
+        free = _free(self._points, scene.covered_s, known, self._points.start[1], 1)
+        return agreement(luma, self._points, free, fit.motion) > _AGREED
 
     def _check_drift(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> None:
         """Check for slow drift, which the scene learns but the points do not."""
