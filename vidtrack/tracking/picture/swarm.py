@@ -11,8 +11,12 @@ from vidtrack.tracking.boxes import longer
 from vidtrack.tracks import Tracks
 
 _SWARM_PER_S = 30.0  # births in the whole picture, more than traffic has anywhere
-_FEW_PER_S = 12.0  # with a swarm, larger ones that may be traffic
+_FEW_PER_S = 1.0  # births of one size (a bin); sizes with fewer are not the swarm's
+_STEEP = (
+    0.7  # most that is left of a pair of sizes half an octave on; traffic begins where the swarm no longer ends so fast
+)
 _FORGET_S = 10.0
+_SOON_S = 3.0  # shortest time that births are taken to have come in: few scans are no swarm
 _AT_ONCE = 30  # births of one scan that count: the picture may change all at once
 _LEAST_PX, _STEPS, _BINS = 1.0, 4, 48  # sizes from 1 px to 4096 px, four bins to a factor of two
 
@@ -23,23 +27,30 @@ class Swarm:
     births  (48,) remembered births, by the logarithm of the longer side
     """
 
-    STATE = ("births", "_time_s")
+    STATE = ("births", "_time_s", "_watched_s")
 
     def __init__(self) -> None:
         self.births: Floats = np.zeros(_BINS)
         self._time_s = 0.0
+        self._watched_s = 0.0  # remembered time
 
     @property
     def size(self) -> float:
         """Longer side [px] up to which objects are of the swarm; larger ones begin seldom. Zero without a swarm."""
-        if self.births.sum() < _SWARM_PER_S * _FORGET_S:
+        rate = self.births / max(self._watched_s, _SOON_S)
+        if rate.sum() < _SWARM_PER_S:
             return 0.0
-        rate = self.births[::-1].cumsum()[::-1] / _FORGET_S
-        return float(_LEAST_PX * 2 ** (np.count_nonzero(rate > _FEW_PER_S) / _STEPS))
+        most = int(rate.argmax())
+        pair = rate[most:-1] + rate[most + 1 :]  # of half an octave
+        ends = (pair[:-2] < 2 * _FEW_PER_S) | (pair[2:] > _STEEP * pair[:-2])
+        return float(_LEAST_PX * 2 ** ((most + (int(ends.argmax()) if ends.any() else len(pair))) / _STEPS))
 
     def learn(self, tracks: Tracks) -> None:
         """Count the tracks that began in this scan."""
-        self.births *= math.exp(-max(tracks.t - self._time_s, 0.0) / _FORGET_S)
+        dt = max(tracks.t - self._time_s, 0.0)
+        kept = math.exp(-dt / _FORGET_S)
+        self.births *= kept
+        self._watched_s = kept * self._watched_s + dt
         self._time_s = tracks.t
         new = tracks.age_s <= 0
         if np.count_nonzero(new):
