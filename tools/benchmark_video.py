@@ -5,7 +5,7 @@
 Rows: clips with crossings found by eye (hit/missed/false, and pooled), CDnet traffic (F of the masks, MOTA and IDF1),
 CDnet highway and PETS09 (MOTA, IDF1, switches), the simulated junction under shake and in weather (mean IDF1 at IoU
 0.3; four times the shake at 960x720), roads in perspective (crossings of their legs, mean MOTA and IDF1; the first
-seeds).
+seeds), and roads in rain, snow, fog, low sun, dusk and night (crossings).
 vidtrack runs with its defaults but for --set. The scripts are MOG2 with SORT and
 KNN with ByteTrack (peers/count_lines.py) in an environment that pip makes in --peers-in, where their results are kept
 too; without --peers-in they are left out. The junctions are drawn once into --clips.
@@ -42,9 +42,6 @@ LARGE = (960, 720)
 LOOSE = 0.3  # IoU for the simulated junction, whose people are six pixels wide
 ROADS = ("road", "junction-3d", "roundabout", "motorway")
 
-SMALL: dict[str, object] = {"size": (640, 360), "seconds": 30.0}
-"""The roads in weather."""
-
 CONDITIONS: dict[str, dict[str, object]] = {
     "rain": {"weather": "rain"},
     "snow": {"weather": "snow"},
@@ -57,6 +54,9 @@ CONDITIONS: dict[str, dict[str, object]] = {
     "leaves-4": {"leaves": 4.0},
     "clock": {"clock": True},
 }
+
+ON_ROADS = ("rain", "snow", "fog", "low-sun", "dusk", "night", "wet-night", "rainy-night")
+SMALL: dict[str, object] = {"size": (640, 360), "seconds": 30.0}  # the roads in these conditions
 
 Cells = dict[str, str]
 """The text of a row for each contender."""
@@ -199,12 +199,13 @@ def weather_rows(options: argparse.Namespace, rivals: dict[str, Contender]) -> N
     """Crossings on roads in each weather and light, all roads in turn, and of all of them."""
     total = {rival: Judged() for rival in rivals}
     seeds = range(options.first_seed, options.first_seed + options.road_seeds)
-    for place, (label, knobs) in enumerate(CONDITIONS.items()):
+    for place, label in enumerate(ON_ROADS):
+        knobs = SMALL | CONDITIONS[label]
         clips = [
             clip
             for seed in seeds
             for clip in simulated_road(
-                options.clips, ROADS[(place + seed) % len(ROADS)], f"-{label}", [seed], **SMALL, **knobs
+                options.clips, ROADS[(place + seed) % len(ROADS)], f"-{label}", [seed], **knobs
             )
         ]
         counted = {rival: Judged() for rival in rivals}

@@ -76,6 +76,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "detector.disturbance": ("detector.kind", ("disturbance",)),
     "detector.disturbance.chroma_threshold": ("detector.disturbance.chroma", (True,)),
     "detector.disturbance.amid": ("detector.disturbance.shadow", (True,)),
+    "detector.disturbance.dark": ("detector.disturbance.shadow", (True,)),
     "detector.disturbance.guard_px": ("detector.disturbance.selective", (True,)),
     "detector.disturbance.ghost_s": ("detector.disturbance.ghosts", (True,)),
     "detector.disturbance.still_s": ("detector.disturbance.registration", (True,)),

@@ -27,6 +27,8 @@ class DisturbanceSettings(Group):
     """pixels that equal the scene darkened by one factor, in luminance, colour and texture, are shadow"""
     amid: bool = False
     """shadow inside a vehicle counts as vehicle, such as dark paint; soft shadow then widens boxes"""
+    dark: bool = True
+    """what passes for shadow, but has edges inside that the scene does not have, is a dark vehicle"""
     beams: bool = True
     """by night, light of headlamps on the road is no vehicle: it is brighter than the scene and fades into it"""
     contrast: bool = True

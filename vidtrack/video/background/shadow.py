@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
@@ -23,6 +23,10 @@ _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
 _LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
+_SOFT_PX = 3  # px
+_OWN = 0.05  # share of the pixels inside a shadow with edges of their own, from which it is a dark vehicle
+_FEW = 10.0  # px; fewer are no body
+_EDGE, _EDGE_NOISE = np.float32(4), np.float32(4)  # luminance differences of an edge: grey levels, and times the noise
 _NEUTRAL = np.float32(128)  # chroma of grey
 _BINS = 20  # of the share of light that is left, from 0 to 1
 _HARDEST, _MILDEST = 5, 13  # the bins that the sun's shadows are in: there is always light of the sky
@@ -150,16 +154,71 @@ def reclaim(hit: Image) -> None:
     """
     row, start, stop = find_runs(hit, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
-    whole, lit = np.zeros(count), np.zeros(count)
+    whole, lit = np.zeros((2, count))
+    for k in range(len(row)):
+        whole[label[k]] += stop[k] - start[k]
+        for x in range(start[k], stop[k]):
+            lit[label[k]] += hit[row[k], x] == 1
+    _fill(hit, row, start, stop, lit[label] >= _LIT * whole[label])
+
+
+@kernel
+def find_dark(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> None:
+    """Set hit (h, w) uint8 from SHADOW back to 1 in regions that are nearly all shadow, but a dark vehicle.
+
+    The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
+    on at least three of four sides is vehicle, too.
+    """
+    row, start, stop = find_runs(hit, OBJECTS)
+    label, count = connect(row, start, stop, CORNERS)
+    whole, lit, inside, own = np.zeros((4, count))
+    edge = np.zeros(hit.shape, np.bool_)
+    for k in range(len(row)):
+        y, region = row[k], label[k]
+        whole[region] += stop[k] - start[k]
+        for x in range(start[k], stop[k]):
+            lit[region] += hit[y, x] == 1
+            if hit[y, x] == SHADOW and _is_inside(hit, y, x):
+                inside[region] += 1
+                edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
+                own[region] += edge[y, x]
+    dark = (lit < _LIT * whole) & (own > np.maximum(_OWN * inside, _FEW))
+    for k in range(len(row)):
+        if dark[label[k]]:
+            for x in range(start[k], stop[k]):
+                if edge[row[k], x]:
+                    hit[row[k], x] = 1
+    _fill(hit, row, start, stop, dark[label])
+
+
+@inlined
+def _is_inside(hit: Image, y: int, x: int) -> bool:
+    """Whether there are hits on all sides, farther off than the edge of a shadow is soft."""
+    h, w = hit.shape
+    if not (_SOFT_PX <= y < h - _SOFT_PX and _SOFT_PX <= x < w - _SOFT_PX):
+        return False
+    above, below = hit[y - _SOFT_PX, x] != 0, hit[y + _SOFT_PX, x] != 0
+    return above and below and hit[y, x - _SOFT_PX] != 0 and hit[y, x + _SOFT_PX] != 0
+
+
+@inlined
+def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -> bool:
+    """Whether there is an edge that is neither the scene's nor noise."""
+    r = (np.float32(luma[y, x]) - black) / (scene.luma[y, x] - black)
+    missed, structure = _texture(luma, scene.luma, y, x, r)
+    return missed > _EDGE + _EDGE_NOISE * scene.noise[y, x] + _SEEN * structure
+
+
+@inlined
+def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask) -> None:
+    """Set hit from SHADOW to 1 between pixels with 1, in runs (R,) of a vehicle (R,)."""
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)
     for k in range(len(row)):
         y, seen = row[k], False
-        whole[label[k]] += stop[k] - start[k]
         for x in range(start[k], stop[k]):
             above = y > 0 and hit[y - 1, x] != 0 and (hit[y - 1, x] == 1 or side[y - 1, x] & _ABOVE != 0)
             side[y, x] = np.uint8(seen) * _LEFT | np.uint8(above) * _ABOVE
-            lit[label[k]] += hit[y, x] == 1
             seen |= hit[y, x] == 1
     for k in range(len(row) - 1, -1, -1):
         y, seen = row[k], False
@@ -168,7 +227,7 @@ def reclaim(hit: Image) -> None:
             side[y, x] |= np.uint8(seen) * _RIGHT | np.uint8(below) * _BELOW
             seen |= hit[y, x] == 1
     for k in range(len(row)):
-        if lit[label[k]] < _LIT * whole[label[k]]:
+        if not vehicle[k]:
             continue
         for x in range(start[k], stop[k]):
             if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= _AMID:
