@@ -39,6 +39,7 @@ WITHOUT = {
     "majority 5": {"majority_px": 5},
     "no shadow test": {"shadow": False},
     "shadow amid vehicles": {"amid": True},
+    "dark vehicles may be shadow": {"dark": False},
     "one threshold for all": {"contrast": False},
     "no hole filling": {"holes": False},
     "no ghost healing": {"ghosts": False},

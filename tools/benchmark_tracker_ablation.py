@@ -36,6 +36,7 @@ WITHOUT: dict[str, tuple[str, ...]] = {
     "boxes not smoothed": ("tracker.box_s=0.001",),
     "pieces not linked by weak foreground": ("detector.disturbance.weak=1",),
     "what is dark amid a vehicle is vehicle": ("detector.disturbance.amid=true",),
+    "dark vehicles may be shadow": ("detector.disturbance.dark=false",),
     "one threshold for all contrasts": ("detector.disturbance.contrast=false",),
     "standing things stay for 20 s": ("detector.disturbance.steady_s=20",),
     "no registration": ("detector.disturbance.registration=false",),

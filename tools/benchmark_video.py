@@ -204,9 +204,7 @@ def weather_rows(options: argparse.Namespace, rivals: dict[str, Contender]) -> N
         clips = [
             clip
             for seed in seeds
-            for clip in simulated_road(
-                options.clips, ROADS[(place + seed) % len(ROADS)], f"-{label}", [seed], **knobs
-            )
+            for clip in simulated_road(options.clips, ROADS[(place + seed) % len(ROADS)], f"-{label}", [seed], **knobs)
         ]
         counted = {rival: Judged() for rival in rivals}
         for rival, run in rivals.items():

@@ -6,8 +6,9 @@ import pytest
 from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
 from vidtrack.video.background.distance import contrast, haziness, veil
-from vidtrack.video.background.scene import SHADOW
-from vidtrack.video.background.shadow import reclaim
+from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.scene import SHADOW, start
+from vidtrack.video.background.shadow import find_dark, reclaim
 from vidtrack.video.frame import Frame
 
 VEHICLE = 1
@@ -133,3 +134,40 @@ def test_the_shadow_on_a_smooth_road_in_clear_light_is_no_foreground():
         seen = np.clip(light + np.random.default_rng(k).normal(0, 1, light.shape), 0, 255).astype(np.uint8)
         mask = detector.apply(Frame(k, k / 25, seen, colour, colour, full_range=True), np.empty((0, 4))).mask
     assert (mask[80:100, 60:100] > 0).mean() < 0.05
+
+
+NO_COLOUR = np.empty((0, 0), np.uint8)
+BLACK = np.float32(16)
+
+
+def road_with(body, rng_seed=3):
+    """Hits of `body`, called with the luminance of a rough road, at 20 x 40 px of shadow; before and after."""
+    rng = np.random.default_rng(rng_seed)
+    road = np.clip(rng.normal(120, 12, (60, 80)), 60, 200).astype(np.uint8)
+    luma = road.copy()
+    luma[20:40, 20:60] = body(luma[20:40, 20:60].astype(float))
+    noisy = np.clip(np.rint(luma + rng.normal(0, 1, luma.shape)), 0, 255).astype(np.uint8)
+    scene = start(Picture(road, NO_COLOUR, NO_COLOUR))
+    scene.noise[:] = 1
+    hit = np.zeros(road.shape, np.uint8)
+    hit[20:40, 20:60] = SHADOW
+    before = hit.copy()
+    find_dark(Picture(noisy, NO_COLOUR, NO_COLOUR), scene, BLACK, hit)
+    return before, hit
+
+
+@pytest.mark.parametrize("share", [0.35, 0.5, 0.8])
+def test_a_shadow_through_which_the_road_is_seen_stays_shadow(share):
+    before, after = road_with(lambda road: BLACK + share * (road - BLACK))
+    np.testing.assert_array_equal(after, before)
+
+
+def test_a_dark_vehicle_with_windows_of_its_own_is_no_shadow():
+    def car(road):
+        body = np.full_like(road, 70.0)
+        body[3:9, 6:16] = body[3:9, 20:32] = 90.0
+        body[14:, 5:35] = 55.0
+        return body
+
+    _, after = road_with(car)
+    assert np.mean(after[23:37, 23:57] == VEHICLE) > 0.9  # soft edges of a shadow are not looked at
