@@ -48,6 +48,7 @@ class Bodies:
         with np.errstate(invalid="ignore"):
             known &= rows.spread[:, :2].sum(axis=1) / 2 < _PLACE_M**2
             known &= (rows.length_sigma < _LENGTH_M) & (rows.speed_sigma < _SPEED_M_S)
+        known = np.flatnonzero(known)
         return cls(
             *(rows.track[known], rows.t[known], rows.xy[known], rows.v[known], rows.ahead[known]),
             np.column_stack([rows.length[known], rows.width[known]]),

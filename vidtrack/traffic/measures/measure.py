@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,10 +58,16 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     metres, ground = site.calibration is not None, grounds[sizes[0]]
     reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, *reaches(metres))
     staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
-    for rows in by_stretches(reader, stretches, vehicles):
-        for part in (passing, staying, meeting):
-            part.add(rows)
+    with ThreadPoolExecutor(1) as beside:
+        met = beside.submit(lambda: None)
+        for rows in by_stretches(reader, stretches, vehicles):
+            passing.add(rows)
+            staying.add(rows)
+            met.result()
+            met = beside.submit(meeting.add, rows)  # takes as long as all else, and so has a thread of its own
+        met.result()
     lives = stretches.lives()
+    del stretches  # which is large
     return _Figures(day, site, gates, ground, reader, passing, lives, staying, meeting, vehicles).measures()
 
 
