@@ -41,11 +41,10 @@ def none_of(*shape_of: int) -> Any:
     return lambda *given: np.zeros(len(given[shape_of[0]]), bool)
 
 
-FOLLOW = (stretches._follow, stretches._backs)
+FOLLOW = stretches._follow
 RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "nothing": {},
     "breaks where the motion is that of another vehicle": {(stretches, "_OTHER"): np.inf},
-    "breaks where a track drives back (`_backs`)": {(stretches, "_BACK"): -2.0},
     "joins": {(journeys, "_joins"): lambda *_: journeys._NONE},
     "joins of vehicles that others hide while they stand": {(joins, "hidden"): lambda _, __, a, ___: np.zeros(len(a))},
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
@@ -116,18 +115,16 @@ def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool]]]:
 
 @contextmanager
 def without(rule: dict[tuple[Any, str], Any]) -> Iterator[None]:
-    """Leave a rule out. The kernels of `stretches` are compiled anew where it is one of theirs, and not kept."""
+    """Leave a rule out. The kernel of `stretches` is compiled anew where it is one of its rules, and not kept."""
     before = {place: getattr(*place) for place in rule}
     for (module, name), value in rule.items():
         setattr(module, name, value)
-    follow, backs = FOLLOW
     if any(module is stretches for module, _ in rule):
-        stretches._backs = numba.njit(error_model="numpy")(backs.py_func)
-        stretches._follow = numba.njit(error_model="numpy")(follow.py_func)
+        stretches._follow = numba.njit(error_model="numpy")(FOLLOW.py_func)
     try:
         yield
     finally:
-        stretches._follow, stretches._backs = follow, backs
+        stretches._follow = FOLLOW
         for place, value in before.items():
             setattr(*place, value)
 

@@ -116,7 +116,7 @@ class Stretches:
         return Lives(*ends, mean_length(self._sums[:n]), self._track[:n], self._until[:n])
 
     def _make_room(self, tracks: int, rows: int) -> None:
-        """For tracks (K), and for as many stretches as these rows can have: each begins with one of them at most one."""
+        """For tracks (K), and for as many stretches as these rows can begin."""
         if tracks > len(self._current):
             more = max(tracks, 2 * len(self._current)) - len(self._current)
             self._state = np.concatenate([self._state, np.full((more * _STATES, 9), np.nan)])

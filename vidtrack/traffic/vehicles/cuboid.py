@@ -35,20 +35,21 @@ def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_
         if w <= 0:
             edge[:] = np.nan
             return 0.0
+        near = 1 / w
         for axis in range(2):
-            u = (G[axis, 0] * qx + G[axis, 1] * qy + G[axis, 2] + z * up[axis]) / w
+            u = (G[axis, 0] * qx + G[axis, 1] * qy + G[axis, 2] + z * up[axis]) * near
             for side in (axis, axis + 2):
                 if (side < 2 and u < edge[side]) or (side >= 2 and u > edge[side]):
                     edge[side] = u
-                    by_state[side, X], by_state[side, LENGTH] = w, a  # until it is known which corner it is
+                    by_state[side, X], by_state[side, LENGTH] = near, a  # until it is known which corner it is
                     by_state[side, WIDTH], by_state[side, HEIGHT] = b, top
     for side in range(4):
-        axis, u, w = side % 2, edge[side], by_state[side, X]
-        by_x, by_y = (G[axis, 0] - u * G[2, 0]) / w, (G[axis, 1] - u * G[2, 1]) / w
+        axis, u, near = side % 2, edge[side], by_state[side, X]
+        by_x, by_y = (G[axis, 0] - u * G[2, 0]) * near, (G[axis, 1] - u * G[2, 1]) * near
         by_state[side, X], by_state[side, Y] = by_x, by_y
         by_state[side, LENGTH] *= by_x * e[0] + by_y * e[1]
         by_state[side, WIDTH] *= by_y * e[0] - by_x * e[1]
-        by_state[side, HEIGHT] *= (up[axis] - u * up[2]) / w
+        by_state[side, HEIGHT] *= (up[axis] - u * up[2]) * near
     left = by_state[LEFT, X] ** 2 + by_state[LEFT, Y] ** 2
     right = by_state[RIGHT, X] ** 2 + by_state[RIGHT, Y] ** 2
     return np.sqrt(max(left, right))

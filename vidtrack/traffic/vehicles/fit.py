@@ -194,7 +194,10 @@ def _normal(
 
 @kernel
 def _factor(band: Floats) -> None:
-    """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place."""
+    """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place.
+
+    Of the diagonal it has the inverses, since all that is done with it is to divide by it.
+    """
     for i in range(len(band)):
         for d in range(min(i, _BAND), -1, -1):
             j = i - d
@@ -202,9 +205,9 @@ def _factor(band: Floats) -> None:
             for m in range(max(i - _BAND, j - _BAND, 0), j):
                 value -= band[i, i - m] * band[j, j - m]
             if d == 0:
-                band[i, 0] = np.sqrt(max(value, 1e-12))
+                band[i, 0] = 1 / np.sqrt(max(value, 1e-12))
             else:
-                band[i, d] = value / band[j, 0]
+                band[i, d] = value * band[j, 0]
 
 
 @kernel
@@ -216,13 +219,13 @@ def _solve(band: Floats, right: Floats) -> None:
             for c in range(SIZE + 1):
                 right[i, c] -= band[i, d] * right[i - d, c]
         for c in range(SIZE + 1):
-            right[i, c] /= band[i, 0]
+            right[i, c] *= band[i, 0]
     for i in range(n - 1, -1, -1):
         for d in range(1, min(n - 1 - i, _BAND) + 1):
             for c in range(SIZE + 1):
                 right[i, c] -= band[i + d, d] * right[i + d, c]
         for c in range(SIZE + 1):
-            right[i, c] /= band[i, 0]
+            right[i, c] *= band[i, 0]
 
 
 @kernel
@@ -232,11 +235,11 @@ def _solve_one(band: Floats, right: Floats) -> None:
     for i in range(n):
         for d in range(1, min(i, _BAND) + 1):
             right[i] -= band[i, d] * right[i - d]
-        right[i] /= band[i, 0]
+        right[i] *= band[i, 0]
     for i in range(n - 1, -1, -1):
         for d in range(1, min(n - 1 - i, _BAND) + 1):
             right[i] -= band[i + d, d] * right[i + d]
-        right[i] /= band[i, 0]
+        right[i] *= band[i, 0]
 
 
 @kernel
