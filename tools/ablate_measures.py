@@ -6,8 +6,7 @@ Each CLIP is a folder of `vidtrack simulate`, with its tracks in CLIP/run, as in
 right within 1 s at its gate and direction; a trip with both legs and both times within 5 s, as a turning count asks
 for it.
 The second table has the joins: what probability they state, and how many of them are of one true vehicle, the one
-that is nearest to where the one stretch ends, within 3 m, and also to where the other begins. Who is near none, as in
-the middle of a blob of two, is nobody, and the join is not right.
+that is nearest to where the one stretch ends, within 8 m, and also to where the other begins.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ from vidtrack.traffic.measures.stretches import End, Lives, Stretches
 from vidtrack.traffic.site import read_site
 
 CROSSING_S, TRIP_S = 1.0, 5.0
-NEAR_M = 3.0
+NEAR_M = 8.0
 STATE = ("frame", "target_id", "x_m", "y_m")
 BINS = (0.5, 0.7, 0.9, 0.99, 1.0)
 
