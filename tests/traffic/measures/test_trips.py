@@ -126,7 +126,7 @@ def test_of_two_that_fit_alike_neither_is_joined():
     assert len(joined(lives(tail, head), one, two, 3600.0, anywhere).before) == 0
     alone = joined(lives(tail, head), one, np.array([False, True, False]), 3600.0, anywhere)
     assert (alone.before.tolist(), alone.after.tolist()) == ([0], [1])
-    assert alone.probability[0] > 0.9
+    assert alone.probability[0] > 0.7
 
 
 def test_one_that_comes_back_is_another():
