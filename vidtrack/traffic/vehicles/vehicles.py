@@ -16,7 +16,7 @@ from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
 from vidtrack.traffic.vehicles.straightness import Paths, Straightness, paths_of, straightness
 
-_BATCH, _AT_ONCE = 2048, 2
+_BATCH, _AT_ONCE = 1024, 2
 """Tracks that are fitted together, and how many such batches at a time: they bound the memory."""
 
 
