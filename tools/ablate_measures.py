@@ -5,7 +5,8 @@
 Each CLIP is a folder of `vidtrack simulate`, with its tracks in CLIP/run, as in `score_measures.py`. A crossing is
 right within 1 s at its gate and direction; a trip with both legs and both times within 5 s, as a turning count asks
 for it.
-The second table has the trips made of several tracks: what `join_confidence` says, and how many of them are right.
+The second table has the joins: what probability they state, and how many of them are of one true vehicle, the one
+that is nearest to where the one stretch ends, within 8 m, and also to where the other begins.
 """
 
 from __future__ import annotations
@@ -20,20 +21,22 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 import score_measures
-from score_measures import paired, rows_of
+from score_measures import FPS, paired, rows_of
 
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.measures import beyond, joins, journeys, passing, stretches, trips
+from vidtrack.traffic.measures import beyond, joins, journeys, passing, rows, stretches, trips
 from vidtrack.traffic.measures.crossings import way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.passing import Passing, reaches
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import open_day
-from vidtrack.traffic.measures.stretches import Lives, Stretches
+from vidtrack.traffic.measures.stretches import End, Lives, Stretches
 from vidtrack.traffic.site import read_site
 
 CROSSING_S, TRIP_S = 1.0, 5.0
-BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
+NEAR_M = 8.0
+STATE = ("frame", "target_id", "x_m", "y_m")
+BINS = (0.5, 0.7, 0.9, 0.99, 1.0)
 
 
 def none_of(*shape_of: int) -> Any:
@@ -41,17 +44,16 @@ def none_of(*shape_of: int) -> Any:
     return lambda *given: np.zeros(len(given[shape_of[0]]), bool)
 
 
-FOLLOW = (stretches._follow, stretches._backs)
+FOLLOW = stretches._follow
 RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "nothing": {},
     "breaks where the motion is that of another vehicle": {(stretches, "_OTHER"): np.inf},
-    "breaks where a track drives back (`_backs`)": {(stretches, "_BACK"): -2.0},
     "joins": {(journeys, "_joins"): lambda *_: journeys._NONE},
-    "joins of vehicles that others hide while they stand": {(joins, "hidden"): lambda _, __, a, ___: np.zeros(len(a))},
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
     "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},
     "to and fro within 2 s": {(passing, "_BACK_S"): 0.0},
     "the same over breaks of a track": {(journeys, "lasting"): lambda track, *_: np.ones(len(track), bool)},
+    "a velocity kept beyond the border": {(rows, "_go_on"): lambda *_: None},
     "gates passed beside": {(journeys, "_needed"): none_of(1)},
     "gates within a gap": {(journeys, "_across"): lambda *given: given[3].only(np.zeros(len(given[3]), bool))},
     "gates just beyond the end of a track": {(beyond, "_extended"): lambda g, end, free, *_: beyond._stood(
@@ -65,7 +67,8 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
 
 
 class Seen(NamedTuple):
-    """What the tracks of a clip passed, before anything is decided; true crossings and movements."""
+    """What the tracks of a clip passed, before anything is decided; true crossings, movements and vehicles: frame,
+    number, x and y (N, 4), in order of frames."""
 
     gates: Gates
     passing: Passing
@@ -74,6 +77,7 @@ class Seen(NamedTuple):
     allowed: tuple[tuple[str, str], ...]
     crossed: list[tuple]
     moved: list[tuple]
+    vehicles: np.ndarray
 
 
 def seen(clip: Path) -> Seen:
@@ -82,8 +86,8 @@ def seen(clip: Path) -> Seen:
     grounds = {one.size: calibrated(site.scaled(*one.size)) for one in day.recordings}
     gates = gates_of(site, calibrated(site))
     broken, passes = Stretches(metres=True), Passing(gates, *reaches(metres=True))
-    for rows in Reader(day, dict(grounds)):
-        passes.add(broken.add(rows))
+    for block in Reader(day, dict(grounds)):
+        passes.add(broken.add(block))
     events = rows_of(clip / "road_events.csv")
     crossed = [((e["place"], e["direction"]), float(e["time_s"])) for e in events if e["event"] == "crossing"]
     moved = [
@@ -91,11 +95,20 @@ def seen(clip: Path) -> Seen:
         for e in events
         if e["event"] == "movement"
     ]
-    return Seen(gates, passes, broken.lives(), day.spans, site.movements.allowed, crossed, moved)
+    states = [[float(row[name]) for name in STATE] for row in rows_of(clip / "road_truth.csv")]
+    vehicles = np.array(sorted(states))
+    return Seen(gates, passes, broken.lives(), day.spans, site.movements.allowed, crossed, moved, vehicles)
+
+
+def nearest(vehicles: np.ndarray, end: End, k: int) -> int:
+    """The number of the true vehicle at the end of a stretch; -1: none."""
+    low, high = np.searchsorted(vehicles[:, 0], round(end.t[k] * FPS) + np.array([-0.5, 0.5]))
+    far = np.linalg.norm(vehicles[low:high, 2:] - end.xy[k], axis=1)
+    return int(vehicles[low + far.argmin(), 1]) if far.min(initial=np.inf) < NEAR_M else -1
 
 
 def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool]]]:
-    """True, told and right crossings, then trips (6,); of the trips of several tracks the confidence, and if right."""
+    """True, told and right crossings, then trips (6,); the probabilities of joins, and if they are right."""
     found = journeys.journeys(one.gates, one.passing.passed(), one.lives, one.spans, True, one.allowed)
     passed, told = found.passed, found.trips
     score_measures.TOLERANCE_S = CROSSING_S
@@ -105,29 +118,27 @@ def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool]]]:
     legs = [[one.gates.legs[gate] for gate in passed.gate[end[who]]] for end in (told.entry, told.exit)]
     moved = list(zip(zip(*legs, strict=True), told.from_s[who], told.to_s[who], strict=True))
     score_measures.TOLERANCE_S = TRIP_S
-    right = {k for _, k in paired(one.moved, moved)}
-    sure, parts = np.ones(len(found.vehicle)), np.ones(len(found.vehicle), int)
-    np.multiply.at(sure, found.vehicle[found.joins.after], found.joins.probability)
-    np.add.at(parts, found.vehicle[found.joins.after], 1)
-    vehicle = told.vehicle[who]
-    joined = [(float(sure[v]), k in right) for k, v in enumerate(vehicle) if parts[v] > 1]
+    right = paired(one.moved, moved)
+    made, ends = found.joins, (one.lives.tail, one.lives.head)
+    of = [
+        [nearest(one.vehicles, end, k) for k in who] for end, who in zip(ends, (made.before, made.after), strict=True)
+    ]
+    joined = [(float(p), a == b != -1) for p, a, b in zip(made.probability, *of, strict=True)]
     return np.array([len(one.crossed), len(crossed), hits, len(one.moved), len(moved), len(right)]), joined
 
 
 @contextmanager
 def without(rule: dict[tuple[Any, str], Any]) -> Iterator[None]:
-    """Leave a rule out. The kernels of `stretches` are compiled anew where it is one of theirs, and not kept."""
+    """Leave a rule out. The kernel of `stretches` is compiled anew where it is one of its rules, and not kept."""
     before = {place: getattr(*place) for place in rule}
     for (module, name), value in rule.items():
         setattr(module, name, value)
-    follow, backs = FOLLOW
     if any(module is stretches for module, _ in rule):
-        stretches._backs = numba.njit(error_model="numpy")(backs.py_func)
-        stretches._follow = numba.njit(error_model="numpy")(follow.py_func)
+        stretches._follow = numba.njit(error_model="numpy")(FOLLOW.py_func)
     try:
         yield
     finally:
-        stretches._follow, stretches._backs = follow, backs
+        stretches._follow = FOLLOW
         for place, value in before.items():
             setattr(*place, value)
 
@@ -142,14 +153,15 @@ def main() -> None:
     print("|---|---|---|")
     for name, rule in RULES.items():
         with without(rule):
-            looked = [seen(clip) for clip in clips] if any(module is stretches for module, _ in rule) else whole
+            anew = any(module in (rows, stretches) for module, _ in rule)
+            looked = [seen(clip) for clip in clips] if anew else whole
             results = [judged(one) for one in looked]
         true, told, right, moved, trips_, right_trips = sum(counts for counts, _ in results)
         if not rule:
             joined = [one for _, some in results for one in some]
             print(f"of {true} crossings and {moved} trips:")
         print(f"| {name} | {right} of {told} | {right_trips} of {trips_} |", flush=True)
-    print("\n| join_confidence | trips | mean of it | right |")
+    print("\n| probability | joins | its mean | right |")
     print("|---|---|---|---|")
     sure, good = np.array([s for s, _ in joined]), np.array([r for _, r in joined])
     for low, high in pairwise(BINS):

@@ -1,6 +1,8 @@
 """Crossings of gates: known answers, and brute force against the compiled look at rows."""
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from drawn_runs import CALIBRATED, along, site, straight, write_run
 from hypothesis import given, settings
@@ -41,6 +43,22 @@ def test_metres_give_speeds_lengths_and_gaps(tmp_path):
     assert [row["headway_s"] for row in rows] == [None, pytest.approx(2.0, abs=0.01), None]  # 3 is in another lane
     assert rows[1]["gap_s"] == pytest.approx(2.0 - 4.0 / 10, abs=0.01)
     assert [row["along_m"] for row in rows] == pytest.approx([24, 24.1, 10], abs=0.2)
+
+
+@pytest.mark.parametrize("status", ["confirmed", "merged"])
+def test_who_is_cut_by_the_border_keeps_its_velocity_while_it_is_alone(tmp_path, status):
+    """From t = 5 on there are no metres, and what is left of the box is a lane beside."""
+    run = write_run(tmp_path / "run", [straight(1, 1.0, 50, 240, 100, 5)], metres=True)
+    column = pq.read_table(f"{run}/tracks.parquet").to_pydict()
+    for row in np.flatnonzero(np.array(column["time_s"]) >= 5):
+        column["x_m"][row] = column["y_m"][row] = column["speed_kmh"][row] = column["heading_deg"][row] = None
+        column["top_px"][row] -= 100
+        column["status"][row] = status
+    pq.write_table(pa.table(column), f"{run}/tracks.parquet")
+    lanes = {"own": {"line": [[500, 280], [500, 200]]}, "beside": {"line": [[500, 190], [500, 50]]}}
+    rows = crossings(run, site(CALIBRATED | {"gates": lanes}))
+    assert [row["gate"] for row in rows] == ["own" if status == "confirmed" else "beside"]
+    assert rows[0]["time_s"] == pytest.approx(5.5, abs=0.2)
 
 
 def test_sections_give_speeds_without_a_calibration(tmp_path):

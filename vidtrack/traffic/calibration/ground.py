@@ -97,7 +97,8 @@ class Ground:
 
     def by_own_error(self, xy_m: Floats) -> Floats:
         """(N, 2, 2) derivative of positions with respect to their picture points [m/px]."""
-        return np.asarray(np.linalg.inv(self.px_per_m(xy_m)))
+        (a, b), (c, d) = self.px_per_m(xy_m).transpose(1, 2, 0)
+        return np.stack([d, -b, -c, a], axis=1).reshape(-1, 2, 2) / (a * d - b * c)[:, None, None]
 
     def by_shared_error(self, xy_m: Floats) -> Floats:
         """(N, 2, 8) derivative of positions, at fixed picture points, with respect to eight independent errors of

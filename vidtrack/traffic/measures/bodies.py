@@ -44,10 +44,11 @@ class Bodies:
     @classmethod
     def of(cls, rows: Rows) -> Bodies:
         """The rows that the picture shows, with a place, a heading and a length that are known well enough."""
-        known = rows.seen & np.isfinite(rows.length + rows.width + rows.xy[:, 0] + rows.v[:, 0] + rows.spread[:, 0])
+        sure = rows.seen & np.isfinite(rows.length + rows.width + rows.xy[:, 0] + rows.v[:, 0] + rows.spread[:, 0])
         with np.errstate(invalid="ignore"):
-            known &= rows.spread[:, :2].sum(axis=1) / 2 < _PLACE_M**2
-            known &= (rows.length_sigma < _LENGTH_M) & (rows.speed_sigma < _SPEED_M_S)
+            sure &= rows.spread[:, :2].sum(axis=1) / 2 < _PLACE_M**2
+            sure &= (rows.length_sigma < _LENGTH_M) & (rows.speed_sigma < _SPEED_M_S)
+        known = np.flatnonzero(sure)
         return cls(
             *(rows.track[known], rows.t[known], rows.xy[known], rows.v[known], rows.ahead[known]),
             np.column_stack([rows.length[known], rows.width[known]]),

@@ -32,13 +32,14 @@ def closing(bodies: Bodies) -> Encounters:
     Moments at which two rectangles overlap give none: vehicles do not, so it is their error. The vehicle ahead in the
     direction of both together is `first`.
     """
-    order = np.lexsort((bodies.xy[:, 0], bodies.t))
+    order, reach = _in_order(bodies.t, bodies.xy), np.hypot(bodies.sides[:, 0], bodies.sides[:, 1]) / 2
     size = max(len(bodies), 64)
     who, found = np.empty((size, 2), np.int64), np.empty((size, 3))
     row, count = 0, 0
     while row < len(bodies):
         row, count = _look(
-            row, count, order, bodies.t, bodies.xy, bodies.v, bodies.ahead, bodies.sides, bodies.speed_sigma, who, found
+            row, count, order, bodies.t, bodies.xy, bodies.v, bodies.ahead, bodies.sides, reach, bodies.speed_sigma,
+            who, found,
         )  # fmt: skip
         if row < len(bodies):
             who, found = np.vstack([who, np.empty_like(who)]), np.vstack([found, np.empty_like(found)])
@@ -62,31 +63,46 @@ def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
 
 
 @kernel
+def _in_order(t: Floats, xy: Floats) -> Ints:
+    """(N,) rows in order of time, and those of one moment in order of x: few, so each is put where it belongs."""
+    order = np.empty(len(t), np.int64)
+    for i in range(len(t)):
+        place = i
+        while place > 0 and t[order[place - 1]] == t[i] and xy[order[place - 1], 0] > xy[i, 0]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = i
+    return order
+
+
+@kernel
 def _look(
-    row: int, count: int, order: Ints, t: Floats, xy: Floats, v: Floats, ahead: Floats, sides: Floats, sigma: Floats,
-    who: Ints, found: Floats,
+    row: int, count: int, order: Ints, t: Floats, xy: Floats, v: Floats, ahead: Floats, sides: Floats, reach: Floats,
+    sigma: Floats, who: Ints, found: Floats,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows in `order` (of time, then of x) with those after them at the same moment, until all are done or
     the pairs need more room; the next row and pair.
 
+    reach   (N,) of the circles around the rectangles
     who, found   the pairs: (M, 2) rows; (M, 3) time to collision and the normal along which they touch
     """
     fastest, longest = 0.0, 0.0
     for i in range(len(order)):
-        fastest = max(fastest, np.hypot(v[i, 0], v[i, 1]))
-        longest = max(longest, np.hypot(sides[i, 0], sides[i, 1]) / 2)
+        fastest = max(fastest, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+        longest = max(longest, reach[i])
+    fastest = np.sqrt(fastest)
     for first in range(row, len(order)):
         i, begun = order[first], count
-        own = np.hypot(sides[i, 0], sides[i, 1]) / 2
-        widest = TTC_S * (np.hypot(v[i, 0], v[i, 1]) + fastest) + own + longest
+        speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+        widest = TTC_S * (speed + fastest) + reach[i] + longest
         for later in range(first + 1, len(order)):
             j = order[later]
             if t[j] != t[i] or xy[j, 0] - xy[i, 0] > widest:
                 break
             dx, dy, wx, wy = xy[j, 0] - xy[i, 0], xy[j, 1] - xy[i, 1], v[j, 0] - v[i, 0], v[j, 1] - v[i, 1]
             far, nearing, w2 = dx * dx + dy * dy, -dx * wx - dy * wy, wx * wx + wy * wy
-            reach = own + np.hypot(sides[j, 0], sides[j, 1]) / 2
-            if far > reach * reach and (nearing <= 0 or (far - reach * reach) * w2 > nearing * nearing):
+            near = (reach[i] + reach[j]) ** 2
+            if far > near and (nearing <= 0 or (far - near) * w2 > nearing * nearing):
                 continue  # the circles around them never meet
             ttc, nx, ny = _touch(dx, dy, wx, wy, ahead[i], ahead[j], sides[i], sides[j])
             if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(sigma[i], sigma[j]):

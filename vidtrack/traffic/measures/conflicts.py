@@ -68,7 +68,8 @@ class Meeting:
             bodies = self._recent.and_also(bodies)
         if len(bodies):
             self._look(bodies, until=bodies.t[-1])
-            self._recent = bodies.only(bodies.t > bodies.t[-1] - PET_S)
+            recent = np.searchsorted(bodies.t, bodies.t[-1] - PET_S, side="right")
+            self._recent = bodies.only(slice(recent, None))
 
     def _look(self, bodies: Bodies, until: float) -> None:
         """Take the moments before `until` that are new."""

@@ -43,8 +43,7 @@ def encroachments(bodies: Bodies) -> Encounters:
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
     """
-    order = np.lexsort((bodies.t, bodies.track))
-    bodies = bodies.only(order)
+    bodies = bodies.only(_by_track(bodies.track))
     stay, turned = _stays(bodies)
     one, other = _soon_after(bodies, stay, turned)
     i, j = _nearest(stay[one], stay[other], bodies.t, bodies.xy, bodies.ahead, bodies.sides)
@@ -64,8 +63,7 @@ def _stays(bodies: Bodies) -> tuple[Ints, Floats]:
 
     bodies  in order of tracks and time
     """
-    reach = np.column_stack([bodies.half(np.broadcast_to(axis, bodies.xy.shape)) for axis in np.eye(2)])
-    cells = np.floor(np.column_stack([bodies.xy - reach, bodies.xy + reach]) / _CELL_M).astype(np.int64)
+    cells = _cells(bodies.xy, bodies.ahead, bodies.sides)
     size = max(2 * len(bodies), 64)
     stay, turned = np.empty((size, 3), np.int64), np.empty(size)
     row, count = 0, 0
@@ -123,12 +121,40 @@ def _step(bodies: Bodies, row: Ints, way: int) -> Floats:
 
 
 @kernel
+def _by_track(track: Ints) -> Ints:
+    """(N,) rows in order of tracks, those of each as they come."""
+    low = track.min() if len(track) else 0
+    begin = np.zeros(track.max() - low + 2 if len(track) else 1, np.int64)
+    for i in range(len(track)):
+        begin[track[i] - low + 1] += 1
+    begin = np.cumsum(begin)
+    order = np.empty(len(track), np.int64)
+    for i in range(len(track)):
+        order[begin[track[i] - low]] = i
+        begin[track[i] - low] += 1
+    return order
+
+
+@kernel
+def _cells(xy: Floats, ahead: Floats, sides: Floats) -> Ints:
+    """(N, 4) first and last cells, in x and y, that rectangles reach into: x0, y0, x1, y1."""
+    cells = np.empty((len(xy), 4), np.int64)
+    for i in range(len(xy)):
+        along, across = abs(ahead[i, 0]), abs(ahead[i, 1])
+        for axis in range(2):
+            half = (sides[i, axis] * along + sides[i, 1 - axis] * across) / 2
+            cells[i, axis] = np.floor((xy[i, axis] - half) / _CELL_M)
+            cells[i, axis + 2] = np.floor((xy[i, axis] + half) / _CELL_M)
+    return cells
+
+
+@kernel
 def _enter(
     row: int, count: int, track: Ints, ahead: Floats, cells: Ints, stay: Ints, turned: Floats
 ) -> tuple[int, int]:
     """Note the stays that begin at rows from `row` on until all are done or they need more room; the next row and stay.
 
-    cells   (N, 4) first and last cells, in x and y, that the rectangles reach into: x0, y0, x1, y1
+    cells   (N, 4) as in `_cells`
     turned  the least cosine between the first heading in the cell and a later one
     """
     for i in range(row, len(track)):

@@ -2,18 +2,18 @@
 
 The odds that they are, against a vehicle that is lost for good and another that begins by chance, are
 
-    R = (1/2 h(gap) t(difference of states; S) + 1/2 k(gap) u(place, velocity)) exp(-d^2 / 2) / rate
+    R = h(gap) t(difference of states; S) exp(-d^2 / 2) / rate
 
-The first term is of a vehicle that drives on: h the density of the time that a track is lost for, t that of place and
-velocity in which it is found (Student's t of four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after
-a motion of nearly constant velocity. The second is of one that others hide while it stands or crawls: it is found
-somewhere ahead, after a time whose logarithm is normal. d is the difference of the lengths in standard deviations. Two
-stretches of one track are SAME times as likely one vehicle, and a movement that is not allowed is none. `rate` is that
-at which tracks begin by chance between the gates, per second and unit of place and velocity: what no join explains.
+h is the density of the time that a track is lost for, t that of place and velocity in which it is found (Student's t of
+four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after a motion of nearly constant velocity, and d the
+difference of the lengths in standard deviations. Two stretches of one track are SAME times as likely one vehicle, and a
+movement that is not allowed is none. `rate` is that at which tracks begin by chance between the gates, per second and
+unit of place and velocity: what no join explains.
 
 All ends are decided together: the probability of a pair is its marginal over all ways to join ends one to one, each as
 likely as the product of its odds. Belief propagation finds these marginals (Williams and Lau, IEEE Transactions on
-Aerospace and Electronic Systems 50(4), 2014). At most one pair of an end is likelier than not, and that is joined.
+Aerospace and Electronic Systems 50(4), 2014). They hold if both ends are where their tracks say, which is so for a
+share _SOUND of them. At most one pair of an end is likelier than not, and that is joined.
 """
 
 from __future__ import annotations
@@ -35,18 +35,14 @@ _LOST_S = 2.0
 OVERLAP_S = 0.3
 """s; a track that is lost may be seen so long after the one began that goes on"""
 SAME = 10.0
-_HIDDEN_S, _HIDDEN_SIGMA = 5.0, 0.7
-"""s, and standard deviation of the logarithm; for how long others hide a vehicle that stands or crawls"""
-_AHEAD_M, _ASIDE_M = 30.0, 1.5
-"""m; how far ahead it is found, and the standard deviation of how far to the side"""
-_ONWARD, _PACE_M_S = 0.5, 8.0
-"""Least cosine of its velocity and of where it has gone; m/s, the standard deviation of its velocity per axis"""
 _FREEDOM = 4.0
 """of Student's t: states of tracks that have just shared a blob are off by more than they say"""
 _VELOCITIES = 400.0
 """(m/s)2; over which the velocities of tracks that begin are spread"""
 _LENGTH_SIGMA = 0.25
 """Standard deviation of the logarithm of a length, from one track of a vehicle to another"""
+_SOUND = 0.78
+"""Share of joins whose two ends are where their tracks say: others are of blobs that hold several vehicles"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,12 +79,14 @@ def joined(lives: Lives, ends: Mask, begins: Mask, watched_s: float, allowed: Ca
     if len(a) == 0:
         return Joins(a, b, np.empty(0))
     area = np.prod(np.ptp(head.xy[first], axis=0) + 1.0)
-    density = odds(tail, head, lives.length, a, b) * np.where(lives.track[a] == lives.track[b], SAME, 1.0)
-    density *= allowed(a, b)
+    size = np.nan_to_num(np.log(lives.length[b] / lives.length[a]) / _LENGTH_SIGMA)
+    density = found_again(tail, head, a, b) * np.exp(-(size**2) / 2)
+    density *= np.where(lives.track[a] == lives.track[b], SAME, 1.0) * allowed(a, b)
     chance = float(len(first))
     for _ in range(_ROUNDS):
         probability = marginals(density / (chance / (watched_s * area * _VELOCITIES)), a, b, len(ends))
         chance = max(len(first) - probability.sum(), 1.0)
+    probability = _SOUND * probability
     likely = probability > 0.5
     return Joins(a[likely], b[likely], probability[likely])
 
@@ -104,14 +102,8 @@ def marginals(R: Floats, a: Ints, b: Ints, ends: int) -> Floats:
     return np.asarray(going / (1 + np.bincount(a, going, ends)[a]))
 
 
-def odds(tail: End, head: End, length: Floats, a: Ints, b: Ints) -> Floats:
-    """(J,) density with which the vehicle of stretch a is found again as stretch b, 1/(s m2 (m/s)2)."""
-    size = np.nan_to_num(np.log(length[b] / length[a]) / _LENGTH_SIGMA)
-    return np.asarray(0.5 * (driving(tail, head, a, b) + hidden(tail, head, a, b)) * np.exp(-(size**2) / 2))
-
-
-def driving(tail: End, head: End, a: Ints, b: Ints) -> Floats:
-    """(J,) the density of a vehicle that drives on, at about the same velocity."""
+def found_again(tail: End, head: End, a: Ints, b: Ints) -> Floats:
+    """(J,) density with which the vehicle of stretch a, driving on, is found as stretch b, 1/(s m2 (m/s)2)."""
     gap = np.maximum(head.t[b] - tail.t[a], 0.0)
     place = head.xy[b] - tail.xy[a] - gap[:, None] * tail.v[a]
     pace = head.v[b] - tail.v[a]
@@ -124,22 +116,6 @@ def driving(tail: End, head: End, a: Ints, b: Ints) -> Floats:
     square = (svv * _dot(place, place) - 2 * sxv * _dot(place, pace) + sxx * _dot(pace, pace)) / det
     found = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det * (1 + square / _FREEDOM) ** -(2 + _FREEDOM / 2)
     return np.asarray(np.exp(-gap / _LOST_S) / _LOST_S * found)
-
-
-def hidden(tail: End, head: End, a: Ints, b: Ints) -> Floats:
-    """(J,) the density of a vehicle that others hid while it stood or crawled."""
-    gap = np.maximum(head.t[b] - tail.t[a], 1e-3)
-    way = head.xy[b] - tail.xy[a]
-    faster = np.linalg.norm(tail.v[a], axis=1) > np.linalg.norm(head.v[b], axis=1)
-    v = np.where(faster[:, None], tail.v[a], head.v[b])
-    ahead = v / np.maximum(np.linalg.norm(v, axis=1), 1e-9)[:, None]
-    along, aside = _dot(way, ahead), way[:, 0] * ahead[:, 1] - way[:, 1] * ahead[:, 0]
-    speed = np.linalg.norm(head.v[b], axis=1)
-    pace = np.exp(-((speed / _PACE_M_S) ** 2) / 2) / (2 * np.pi * _PACE_M_S**2) * np.pi / np.arccos(_ONWARD)
-    late = np.exp(-((np.log(gap / _HIDDEN_S) / _HIDDEN_SIGMA) ** 2) / 2) / (gap * _HIDDEN_SIGMA * np.sqrt(2 * np.pi))
-    place = np.exp(-((aside / _ASIDE_M) ** 2) / 2) / (_ASIDE_M * np.sqrt(2 * np.pi) * (_AHEAD_M + _ASIDE_M))
-    onward = (_dot(head.v[b], ahead) >= _ONWARD * speed) & (along > -_ASIDE_M) & (along < _AHEAD_M)
-    return np.asarray(late * place * pace * onward)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

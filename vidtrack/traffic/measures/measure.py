@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from vidtrack.arrays.types import Ints
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
@@ -20,7 +21,7 @@ from vidtrack.traffic.measures.crossings import following, section_speeds, way_n
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.journeys import journeys
-from vidtrack.traffic.measures.passing import Passing, reaches
+from vidtrack.traffic.measures.passing import Passed, Passing, reaches
 from vidtrack.traffic.measures.queues import queues_of
 from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
@@ -57,11 +58,18 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     metres, ground = site.calibration is not None, grounds[sizes[0]]
     reader, stretches, passing = Reader(day, grounds), Stretches(metres), Passing(gates, *reaches(metres))
     staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
-    for rows in by_stretches(reader, stretches, vehicles):
-        for part in (passing, staying, meeting):
-            part.add(rows)
+    with ThreadPoolExecutor(1) as beside:
+        met = beside.submit(lambda: None)
+        for rows in by_stretches(reader, stretches, vehicles):
+            passing.add(rows)
+            staying.add(rows)
+            met.result()
+            met = beside.submit(meeting.add, rows)  # takes as long as all else, and so has a thread of its own
+        met.result()
     lives = stretches.lives()
-    return _Figures(day, site, gates, ground, reader, passing, lives, staying, meeting, vehicles).measures()
+    passed, ways = passing.passed(), passing.ways(len(lives.track))
+    del stretches, passing  # which are large
+    return _Figures(day, site, gates, ground, reader, passed, ways, lives, staying, meeting, vehicles).measures()
 
 
 class _Figures:
@@ -74,7 +82,8 @@ class _Figures:
         gates: Gates,
         ground: Ground | None,
         reader: Reader,
-        passing: Passing,
+        passed: Passed,
+        ways: Floats,
         lives: Lives,
         staying: Staying,
         meeting: Meeting,
@@ -82,13 +91,13 @@ class _Figures:
     ) -> None:
         self.day, self.site, self.gates, self.ground = day, site, gates, ground
         self.staying, self.meeting = staying, meeting
-        self.lives, self.ways = lives, passing.ways(len(lives.track))
+        self.lives, self.ways = lives, ways
         self.metres = ground is not None
         self.spans = day.spans
         sessions, track_ids = reader.names
         self.tracks = len(track_ids)
         self.session, self.track_id = sessions[lives.track], track_ids[lives.track]
-        driven = journeys(gates, passing.passed(), lives, self.spans, self.metres, site.movements.allowed)
+        driven = journeys(gates, passed, lives, self.spans, self.metres, site.movements.allowed)
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)

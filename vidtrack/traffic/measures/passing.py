@@ -269,10 +269,11 @@ def _look(
             if passing >= 0:
                 real[passing, AFTER] = far[k, g]
                 whole[passing, SEEN] |= seen[i]
-        state[k] = values[i]
-        step = np.hypot(x - way[k, 0], y - way[k, 1])
-        if step >= _CORNER:
-            way[k, 0], way[k, 1], way[k, 2] = x, y, way[k, 2] + step
+        for column in range(7):
+            state[k, column] = values[i, column]
+        dx, dy = x - way[k, 0], y - way[k, 1]
+        if dx * dx + dy * dy >= _CORNER**2:
+            way[k, 0], way[k, 1], way[k, 2] = x, y, way[k, 2] + np.hypot(dx, dy)
     return len(track), count
 
 

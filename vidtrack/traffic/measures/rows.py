@@ -14,6 +14,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
@@ -98,6 +99,8 @@ _USUAL_M = 4.5
 """m; of a vehicle whose length is not known, for this margin"""
 _ROUGH_M = 1.0
 """m; standard deviation of positions without a heading, or where the border cuts the box"""
+_ONWARD_S = 2.0
+"""s; for which a vehicle without a place is taken to keep its velocity"""
 
 
 class Reader:
@@ -111,6 +114,7 @@ class Reader:
         self._day = day
         self._grounds = grounds
         self._size = min(grounds)
+        self._latest = np.full((0, 5), np.nan)
         self._numbers: dict[tuple[int, int], int] = {}
 
     @property
@@ -143,7 +147,12 @@ class Reader:
         if road is not None:
             column |= _stand(road, track, column)
         edge = (edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
-        return _on_road(ground, column, track, t, seen, merged, edge)
+        rows = _on_road(ground, column, track, t, seen, merged, edge)
+        if len(self._latest) < len(self._numbers):
+            more = max(len(self._numbers), 2 * len(self._latest)) - len(self._latest)
+            self._latest = np.vstack([self._latest, np.full((more, 5), np.nan)])
+        _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
+        return rows
 
     def _numbered(self, table: pa.Table, session: int) -> Ints:
         """(N,) numbers over the whole day."""
@@ -239,6 +248,25 @@ def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Float
             xy[rough] = ground.metres(middle)
         sigma[rough] = _ROUGH_M
     return xy, sigma
+
+
+@kernel
+def _go_on(track: Ints, t: Floats, rough: Mask, alone: Mask, v: Floats, xy: Floats, latest: Floats) -> None:
+    """Put vehicles that were known until just now, in rows without a place, where their velocity (N, 2) has led them,
+    as long as they are seen alone.
+
+    latest  (T, 5) of each track the time, place and velocity that were known last
+    """
+    for i in range(len(track)):
+        k = track[i]
+        if not alone[i]:
+            latest[k, 0] = np.nan
+        elif not rough[i]:
+            latest[k, 0], latest[k, 1], latest[k, 2] = t[i], xy[i, 0], xy[i, 1]
+            latest[k, 3], latest[k, 4] = v[i, 0], v[i, 1]
+        elif t[i] - latest[k, 0] < _ONWARD_S and not np.isnan(latest[k, 3]):
+            xy[i, 0] = latest[k, 1] + (t[i] - latest[k, 0]) * latest[k, 3]
+            xy[i, 1] = latest[k, 2] + (t[i] - latest[k, 0]) * latest[k, 4]
 
 
 def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str, Floats]:

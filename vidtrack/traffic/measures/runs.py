@@ -22,6 +22,7 @@ _JOINED_S = 1.0
 _CLOCK_S, _CLOCK_SHARE = 5.0, 1e-4
 """s, and share of the time since: by so much the clock that a live run tells its beginning by may have been set"""
 _ROUNDING_S = 1e-3
+_NO_RUN = "{} is not a finished run: it has no tracks.parquet and no tracks.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,10 +157,12 @@ def parts_with_tracks(run: Path, parts: Sequence[Path]) -> list[Path]:
 def site_of(runs: Sequence[str]) -> Path:
     """The site that runs were tracked with: the copy in their folders, each written as for `open_day`.
 
-    Raises ConfigError where a run has none, or another one than the first.
+    Raises ConfigError where a run has none, or another one than the first, SourceError where there is no run.
     """
     copies = [_split(run)[0] / SITE_COPY for run in runs]
     for copy in copies:
+        if not copy.parent.is_dir():
+            raise SourceError(_NO_RUN.format(copy.parent))
         if not copy.is_file() or not _had_site(copy.parent):
             raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
     for other in copies[1:]:
@@ -200,7 +203,7 @@ def _sessions(found: list[_Found]) -> list[int]:
 def _found(run: str) -> _Found:
     folder, time = _split(run)
     if not has_tracks(folder):
-        raise SourceError(f"{folder} is not a finished run: it has no tracks.parquet and no tracks.csv")
+        raise SourceError(_NO_RUN.format(folder))
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         frames, end, fps = float(summary["frames"]), float(summary["media_s"]), float(summary["fps"])

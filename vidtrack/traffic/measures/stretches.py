@@ -4,7 +4,7 @@ Where vehicles meet in one blob, or one hides the other, a track may go on as th
 nearly constant velocity follows each track through the rows in which the picture shows it alone. Again and again
 another filter begins, also after rows that the track shared, and where a row is far from the prediction. If its state
 after _CHECK_S is not where the first one led to when it began, the rest of the track is another stretch: of which
-vehicle is decided by `joins`. So it is where a track drives back the way that it came, without room to turn.
+vehicle is decided by `joins`.
 
 The noise of the two axes is the same and independent, so a filter has six numbers beside its time: position,
 velocity, and for each axis the variances of both and their covariance. Errors of footprints last, so the variance of
@@ -36,13 +36,11 @@ _FAR = 25.0
 """Squared distance beyond which a row is of something else"""
 _OTHER = 30.0
 """Squared distance of two states, beyond which they are of two vehicles: of one, one in 200,000"""
-_DRIVES_M_S, _KNOWN_M_S = 3.0, 1.5
-"""m/s; from which on a vehicle has a direction, if its velocity is known so well"""
-_BACK, _ROOM_M = -0.7, 6.0
-"""Cosine of directions that are opposite; m to the side that a vehicle needs to turn round"""
 MODEL_M_S = 1.0
 """m/s; standard deviation of the difference of two velocities beside what they say"""
 T, X, Y, VX, VY, PXX, PXV, PVV, LASTING = range(9)
+_STATES = 1 + 2 * _CHECKS
+"""of a track"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,10 +85,8 @@ class Stretches:
 
     def __init__(self, metres: bool) -> None:
         self._metres = metres
-        self._state = np.full((0, 1 + 2 * _CHECKS, 9), np.nan)
+        self._state = np.full((0, 9), np.nan)
         self._since = np.full((0, 2 + 2 * _CHECKS), np.nan)
-        self._onward = np.full((0, 4), np.nan)
-        self._turned = np.full((0, 9), np.nan)
         self._current = np.empty(0, np.int64)
         self._head, self._tail = np.full((2, 0, 9), np.nan)
         self._track, self._until = np.empty(0, np.int64), np.empty(0)
@@ -104,12 +100,13 @@ class Stretches:
         self._make_room(int(rows.track.max()) + 1, len(rows))
         alone = rows.seen & ~rows.merged & np.isfinite(rows.xy[:, 0]) if self._metres else np.isfinite(rows.xy[:, 0])
         number = np.empty(len(rows), np.int64)
-        values = np.column_stack([rows.t, rows.xy, rows.sigma**2 + _PLACE_M**2])
         self._count = _follow(
-            rows.track, values, alone & rows.seen, self._metres, self._state, self._since, self._onward,
-            self._turned, self._current, self._head, self._tail, self._track, self._until, number, self._count,
+            rows.track, rows.t, rows.xy, rows.sigma**2 + _PLACE_M**2, alone & rows.seen, self._metres, self._state,
+            self._since, self._current, self._head, self._tail, self._track, self._until, number, self._count,
         )  # fmt: skip
-        self._sums[: self._count] += length_sums(number, rows.length, rows.length_sigma, self._count)
+        low = int(number.min())
+        some = length_sums(number - low, rows.length, rows.length_sigma, self._count - low)
+        self._sums[low : self._count] += some
         return replace(rows, track=number)
 
     def lives(self) -> Lives:
@@ -119,15 +116,13 @@ class Stretches:
         return Lives(*ends, mean_length(self._sums[:n]), self._track[:n], self._until[:n])
 
     def _make_room(self, tracks: int, rows: int) -> None:
-        """For tracks (K), and for as many stretches as these rows can have: one begins with some rows of its own."""
+        """For tracks (K), and for as many stretches as these rows can begin."""
         if tracks > len(self._current):
             more = max(tracks, 2 * len(self._current)) - len(self._current)
-            self._state = np.concatenate([self._state, np.full((more, *self._state.shape[1:]), np.nan)])
+            self._state = np.concatenate([self._state, np.full((more * _STATES, 9), np.nan)])
             self._since = np.concatenate([self._since, np.full((more, self._since.shape[1]), np.nan)])
-            self._onward = np.concatenate([self._onward, np.full((more, 4), np.nan)])
-            self._turned = np.concatenate([self._turned, np.full((more, 9), np.nan)])
             self._current = np.concatenate([self._current, np.full(more, -1)])
-        stretches = self._count + tracks + rows // _CHECK_ROWS
+        stretches = self._count + rows
         if stretches > len(self._track):
             more = max(stretches, 2 * len(self._track)) - len(self._track)
             unknown = np.full((more, 9), np.nan)
@@ -144,39 +139,41 @@ def _end(states: Floats) -> End:
 
 @kernel
 def _follow(
-    track: Ints, values: Floats, alone: Mask, metres: bool, state: Floats, since: Floats, onward: Floats,
-    turned: Floats, current: Ints, head: Floats, tail: Floats, of_track: Ints, until: Floats, number: Ints, count: int,
+    track: Ints, t: Floats, xy: Floats, variance: Floats, alone: Mask, metres: bool, state: Floats, since: Floats,
+    current: Ints, head: Floats, tail: Floats, of_track: Ints, until: Floats, number: Ints, count: int,
 ) -> int:  # fmt: skip
     """Number rows by stretches; returns how many there are.
 
-    values  (N, 4) t, x, y and the variance of a position
-    state   (K, 1 + 2 _CHECKS, 9) of each track the long filter, then for each check what this was when the check began,
-            and the filter that began with it
-    onward, turned   (K, 4), (K, 9) as in `_backs`
+    t (N,), xy (N, 2), variance (N,) of a position, alone (N,) seen and in no shared blob
+    state   (K * _STATES, 9) of each track the long filter, then for each check what this was when the check began, and
+            the filter that began with it
     since   (K, 2 + 2 _CHECKS) when the long filter began, and 1 after rows in which the track was not alone; then of
             each check when it began (NaN: it has not) and how many rows it has
+
+    States are passed on as a table and a row in it: an array of each would be made anew for every row.
     """
-    begun = np.empty(9)
+    begun = np.empty((1, 9))
     for i in range(len(track)):
-        k, t = track[i], values[i, 0]
+        k, now = track[i], t[i]
         if current[k] < 0:
             current[k] = count
             of_track[count] = k
             count += 1
-        number[i] = current[k]
+        mine = current[k]
+        number[i] = mine
         if not alone[i]:
             since[k, 1] = 1
             continue
-        first = state[k, 0]
-        if np.isnan(first[T]) or not metres:
-            new = np.isnan(first[T])
-            _begin(first, values[i])
-            tail[current[k]] = first
+        x, y, spread, first = xy[i, 0], xy[i, 1], variance[i], k * _STATES
+        new = np.isnan(state[first, T])
+        if new or not metres:
+            _begin(state, first, now, x, y, spread)
+            _copy(state, first, tail, mine)
             if new:
-                head[current[k]] = first
-                since[k, 0], since[k, 1] = t, 0
+                _copy(state, first, head, mine)
+                since[k, 0], since[k, 1] = now, 0
             continue
-        shared = since[k, 1] == 1 and t - first[T] > _PAUSE_S
+        shared = since[k, 1] == 1 and now - state[first, T] > _PAUSE_S
         since[k, 1] = 0
         latest = -np.inf
         for c in range(_CHECKS):
@@ -186,152 +183,116 @@ def _follow(
                 latest = since[k, 2 + 2 * c]
         broken = -1
         for c in range(_CHECKS):
-            before, after = state[k, 1 + 2 * c], state[k, 2 + 2 * c]
-            if np.isnan(since[k, 2 + 2 * c]):
-                if t - latest >= _CHECK_S / _CHECKS:
-                    latest = t
-                    before[:] = first
-                    _begin(after, values[i])
-                    since[k, 2 + 2 * c], since[k, 3 + 2 * c] = t, 1
+            before, after, began = first + 1 + 2 * c, first + 2 + 2 * c, since[k, 2 + 2 * c]
+            if np.isnan(began):
+                if now - latest < _CHECK_S / _CHECKS:
+                    continue
+                latest = now
+            elif _step(state, after, now, x, y, spread) <= _FAR:
+                since[k, 3 + 2 * c] += 1
+                if now - began < _CHECK_S or since[k, 3 + 2 * c] < _CHECK_ROWS:
+                    continue
+                _write_back(state, after, began, begun, 0)
+                if _apart(state, before, begun, 0) > _OTHER:
+                    broken = c
+                    break
+                if state[first, T] <= began:
+                    _copy(state, after, state, first)  # which all these rows were far from, until now
+                since[k, 2 + 2 * c] = np.nan
                 continue
-            if _step(after, values[i]) > _FAR:
-                before[:] = first
-                _begin(after, values[i])
-                since[k, 2 + 2 * c], since[k, 3 + 2 * c] = t, 1
-                continue
-            since[k, 3 + 2 * c] += 1
-            if t - since[k, 2 + 2 * c] < _CHECK_S or since[k, 3 + 2 * c] < _CHECK_ROWS:
-                continue
-            _write_back(after, since[k, 2 + 2 * c], begun)
-            if _apart(before, begun) > _OTHER:
-                broken = c
-                break
-            if first[T] <= since[k, 2 + 2 * c]:
-                first[:] = after  # which all these rows were far from, until now
-            since[k, 2 + 2 * c] = np.nan
-        begin = np.nan
+            _copy(state, first, state, before)
+            _begin(state, after, now, x, y, spread)
+            since[k, 2 + 2 * c], since[k, 3 + 2 * c] = now, 1
         if broken >= 0:
-            begin, tail[current[k]] = since[k, 2 + 2 * broken], state[k, 1 + 2 * broken]
-            first[:] = state[k, 2 + 2 * broken]
-        elif first[T] == t or _step(first, values[i]) <= _FAR:
-            tail[current[k]] = first
-            if t - since[k, 0] <= _CHECK_S:
-                _write_back(first, since[k, 0], head[current[k]])
-            if _backs(first, onward[k], turned[k]):
-                begin, tail[current[k]] = turned[k, T], turned[k]
-                _write_back(first, begin, begun)
-        if not np.isnan(begin):
-            until[current[k]] = tail[current[k], T]
-            _renumber(track, values, number, i, k, begin, count)
+            begin = since[k, 2 + 2 * broken]
+            _copy(state, first + 1 + 2 * broken, tail, mine)
+            _copy(state, first + 2 + 2 * broken, state, first)
+            until[mine] = tail[mine, T]
+            _renumber(track, t, number, i, k, begin, count)
             current[k] = count
             of_track[count] = k
-            head[count], tail[count] = begun, first
+            _copy(begun, 0, head, count)
+            _copy(state, first, tail, count)
             count += 1
             since[k, 0] = begin
             since[k, 2:] = np.nan
-            onward[k], turned[k] = np.nan, np.nan
+        elif state[first, T] == now or _step(state, first, now, x, y, spread) <= _FAR:
+            _copy(state, first, tail, mine)
+            if now - since[k, 0] <= _CHECK_S:
+                _write_back(state, first, since[k, 0], head, mine)
     return count
 
 
 @kernel
-def _backs(state: Floats, onward: Floats, turned: Floats) -> bool:
-    """Whether a track drives back the way that it came, without room to turn: then it is of another vehicle.
-
-    onward  (4,) place and unit vector of its last driving
-    turned  (9,) its last state before it began to drive back; both are kept up here
-    """
-    speed = np.hypot(state[VX], state[VY])
-    along = (state[VX] * onward[2] + state[VY] * onward[3]) / max(speed, 1e-9)
-    if not along < 0:
-        turned[:] = np.nan
-    elif np.isnan(turned[T]):
-        turned[:] = state
-    if speed < _DRIVES_M_S or state[PVV] > _KNOWN_M_S**2:
-        return False
-    if along < _BACK:
-        sideways = abs((state[X] - onward[0]) * onward[3] - (state[Y] - onward[1]) * onward[2])
-        if sideways < _ROOM_M:
-            return True
-    onward[0], onward[1], onward[2], onward[3] = state[X], state[Y], state[VX] / speed, state[VY] / speed
-    turned[:] = np.nan
-    return False
+def _copy(source: Floats, i: int, to: Floats, j: int) -> None:
+    """Write the state in a row of one table into a row of another."""
+    for column in range(9):
+        to[j, column] = source[i, column]
 
 
 @kernel
-def _begin(state: Floats, row: Floats) -> None:
-    """Write the state of a vehicle of which one row (4,) is known."""
-    state[T], state[X], state[Y], state[VX], state[VY] = row[0], row[1], row[2], 0.0, 0.0
-    state[PXX], state[PXV], state[PVV], state[LASTING] = row[3], 0.0, _FIRST_M_S**2, row[3]
+def _begin(state: Floats, i: int, t: float, x: float, y: float, variance: float) -> None:
+    """Write the state of a vehicle of which one row is known."""
+    state[i, T], state[i, X], state[i, Y], state[i, VX], state[i, VY] = t, x, y, 0.0, 0.0
+    state[i, PXX], state[i, PXV], state[i, PVV], state[i, LASTING] = variance, 0.0, _FIRST_M_S**2, variance
 
 
 @kernel
-def _predict(state: Floats, dt: float, to: Floats) -> None:
-    """Write the state dt [s] later."""
-    jolt = STANDING_JOLT + JOLT_PER_M_S * np.hypot(state[VX], state[VY])
-    to[T], to[VX], to[VY], to[LASTING] = state[T] + dt, state[VX], state[VY], state[LASTING]
-    to[X], to[Y] = state[X] + dt * state[VX], state[Y] + dt * state[VY]
-    to[PXX] = state[PXX] + 2 * dt * state[PXV] + dt * dt * state[PVV] + jolt * dt**3 / 3
-    to[PXV] = state[PXV] + dt * state[PVV] + jolt * dt**2 / 2
-    to[PVV] = state[PVV] + jolt * dt
+def _ahead(state: Floats, i: int, t: float) -> tuple[float, float, float, float, float]:
+    """Position, and the variances of each axis, at a later time."""
+    dt, vx, vy = t - state[i, T], state[i, VX], state[i, VY]
+    jolt = STANDING_JOLT + JOLT_PER_M_S * np.sqrt(vx * vx + vy * vy)
+    xx = state[i, PXX] + 2 * dt * state[i, PXV] + dt * dt * state[i, PVV] + jolt * dt**3 / 3
+    xv = state[i, PXV] + dt * state[i, PVV] + jolt * dt**2 / 2
+    return state[i, X] + dt * vx, state[i, Y] + dt * vy, xx, xv, state[i, PVV] + jolt * dt
 
 
 @kernel
-def _step(state: Floats, row: Floats) -> float:
-    """Predict and update with a row (4,), unless it is far off; returns its squared distance.
-
-    Several are made of each row: the prediction of `_predict` is written out, so that no array is made for it.
-    """
-    dt, vx, vy = row[0] - state[T], state[VX], state[VY]
-    jolt = STANDING_JOLT + JOLT_PER_M_S * np.hypot(vx, vy)
-    x, y = state[X] + dt * vx, state[Y] + dt * vy
-    xx = state[PXX] + 2 * dt * state[PXV] + dt * dt * state[PVV] + jolt * dt**3 / 3
-    xv = state[PXV] + dt * state[PVV] + jolt * dt**2 / 2
-    vv = state[PVV] + jolt * dt
-    dx, dy, s = row[1] - x, row[2] - y, xx + row[3]
+def _step(state: Floats, i: int, t: float, x: float, y: float, variance: float) -> float:
+    """Predict and update with a row, unless it is far off; returns its squared distance."""
+    px, py, xx, xv, vv = _ahead(state, i, t)
+    dx, dy, s = x - px, y - py, xx + variance
     distance = (dx * dx + dy * dy) / s
-    if distance > _FAR:
-        return distance
-    place, pace = xx / s, xv / s
-    state[T], state[X], state[Y], state[VX], state[VY] = (
-        row[0],
-        x + place * dx,
-        y + place * dy,
-        vx + pace * dx,
-        vy + pace * dy,
-    )
-    state[PXX], state[PXV], state[PVV], state[LASTING] = (1 - place) * xx, (1 - place) * xv, vv - pace * xv, row[3]
+    if distance <= _FAR:
+        place, pace = xx / s, xv / s
+        state[i, T], state[i, X], state[i, Y] = t, px + place * dx, py + place * dy
+        state[i, VX] += pace * dx
+        state[i, VY] += pace * dy
+        state[i, PXX], state[i, PXV], state[i, PVV] = (1 - place) * xx, (1 - place) * xv, vv - pace * xv
+        state[i, LASTING] = variance
     return distance
 
 
 @kernel
-def _write_back(state: Floats, t: float, begun: Floats) -> None:
-    """Write the state at an earlier time, at the same velocity."""
-    dt = t - state[T]
-    begun[:] = state
-    begun[T], begun[X], begun[Y] = t, state[X] + dt * state[VX], state[Y] + dt * state[VY]
-    begun[PXX] = state[PXX] + 2 * dt * state[PXV] + dt * dt * state[PVV]
-    begun[PXV] = state[PXV] + dt * state[PVV]
+def _write_back(state: Floats, i: int, t: float, begun: Floats, j: int) -> None:
+    """Write the state at an earlier time, at the same velocity, into a row of another table."""
+    dt = t - state[i, T]
+    _copy(state, i, begun, j)
+    begun[j, T] = t
+    begun[j, X] += dt * state[i, VX]
+    begun[j, Y] += dt * state[i, VY]
+    begun[j, PXX] += 2 * dt * state[i, PXV] + dt * dt * state[i, PVV]
+    begun[j, PXV] += dt * state[i, PVV]
 
 
 @kernel
-def _apart(first: Floats, second: Floats) -> float:
+def _apart(state: Floats, i: int, second: Floats, j: int) -> float:
     """Squared distance of the second state from where the first one leads to."""
-    then = np.empty(9)
-    _predict(first, second[T] - first[T], then)
-    xx, xv = then[PXX] + second[PXX] + then[LASTING] + second[LASTING], then[PXV] + second[PXV]
-    vv = then[PVV] + second[PVV] + MODEL_M_S**2
-    total = 0.0
-    for place, pace in ((X, VX), (Y, VY)):
-        dx, dv = second[place] - then[place], second[pace] - then[pace]
-        total += (vv * dx * dx - 2 * xv * dx * dv + xx * dv * dv) / (xx * vv - xv * xv)
-    return total
+    px, py, xx, xv, vv = _ahead(state, i, second[j, T])
+    xx += second[j, PXX] + state[i, LASTING] + second[j, LASTING]
+    xv, vv = xv + second[j, PXV], vv + second[j, PVV] + MODEL_M_S**2
+    dx, dy = second[j, X] - px, second[j, Y] - py
+    dvx, dvy = second[j, VX] - state[i, VX], second[j, VY] - state[i, VY]
+    return (vv * (dx * dx + dy * dy) - 2 * xv * (dx * dvx + dy * dvy) + xx * (dvx * dvx + dvy * dvy)) / (
+        xx * vv - xv * xv
+    )
 
 
 @kernel
-def _renumber(track: Ints, values: Floats, number: Ints, row: int, k: int, begin: float, stretch: int) -> None:
+def _renumber(track: Ints, t: Floats, number: Ints, row: int, k: int, begin: float, stretch: int) -> None:
     """Give the rows of a track from a time on, to this one, the number of another stretch."""
     for j in range(row, -1, -1):
-        if values[j, 0] < begin:
+        if t[j] < begin:
             break
         if track[j] == k:
             number[j] = stretch

@@ -80,7 +80,7 @@ def read_manual(path: Path, clocks: Iterable[str]) -> Events:
                 f"{path} has times of day, and the counted table has none: give time_s in seconds of the video, or "
                 "measure with a site that has a start"
             )
-        raise ConfigError(f"{path} has no column time_s or utc; it has {', '.join(names)}")
+        raise ConfigError(f"{path} has no column time_s or utc; it has {', '.join(names) or 'none'}")
     if not rows:
         raise ConfigError(f"{path} is empty: there is nothing to compare with")
     return _events(path, rows, names, clock)
@@ -152,7 +152,7 @@ def _events(path: Path, rows: list[dict[str, str]], names: list[str], clock: str
     gate = next((name for name in _GATE if name in names), None)
     if gate is None or "direction" not in names:
         missing = "gate" if gate is None else "direction"
-        raise ConfigError(f"{path} has no column {missing}; it has {', '.join(names)}")
+        raise ConfigError(f"{path} has no column {missing}; it has {', '.join(names) or 'none'}")
     times = [seconds(row[clock], clock, f"{path}, line {i}") for i, row in enumerate(rows, start=2)]
     certain = [_certain(row.get("certain", "1"), f"{path}, line {i}") for i, row in enumerate(rows, start=2)]
     gates, directions = ([row[name].strip() for row in rows] for name in (gate, "direction"))

@@ -24,7 +24,6 @@ def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_
     Edges are NaN where a corner lies behind the camera.
     """
     edge[0], edge[1], edge[2], edge[3] = np.inf, np.inf, -np.inf, -np.inf
-    scale = 0.0
     for corner in range(8):
         a = 0.5 if corner & 1 else -0.5
         b = 0.5 if corner & 2 else -0.5
@@ -35,17 +34,22 @@ def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_
         w = G[2, 0] * qx + G[2, 1] * qy + G[2, 2] + z * up[2]
         if w <= 0:
             edge[:] = np.nan
-            return scale
+            return 0.0
+        near = 1 / w
         for axis in range(2):
-            u = (G[axis, 0] * qx + G[axis, 1] * qy + G[axis, 2] + z * up[axis]) / w
+            u = (G[axis, 0] * qx + G[axis, 1] * qy + G[axis, 2] + z * up[axis]) * near
             for side in (axis, axis + 2):
                 if (side < 2 and u < edge[side]) or (side >= 2 and u > edge[side]):
-                    by_x, by_y = (G[axis, 0] - u * G[2, 0]) / w, (G[axis, 1] - u * G[2, 1]) / w
                     edge[side] = u
-                    by_state[side, X], by_state[side, Y] = by_x, by_y
-                    by_state[side, LENGTH] = a * (by_x * e[0] + by_y * e[1])
-                    by_state[side, WIDTH] = b * (by_y * e[0] - by_x * e[1])
-                    by_state[side, HEIGHT] = top * (up[axis] - u * up[2]) / w
-    for side in (LEFT, RIGHT):
-        scale = max(scale, np.hypot(by_state[side, X], by_state[side, Y]))
-    return scale
+                    by_state[side, X], by_state[side, LENGTH] = near, a  # until it is known which corner it is
+                    by_state[side, WIDTH], by_state[side, HEIGHT] = b, top
+    for side in range(4):
+        axis, u, near = side % 2, edge[side], by_state[side, X]
+        by_x, by_y = (G[axis, 0] - u * G[2, 0]) * near, (G[axis, 1] - u * G[2, 1]) * near
+        by_state[side, X], by_state[side, Y] = by_x, by_y
+        by_state[side, LENGTH] *= by_x * e[0] + by_y * e[1]
+        by_state[side, WIDTH] *= by_y * e[0] - by_x * e[1]
+        by_state[side, HEIGHT] *= (up[axis] - u * up[2]) * near
+    left = by_state[LEFT, X] ** 2 + by_state[LEFT, Y] ** 2
+    right = by_state[RIGHT, X] ** 2 + by_state[RIGHT, Y] ** 2
+    return np.sqrt(max(left, right))

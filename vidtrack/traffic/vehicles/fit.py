@@ -129,37 +129,6 @@ def _headings(path: Floats, heading: Floats) -> None:
 
 
 @kernel
-def _residuals(
-    edge: Floats, rows: float, p: Floats, e: Floats, size: Floats, G: Floats, up: Floats, coarse: float,
-    state: Floats, model: Floats, by_state: Floats, residual: Floats, by_size: Floats, weight: Floats,
-) -> tuple[float, int]:  # fmt: skip
-    """Write residuals (4,), their derivatives by_state (4, 5) and by_size (4, SIZE), and weights (4,) of a knot.
-
-    Returns the weighted sum of squares, and how many edges are far off.
-    """
-    state[0], state[1] = p[0], p[1]
-    state[2], state[3], state[4] = size[0], size[1], size[2]
-    scale = box_edges(G, up, state, e, model, by_state)
-    total, strange = 0.0, 0
-    for side in range(4):
-        sign = -1.0 if side < 2 else 1.0
-        residual[side] = edge[side] - model[side] - sign * size[3]
-        weight[side] = 0.0
-        if np.isnan(residual[side]):
-            residual[side] = 0.0
-            continue
-        variance = _EDGE_PX**2 + _ROW_PX**2 / rows + (_SHAPE_M[side] * scale) ** 2
-        variance *= coarse**2
-        far = residual[side] ** 2 / variance
-        strange += far > _FAR**2
-        weight[side] = (_FREEDOM + 1) / (_FREEDOM + far) / variance
-        total += weight[side] * residual[side] ** 2
-        by_size[side, 0], by_size[side, 1], by_size[side, 2] = by_state[side, 2], by_state[side, 3], by_state[side, 4]
-        by_size[side, 3] = sign
-    return total, strange
-
-
-@kernel
 def _normal(
     t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
     coarse: float, band: Floats, right: Floats, whole: Floats, rest: Floats,
@@ -170,32 +139,45 @@ def _normal(
     Returns the misfit, 1 where the noise is as stated, and the share of edges that are far off.
     """
     band[:], right[:], whole[:], rest[:] = 0.0, 0.0, 0.0, 0.0
-    state, model, by_state = np.empty(5), np.empty(4), np.zeros((4, 5))
-    residual, by_size, weight = np.zeros(4), np.zeros((4, SIZE)), np.zeros(4)
+    state, ahead, model, by_state = np.empty(5), np.empty(2), np.empty(4), np.zeros((4, 5))
+    by_size = np.empty(SIZE)
     total, strange, count = 0.0, 0, 0
     for s in range(SIZE):
         whole[s, s] = 1 / SIGMA[s] ** 2
         rest[s] = (MEAN[s] - size[s]) / SIGMA[s] ** 2
+    state[2], state[3], state[4] = size[0], size[1], size[2]
     for k in range(len(t)):
-        squares, far = _residuals(edge[k], rows[k], path[k], heading[k], size, G, up, coarse, state, model, by_state,
-                                  residual, by_size, weight)  # fmt: skip
-        total += squares
-        strange += far
+        state[0], state[1], ahead[0], ahead[1] = path[k, 0], path[k, 1], heading[k, 0], heading[k, 1]
+        scale, squares = box_edges(G, up, state, ahead, model, by_state), 0.0
         for side in range(4):
-            if weight[side] == 0:
+            sign = -1.0 if side < 2 else 1.0
+            residual = edge[k, side] - model[side] - sign * size[3]
+            if np.isnan(residual):
                 continue
+            variance = _EDGE_PX**2 + _ROW_PX**2 / rows[k] + (_SHAPE_M[side] * scale) ** 2
+            variance *= coarse**2
+            far = residual**2 / variance
+            weight = (_FREEDOM + 1) / (_FREEDOM + far) / variance
+            squares += weight * residual**2
+            strange += far > _FAR**2
             count += 1
-            for i in range(2):
-                wi = weight[side] * by_state[side, i]
-                for j in range(i + 1):
-                    band[2 * k + i, i - j] += wi * by_state[side, j]
-                for s in range(SIZE):
-                    right[2 * k + i, s] += wi * by_size[side, s]
-                right[2 * k + i, SIZE] += wi * residual[side]
+            by_size[0], by_size[1], by_size[2] = by_state[side, 2], by_state[side, 3], by_state[side, 4]
+            by_size[3] = sign
+            x, y = weight * by_state[side, 0], weight * by_state[side, 1]
+            band[2 * k, 0] += x * by_state[side, 0]
+            band[2 * k + 1, 1] += y * by_state[side, 0]
+            band[2 * k + 1, 0] += y * by_state[side, 1]
             for s in range(SIZE):
+                right[2 * k, s] += x * by_size[s]
+                right[2 * k + 1, s] += y * by_size[s]
+            right[2 * k, SIZE] += x * residual
+            right[2 * k + 1, SIZE] += y * residual
+            for s in range(SIZE):
+                ws = weight * by_size[s]
                 for r in range(SIZE):
-                    whole[s, r] += weight[side] * by_size[side, s] * by_size[side, r]
-                rest[s] += weight[side] * by_size[side, s] * residual[side]
+                    whole[s, r] += ws * by_size[r]
+                rest[s] += ws * residual
+        total += squares
     c = np.empty(3)
     for k in range(1, len(t) - 1):
         before, after = t[k] - t[k - 1], t[k + 1] - t[k]
@@ -212,7 +194,10 @@ def _normal(
 
 @kernel
 def _factor(band: Floats) -> None:
-    """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place."""
+    """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place.
+
+    Of the diagonal it has the inverses, since all that is done with it is to divide by it.
+    """
     for i in range(len(band)):
         for d in range(min(i, _BAND), -1, -1):
             j = i - d
@@ -220,27 +205,41 @@ def _factor(band: Floats) -> None:
             for m in range(max(i - _BAND, j - _BAND, 0), j):
                 value -= band[i, i - m] * band[j, j - m]
             if d == 0:
-                band[i, 0] = np.sqrt(max(value, 1e-12))
+                band[i, 0] = 1 / np.sqrt(max(value, 1e-12))
             else:
-                band[i, d] = value / band[j, 0]
+                band[i, d] = value * band[j, 0]
 
 
 @kernel
 def _solve(band: Floats, right: Floats) -> None:
-    """Solve for all right sides (n, m), in place, with the factor."""
+    """Solve for the right sides (n, SIZE + 1), in place, with the factor."""
     n = len(band)
     for i in range(n):
         for d in range(1, min(i, _BAND) + 1):
-            for c in range(right.shape[1]):
+            for c in range(SIZE + 1):
                 right[i, c] -= band[i, d] * right[i - d, c]
-        for c in range(right.shape[1]):
-            right[i, c] /= band[i, 0]
+        for c in range(SIZE + 1):
+            right[i, c] *= band[i, 0]
     for i in range(n - 1, -1, -1):
         for d in range(1, min(n - 1 - i, _BAND) + 1):
-            for c in range(right.shape[1]):
+            for c in range(SIZE + 1):
                 right[i, c] -= band[i + d, d] * right[i + d, c]
-        for c in range(right.shape[1]):
-            right[i, c] /= band[i, 0]
+        for c in range(SIZE + 1):
+            right[i, c] *= band[i, 0]
+
+
+@kernel
+def _solve_one(band: Floats, right: Floats) -> None:
+    """Solve for one right side (n,)."""
+    n = len(band)
+    for i in range(n):
+        for d in range(1, min(i, _BAND) + 1):
+            right[i] -= band[i, d] * right[i - d]
+        right[i] *= band[i, 0]
+    for i in range(n - 1, -1, -1):
+        for d in range(1, min(n - 1 - i, _BAND) + 1):
+            right[i] -= band[i + d, d] * right[i + d]
+        right[i] *= band[i, 0]
 
 
 @kernel
@@ -269,14 +268,14 @@ def _speed(
     vx, vy = (path[j, 0] - path[i, 0]) / h, (path[j, 1] - path[i, 1]) / h
     v = np.hypot(vx, vy)
     ex, ey = vx / max(v, 1e-9), vy / max(v, 1e-9)
-    a = np.zeros((len(band), 1))
-    a[2 * j, 0], a[2 * j + 1, 0], a[2 * i, 0], a[2 * i + 1, 0] = ex / h, ey / h, -ex / h, -ey / h
+    a = np.zeros(len(band))
+    a[2 * j], a[2 * j + 1], a[2 * i], a[2 * i + 1] = ex / h, ey / h, -ex / h, -ey / h
     by_size = np.zeros(SIZE)
     for s in range(SIZE):
         for r in (2 * i, 2 * i + 1, 2 * j, 2 * j + 1):
-            by_size[s] -= a[r, 0] * right[r, s]
-    _solve(band, a)
-    variance = (ex * (a[2 * j, 0] - a[2 * i, 0]) + ey * (a[2 * j + 1, 0] - a[2 * i + 1, 0])) / h * misfit
+            by_size[s] -= a[r] * right[r, s]
+    _solve_one(band, a)
+    variance = (ex * (a[2 * j] - a[2 * i]) + ey * (a[2 * j + 1] - a[2 * i + 1])) / h * misfit
     for s in range(SIZE):
         for r in range(SIZE):
             variance += by_size[s] * cov[s, r] * by_size[r] * misfit

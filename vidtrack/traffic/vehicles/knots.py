@@ -70,11 +70,13 @@ class Knotting:
         rest = np.empty((len(open_), 6))
         _means(self._open[open_], rest)
         self._keep(open_, rest)
-        who, t, values = (np.concatenate(column) for column in zip(*self._done, strict=True))
+        columns = list(zip(*self._done, strict=True))
         self._done.clear()
+        values, t, who = (np.concatenate(columns.pop()) for _ in range(3))  # a day of them is large: none stays twice
         order = np.lexsort((t, who))
         first = np.searchsorted(who[order], np.arange(tracks + 1))
-        return Knots(first, t[order], values[order, :4], values[order, 4])
+        values = values[order]
+        return Knots(first, t[order], values[:, :4], values[:, 4])
 
     def _keep(self, who: Ints, done: Floats) -> None:
         self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +16,8 @@ from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
 from vidtrack.traffic.vehicles.straightness import Paths, Straightness, paths_of, straightness
 
-_BATCH = 4096
-"""Tracks that are fitted at a time, which bounds the memory."""
+_BATCH, _AT_ONCE = 1024, 2
+"""Tracks that are fitted together, and how many such batches at a time: they bound the memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +62,18 @@ class Vehicles:
         knots = self._knotting.knots(tracks)
         if len(knots.t) == 0:
             return None
-        speeds, sizes, driven = np.full((3, len(t)), np.nan), [], []
-        for begin in range(0, tracks, _BATCH):
-            asked = np.flatnonzero((track >= begin) & (track < begin + _BATCH))
+        ground, order = self._ground, np.argsort(track, kind="stable")
+        first = np.searchsorted(track[order], np.arange(0, tracks + _BATCH, _BATCH))
+
+        def batch(number: int) -> tuple[_Sizes, Paths]:
+            begin, asked = number * _BATCH, order[first[number] : first[number + 1]]
             some = knots.between(begin, min(begin + _BATCH, tracks))
-            speeds[:, asked], found, paths = _fitted(self._ground, some, track[asked] - begin, t[asked])
-            driven.append(paths)
-            sizes.append(replace(found, track=found.track + begin))
+            speeds[:, asked], found, paths = _fitted(ground, some, track[asked] - begin, t[asked])
+            return replace(found, track=found.track + begin), paths
+
+        speeds = np.full((3, len(t)), np.nan)
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            sizes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
         told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
         told = _best(replace(told, track=vehicle[told.track]))
         scale = scale_of(told.information, told.vector, told.speed)
