@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -57,6 +57,12 @@ class Estimator(Protocol):
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
+
+    def only(self, rows: Ints) -> Self:
+        """A bank of its own of these rows (K,)."""
+
+    def put(self, rows: Ints, other: Self, at: Ints) -> None:
+        """Set these rows (K,) to rows `at` (K,) of another bank of this kind."""
 
 
 class Modes(NamedTuple):

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from scipy.special import logsumexp
 
+from vidtrack.arrays.rows import replaced
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
@@ -151,6 +153,20 @@ class IMMBank:
             bank.keep(rows)
         self.mode, self.hits, self.scale = self.mode[rows], self.hits[rows], self.scale[rows]
         self.x, self.P = self.x[rows], self.P[rows]
+
+    def only(self, rows: Ints) -> Self:
+        """A bank of its own of these rows (K,)."""
+        bank = copy(self)
+        bank.banks = [copy(each) for each in self.banks]
+        bank.keep(rows)
+        return bank
+
+    def put(self, rows: Ints, other: Self, at: Ints) -> None:
+        """Set these rows (K,) to rows `at` (K,) of another bank."""
+        for bank, theirs in zip(self.banks, other.banks, strict=True):
+            bank.put(rows, theirs, at)
+        for name in ("mode", "hits", "scale", "x", "P"):
+            setattr(self, name, replaced(getattr(self, name), rows, getattr(other, name), at))
 
     def _enter(self, count: int, scale: Floats) -> None:
         self.mode = np.concatenate([self.mode, np.tile(self.prior, (count, 1))])
