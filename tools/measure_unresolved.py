@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from vidtrack import formats, score
 from vidtrack.config.load import load
@@ -62,9 +63,9 @@ def outcome(scenario: str, seed: int, settings: Settings) -> Outcome:
     scores = [score.evaluate(cut(result, *part), cut(truth, *part), max_distance=NEAR_M) for part in parts]
     whole = score.evaluate(result, truth, max_distance=NEAR_M)
     by_scan = dict(steps)
-    pair = [nearest(by_scan[first - 1], seen.states[k, first - 1, :2]) for k in (0, 1)]
+    pair = nearest(by_scan[first - 1], seen.states[:, first - 1, :2])
     end = by_scan[max(by_scan)]
-    kept = pair[0] != pair[1] and all(set(pair) <= set(by_scan[scan].id) for scan in range(first, max(by_scan) + 1))
+    kept = len(pair) == 2 and all(set(pair) <= set(by_scan[scan].id) for scan in range(first, max(by_scan) + 1))
     exchanged, stated = False, np.nan
     if kept:
         place = [end.xy[end.id == one][0] for one in pair]
@@ -93,10 +94,11 @@ def cut(rows: formats.Table, first: float, last: float) -> formats.Table:
     return rows.select((rows.frame >= first) & (rows.frame <= last))
 
 
-def nearest(tracks: Tracks, xy: np.ndarray) -> int:
-    """The confirmed track nearest to a place (2,); -1: none."""
-    known = tracks.status != TENTATIVE
-    return int(tracks.id[known][np.linalg.norm(tracks.xy[known] - xy, axis=1).argmin()]) if known.any() else -1
+def nearest(tracks: Tracks, xy: np.ndarray) -> list[int]:
+    """The confirmed tracks that are together nearest to two places (2, 2), one of each; fewer if there are fewer."""
+    known = np.flatnonzero(tracks.status != TENTATIVE)
+    place, row = linear_sum_assignment(np.linalg.norm(xy[:, None] - tracks.xy[known], axis=-1))
+    return [int(one) for one in tracks.id[known[row[np.argsort(place)]]]]
 
 
 def show(name: str, found: list[Outcome]) -> None:

@@ -44,7 +44,7 @@ SLACK = 12.0
 MARGIN = 1.0
 """ln of the odds for a branch from which the pair continues with it."""
 TOGETHER = float(np.log((1 - SURE) / SURE))
-"""ln of the odds by which a pair that shares a measurement may be less likely than one that does not, as in `claims`."""
+"""ln of the odds against two targets with one measurement at which they still share it, as in `claims`."""
 ALIKE = 3
 """Scans with the same measurements after which two branches are one: they differ by the names of the targets only."""
 PAIR = np.array([0, 1])
@@ -260,8 +260,8 @@ class Doubts:
         doubt.branches = branches
 
     def _follow(
-        self, pair: tuple[int, int], number: int, rows: list[Ints], found: Association, register: Register, bank: Estimator,
-        correlations: Correlations,
+        self, pair: tuple[int, int], number: int, rows: list[Ints], found: Association, register: Register,
+        bank: Estimator, correlations: Correlations,
     ) -> None:  # fmt: skip
         """Continue a pair with a branch; the tracker's own states become a branch. Other doubts about
         these tracks end.
