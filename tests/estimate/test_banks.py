@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.fixed_gain import FixedGainBank, alpha_beta, alpha_beta_gamma, steady_prediction
-from vidtrack.estimate.imm import IMMBank
+from vidtrack.estimate.imm import USUAL, IMMBank
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.motion.acceleration import ConstantAcceleration
 from vidtrack.estimate.motion.turn import CoordinatedTurn
@@ -230,7 +230,9 @@ def test_modes_can_be_forgotten_but_not_the_kind_of_target():
     bank.update(one_to_one(2), Scan(0.0, np.full((2, 2), 9.0), np.eye(2)), POSITION)
     told = bank.mode[1].copy()
     bank.forget(np.array([0]))
-    np.testing.assert_allclose(bank.mode, [np.repeat([kind[0], 1 - kind[0]], 2) / 2, told])
+    evenly, usual = np.full(4, 0.5), np.array([0.8, 0.2, 0.5, 0.5])  # within each kind, by 20, 5, 10 and 10 s
+    unseen = np.repeat([kind[0], 1 - kind[0]], 2) * (USUAL * usual + (1 - USUAL) * evenly)
+    np.testing.assert_allclose(bank.mode, [unseen, told])
 
 
 @pytest.mark.parametrize("rates", [np.zeros((2, 2)), -np.ones((2, 2)), np.ones((3, 3))])

@@ -84,4 +84,4 @@ class Mixture(Protocol):
         """The predicted measurement of each mode; S adds R."""
 
     def forget(self, rows: Ints) -> None:
-        """Make all modes that a target of these rows may switch to equally probable."""
+        """Make the modes that a target of these rows may switch to as probable as if nothing showed them."""

@@ -23,6 +23,9 @@ from vidtrack.scan import Scan
 LEAST = 1e-9
 """Smallest probability of a mode, so that every mode can recover."""
 
+USUAL = 2 / 3
+"""Share of the usual probabilities in those of modes that nothing shows."""
+
 
 class IMMBank:
     """IMM filters, one per row (Blom and Bar-Shalom 1988).
@@ -66,7 +69,8 @@ class IMMBank:
         self.prior = 1 / self.left[:, 0] if prior is None else np.asarray(prior, float)
         self.prior = self.prior / self.prior.sum()
         together = np.linalg.matrix_power((self.rates > 0) + np.eye(r), r) > 0
-        self._evenly = together / together.sum(axis=1)
+        evenly, usual = (each / each.sum(axis=1, keepdims=True) for each in (together, together / self.left.T))
+        self._unseen = USUAL * usual + (1 - USUAL) * evenly
         self.model = models[0]
         self.banks = [KalmanBank(model) for model in models]
         self.mode = np.empty((0, r))
@@ -130,8 +134,13 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def forget(self, rows: Ints) -> None:
-        """Make all modes that a target of these rows may switch to equally probable; what kind it is stays known."""
-        self.mode[rows] = self._expected[rows] @ self._evenly
+        """Nothing shows in which of the modes that it may switch to a target of these rows is; its kind stays known.
+
+        Their probabilities are between the usual ones, in proportion to the sojourn times, and equal ones. With equal
+        ones two targets that have flown together seem to part all the time; with the usual ones which is which
+        afterwards seems to be known.
+        """
+        self.mode[rows] = self._expected[rows] @ self._unseen
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
