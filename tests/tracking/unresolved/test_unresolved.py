@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
+from vidtrack.associate.gate import LikelihoodGate
 from vidtrack.associate.hard import GNN
+from vidtrack.associate.jpda import JPDA
 from vidtrack.config.load import load
+from vidtrack.estimate.motion.velocity import ConstantVelocity
 from vidtrack.run.radar import track_plots
 from vidtrack.scan import Scan
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 from vidtrack.state import gather, restore
+from vidtrack.tracking.deferred.mht import MHT
+from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracking.unresolved.cell import PolarCell
@@ -80,6 +85,53 @@ def test_the_middle_is_followed_and_the_difference_less_and_less_known():
     np.testing.assert_allclose(tracks.xy.mean(axis=0), [190, 5000], atol=2)
     assert wide[-1] > wide[5] > wide[0]
     assert wide[-1] < 150**2
+
+
+def near(rule, plots):
+    """Tracks after scans of these plots, of two targets 40 m apart that gave one plot in each of 10 scans."""
+    run = Tracker(
+        ConstantVelocity(accel=20.0, hold_s=2.0, speed=50.0), rule,
+        picture=NoPicture(), sharing=Unresolved(PolarCell((0.0, 0.0), (150.0, 0.03))), life=LogRatio(),
+        gate=LikelihoodGate(detection_probability=None, new_density=None), clutter_density=1e-9,
+    )  # fmt: skip
+    run.add(0.0, np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0]]), np.tile(np.diag([100.0, 1, 100, 1]), (2, 1, 1)))
+    rng = np.random.default_rng(0)
+    for k in range(1, 11):
+        run.step(Scan(float(k), np.array([[10.0 * k, 5000.0]]) + rng.normal(0, 10, (1, 2)), 100 * np.eye(2)))
+    for k, offsets in enumerate(plots, 11):
+        z = np.array([[10.0 * k, 5000.0]]) + np.array(offsets, float).reshape(-1, 2)
+        tracks = run.step(Scan(float(k), z + rng.normal(0, 10, z.shape), 100 * np.eye(2)))
+    return tracks
+
+
+METHODS = [GNN(), JPDA(star=True), MHT()]
+
+
+@pytest.mark.parametrize("rule", METHODS, ids=["gnn", "jpda", "mht"])
+def test_a_false_plot_beside_the_shared_one_costs_no_track(rule):
+    tracks = near(rule, [[(0, 0), (0, 130)], *[[(0, 0)]] * 5])
+    assert tracks.id.tolist() == [1, 2]
+    assert (tracks.status == MERGED).all()
+    assert np.abs(tracks.xy - [160, 5000]).max() < 60
+
+
+@pytest.mark.parametrize("rule", METHODS, ids=["gnn", "jpda", "mht"])
+def test_a_target_that_is_missed_when_the_pair_parts_is_found_again(rule):
+    tracks = near(rule, [[(0, 90)], *[[(0, 90 + 50 * k), (0, -90 - 50 * k)] for k in range(1, 6)]])
+    old = np.isin(tracks.id, [1, 2])
+    assert old.sum() == 2
+    assert (tracks.group[old] < 0).all()
+    np.testing.assert_allclose(np.sort(tracks.xy[old][:, 1]), [4660, 5340], atol=60)
+
+
+def test_tracks_near_to_several_others_have_no_branches():
+    run = tracker()
+    x = np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0], [0.0, 10, 5000, 0]])
+    run.add(0.0, x, np.tile(np.diag([4.0, 1, 4, 1]), (3, 1, 1)))
+    for scan in scans(20):
+        tracks = run.step(scan)
+    assert tracks.id.tolist() == [1, 2, 3]
+    assert (tracks.status == MERGED).all()
 
 
 def test_a_saved_state_goes_on_as_if_it_had_not_been_saved():

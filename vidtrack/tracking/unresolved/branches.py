@@ -198,16 +198,22 @@ class Doubts:
         self, problem: Problem, pairs: Ints, rows: Ints, register: Register, bank: Estimator,
         correlations: Correlations, cell: PolarCell, dt: float,
     ) -> None:  # fmt: skip
-        """Explain a scan, dt seconds after the last; pairs (Q, 2) of the rows that are shown may be unresolved."""
+        """Explain a scan, dt seconds after the last; pairs (Q, 2) of the rows that are shown may be unresolved.
+
+        Tracks that may be unresolved from several others have no branches.
+        """
         self._problem = problem
         row_of = dict(zip(register.id[rows].tolist(), rows.tolist(), strict=True))
         doubts = {pair: doubt for pair, doubt in self.of_pair.items() if row_of.keys() >= set(pair)}
         for doubt in doubts.values():
             for branch in doubt.branches:
                 branch.predict(dt)
-        for one, other in np.sort(register.id[pairs], axis=1).tolist():
+        near = np.sort(register.id[pairs], axis=1)
+        track, count = np.unique(near, return_counts=True)
+        crowded = set(track[count > 1].tolist())
+        for one, other in near.tolist():
             doubts.setdefault((one, other), Doubt())
-        self.of_pair = doubts
+        self.of_pair = doubts = {pair: doubt for pair, doubt in doubts.items() if crowded.isdisjoint(pair)}
         if not problem.measurements:
             return
         owner = _owners(problem, rows)
