@@ -223,7 +223,7 @@ def test_rates_between_kinds_of_targets_are_kept_and_stays_are_rates_that_are_al
 def test_modes_can_be_forgotten_but_not_the_kind_of_target():
     rates = np.zeros((4, 4))
     rates[0, 1], rates[1, 0], rates[2, 3], rates[3, 2] = 0.05, 0.2, 0.1, 0.1
-    bank = IMMBank([QUIET, BRISK, QUIET, BRISK], rates=rates, prior=[0.8, 0.1, 0.05, 0.05])
+    bank = IMMBank([QUIET, BRISK, QUIET, BRISK], rates=rates, prior=[0.8, 0.1, 0.05, 0.05], kinds=[0, 0, 1, 1])
     bank.append(np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)), np.ones(2))
     bank.predict(1.0)
     kind = bank.mode[:, :2].sum(axis=1)

@@ -34,6 +34,7 @@ class IMMBank:
     stay_s  mean sojourn time [s] of each model; it is left for each other model alike
     rates   (r, r) instead of stay_s: rates [1/s] of switching from the model of a row to that of a column
     prior   (r,) probabilities of the models for new targets; None: in proportion to the sojourn times
+    kinds   (r,) number of the kind of target that each model is of; None: all are of one
 
     Models may have components beyond position and velocity. In the mixing, a component that the other model lacks
     keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
@@ -46,6 +47,7 @@ class IMMBank:
         *,
         rates: Floats | None = None,
         prior: Floats | None = None,
+        kinds: Sequence[int] | None = None,
     ) -> None:
         r = len(models)
         if r < 2 or (stay_s is not None and len(stay_s) != r):
@@ -68,7 +70,8 @@ class IMMBank:
             raise ConfigError("IMM: a model is never left; each needs a rate above zero")
         self.prior = 1 / self.left[:, 0] if prior is None else np.asarray(prior, float)
         self.prior = self.prior / self.prior.sum()
-        together = np.linalg.matrix_power((self.rates > 0) + np.eye(r), r) > 0
+        kind = np.zeros(r) if kinds is None else np.asarray(kinds)
+        together = (kind == kind[:, None]).astype(float)
         evenly, usual = (each / each.sum(axis=1, keepdims=True) for each in (together, together / self.left.T))
         self._unseen = USUAL * usual + (1 - USUAL) * evenly
         self.model = models[0]

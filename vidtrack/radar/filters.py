@@ -78,7 +78,7 @@ def _imm(model: Motion, quiet: Motion, settings: RadarSettings) -> IMMBank:
     ])  # fmt: skip
     usual = (1 - share) / (rest + turn)
     prior = np.array([usual * rest, usual * turn, share / 2, share / 2])
-    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior)
+    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior, kinds=[0, 0, 1, 1])
 
 
 def _particles(model: Motion, settings: RadarSettings, seed: int) -> ParticleBank:
