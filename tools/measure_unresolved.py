@@ -4,7 +4,8 @@
     python tools/measure_unresolved.py radar-parting --seeds 400-489 "" radar.unresolved=false
 
 Each argument after the scenario is one choice of settings, as in measure_radar.py. The stretch is from the first to the
-last scan with one plot for both. IDF1, GOSPA (order 2) and matches are within 1 km; NEES is of positions, 2 is right.
+last scan with one plot for both. IDF1, GOSPA (order 2) and matches are within 1 km. NEES is of positions, with the
+track nearest to a target in the scan, because which is which is not in the data; 2 is right.
 
 kept       runs in which the two tracks that follow the pair before the stretch are there in all its scans and after it
 switches   identity switches over the whole run, and their largest number in one run
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from vidtrack import formats, score
 from vidtrack.config.load import load
@@ -62,9 +64,9 @@ def outcome(scenario: str, seed: int, settings: Settings) -> Outcome:
     scores = [score.evaluate(cut(result, *part), cut(truth, *part), max_distance=NEAR_M) for part in parts]
     whole = score.evaluate(result, truth, max_distance=NEAR_M)
     by_scan = dict(steps)
-    pair = [nearest(by_scan[first - 1], seen.states[k, first - 1, :2]) for k in (0, 1)]
+    pair = nearest(by_scan[first - 1], seen.states[:, first - 1, :2])
     end = by_scan[max(by_scan)]
-    kept = pair[0] != pair[1] and all(set(pair) <= set(by_scan[scan].id) for scan in range(first, max(by_scan) + 1))
+    kept = len(pair) == 2 and all(set(pair) <= set(by_scan[scan].id) for scan in range(first, max(by_scan) + 1))
     exchanged, stated = False, np.nan
     if kept:
         place = [end.xy[end.id == one][0] for one in pair]
@@ -72,7 +74,7 @@ def outcome(scenario: str, seed: int, settings: Settings) -> Outcome:
         straight, crossed = (sum(np.linalg.norm(place[k] - there[k ^ x]) for k in (0, 1)) for x in (0, 1))
         exchanged, stated = bool(crossed < straight), float(end.exchange[end.id == pair[0]][0])
     return Outcome(
-        [float(one["idf1"]) for one in scores], [float(one.get("nees", np.nan)) for one in scores],
+        [float(one["idf1"]) for one in scores], [nees(cut(result, *part), truth) for part in parts],
         float(whole["gospa"]), float(whole["switches"]), kept, exchanged, stated,
     )  # fmt: skip
 
@@ -93,10 +95,25 @@ def cut(rows: formats.Table, first: float, last: float) -> formats.Table:
     return rows.select((rows.frame >= first) & (rows.frame <= last))
 
 
-def nearest(tracks: Tracks, xy: np.ndarray) -> int:
-    """The confirmed track nearest to a place (2,); -1: none."""
-    known = tracks.status != TENTATIVE
-    return int(tracks.id[known][np.linalg.norm(tracks.xy[known] - xy, axis=1).argmin()]) if known.any() else -1
+def nees(result: formats.Table, truth: formats.Table) -> float:
+    """Mean of the normalised squared errors of positions; tracks and targets are matched scan by scan."""
+    found: list[np.ndarray] = []
+    for scan in np.unique(result.frame):
+        own, there = result.select(result.frame == scan), truth.xy[truth.frame == scan][:, :2]
+        off = there[:, None] - own.xy
+        target, track = linear_sum_assignment(np.linalg.norm(off, axis=-1))
+        off = off[target, track]
+        near = np.linalg.norm(off, axis=1) < NEAR_M
+        assert own.cov is not None
+        found.append(np.einsum("ni,ni->n", off, np.linalg.solve(own.cov[track], off[..., None])[..., 0])[near])
+    return float(np.concatenate(found).mean()) if found else np.nan
+
+
+def nearest(tracks: Tracks, xy: np.ndarray) -> list[int]:
+    """The confirmed tracks that are together nearest to two places (2, 2), one of each; fewer if there are fewer."""
+    known = np.flatnonzero(tracks.status != TENTATIVE)
+    place, row = linear_sum_assignment(np.linalg.norm(xy[:, None] - tracks.xy[known], axis=-1))
+    return [int(one) for one in tracks.id[known[row[np.argsort(place)]]]]
 
 
 def show(name: str, found: list[Outcome]) -> None:

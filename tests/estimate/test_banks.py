@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.fixed_gain import FixedGainBank, alpha_beta, alpha_beta_gamma, steady_prediction
-from vidtrack.estimate.imm import IMMBank
+from vidtrack.estimate.imm import USUAL, IMMBank
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.estimate.motion.acceleration import ConstantAcceleration
 from vidtrack.estimate.motion.turn import CoordinatedTurn
@@ -223,14 +223,16 @@ def test_rates_between_kinds_of_targets_are_kept_and_stays_are_rates_that_are_al
 def test_modes_can_be_forgotten_but_not_the_kind_of_target():
     rates = np.zeros((4, 4))
     rates[0, 1], rates[1, 0], rates[2, 3], rates[3, 2] = 0.05, 0.2, 0.1, 0.1
-    bank = IMMBank([QUIET, BRISK, QUIET, BRISK], rates=rates, prior=[0.8, 0.1, 0.05, 0.05])
+    bank = IMMBank([QUIET, BRISK, QUIET, BRISK], rates=rates, prior=[0.8, 0.1, 0.05, 0.05], kinds=[0, 0, 1, 1])
     bank.append(np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)), np.ones(2))
     bank.predict(1.0)
     kind = bank.mode[:, :2].sum(axis=1)
     bank.update(one_to_one(2), Scan(0.0, np.full((2, 2), 9.0), np.eye(2)), POSITION)
     told = bank.mode[1].copy()
     bank.forget(np.array([0]))
-    np.testing.assert_allclose(bank.mode, [np.repeat([kind[0], 1 - kind[0]], 2) / 2, told])
+    evenly, usual = np.full(4, 0.5), np.array([0.8, 0.2, 0.5, 0.5])  # within each kind, by 20, 5, 10 and 10 s
+    unseen = np.repeat([kind[0], 1 - kind[0]], 2) * (USUAL * usual + (1 - USUAL) * evenly)
+    np.testing.assert_allclose(bank.mode, [unseen, told])
 
 
 @pytest.mark.parametrize("rates", [np.zeros((2, 2)), -np.ones((2, 2)), np.ones((3, 3))])

@@ -7,7 +7,7 @@ from plot_files import HEADER, write
 from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.plots import read_plots
-from vidtrack.radar.scans import clutter_density, measurements, surveyed
+from vidtrack.radar.scans import clutter_density, extent, measurements, surveyed
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
 
 
@@ -80,6 +80,24 @@ def test_a_sector_to_the_south_is_no_wider_than_one_to_the_north(tmp_path):
     north, south = map(surveyed, found)
     assert south == pytest.approx(north)
     assert north > 190 * np.radians(19)
+
+
+@pytest.mark.parametrize("middle", [0.0, 90.0, 180.0])
+def test_what_is_surveyed_is_a_sector_that_holds_the_plots(tmp_path, middle):
+    rows = [f"{k},{k},{9000 + 10 * k},{middle + k - 10},5,0.1" for k in range(20)]
+    found = read(tmp_path, *rows, estimator="ekf")
+    low, high = extent(found)
+    assert low[0] >= 0
+    assert high[1] - low[1] < 2 * np.pi
+    off = (found.z[:, 1] - (low[1] + high[1]) / 2 + np.pi) % (2 * np.pi) - np.pi
+    assert np.abs(off).max() < (high[1] - low[1]) / 2
+    assert surveyed(found) == pytest.approx((high - low).prod())
+
+
+def test_near_the_radar_a_full_turn_is_surveyed_at_most(tmp_path):
+    low, high = extent(read(tmp_path, *(f"{k},{4 * k},{50 + k},{18 * k},5,0.1" for k in range(20)), estimator="ekf"))
+    assert high[1] - low[1] == pytest.approx(2 * np.pi)
+    assert low[0] == 0.0
 
 
 def test_a_single_plot_has_a_surveyed_space(tmp_path):

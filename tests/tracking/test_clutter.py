@@ -100,6 +100,38 @@ def test_the_density_of_a_feed_is_right_when_its_first_scans_were_of_a_corner(wh
     assert own.clutter_density == pytest.approx(1 / SIDE**2, rel=0.25)
 
 
+def polar_clutter(count, middle, width, nearest=2e3, farthest=6e4, seed=0):
+    """Ranges, and azimuths in -pi..pi of a sector."""
+    rng = np.random.default_rng(seed)
+    azimuth = middle + width * (rng.random(count) - 0.5)
+    return np.column_stack([rng.uniform(nearest, farthest, count), (azimuth + np.pi) % (2 * np.pi) - np.pi])
+
+
+@pytest.mark.parametrize("middle", [0.0, np.pi / 2, np.pi, -np.pi])
+def test_the_density_in_a_sector_is_the_same_wherever_it_looks(middle):
+    width, z = np.pi / 2, polar_clutter(20_000, middle, np.pi / 2)
+    box = np.array([2e3, middle - width / 2]), np.array([6e4, middle + width / 2])
+    learnt = ClutterMap(*box, polar=True)
+    learnt.reach(z)
+    learnt.learn(z, np.ones(len(z)))
+    assert learnt.grown == 1.0
+    assert learnt.at(z).mean() == pytest.approx(1.0, abs=0.1)
+    half = (z[:, 1] - middle + np.pi) % (2 * np.pi) - np.pi < 0
+    learnt.learn(z[half], np.full(half.sum(), 3.0))
+    assert learnt.at(z[half]).mean() > 2 * learnt.at(z[~half]).mean()
+
+
+@pytest.mark.parametrize("middle", [0.0, np.pi])
+def test_a_polar_box_grows_to_a_full_turn_and_to_no_range_below_zero(middle):
+    box = EvenBox(np.array([500.0, middle - 0.5]), np.array([3000.0, middle + 0.5]), polar=True)
+    z = polar_clutter(200, middle, 2 * np.pi, nearest=0.0, farthest=4000.0)
+    for _ in range(100):
+        box.reach(z)
+    assert box.low[0] == 0.0
+    assert 0.98 * 2 * np.pi < box.high[1] - box.low[1] <= 2 * np.pi * (1 + 1e-12)
+    assert box.grown == pytest.approx((box.high - box.low).prod() / 2500)
+
+
 def test_it_is_even_where_nothing_is_known():
     np.testing.assert_array_equal(new_map().density, np.ones((32, 32)))
 

@@ -31,6 +31,13 @@ def no_index(rows: int) -> Ints:
     return none
 
 
+def replaced(value: np.ndarray, rows: Ints, other: np.ndarray, at: Ints) -> np.ndarray:
+    """A copy of values (T, ...) that has the values `at` (K,) of another array in these rows (K,)."""
+    copy = value.copy()
+    copy[rows] = other[at]
+    return copy
+
+
 @kernel
 def starts(row: Ints, rows: int) -> Ints:
     """(rows + 1,) index of each row's first entry in the sorted `row` (B,); the last element is B."""

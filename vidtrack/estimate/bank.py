@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -58,6 +58,12 @@ class Estimator(Protocol):
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
 
+    def only(self, rows: Ints) -> Self:
+        """A bank of its own of these rows (K,)."""
+
+    def put(self, rows: Ints, other: Self, at: Ints) -> None:
+        """Set these rows (K,) to rows `at` (K,) of another bank of this kind."""
+
 
 class Modes(NamedTuple):
     """Predicted measurements as Gaussian mixtures.
@@ -78,4 +84,4 @@ class Mixture(Protocol):
         """The predicted measurement of each mode; S adds R."""
 
     def forget(self, rows: Ints) -> None:
-        """Make all modes that a target of these rows may switch to equally probable."""
+        """Make the modes that a target of these rows may switch to as probable as if nothing showed them."""

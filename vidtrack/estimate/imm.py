@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from scipy.special import logsumexp
 
+from vidtrack.arrays.rows import replaced
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
@@ -21,6 +23,9 @@ from vidtrack.scan import Scan
 LEAST = 1e-9
 """Smallest probability of a mode, so that every mode can recover."""
 
+USUAL = 2 / 3
+"""Share of the usual probabilities in those of modes that nothing shows."""
+
 
 class IMMBank:
     """IMM filters, one per row (Blom and Bar-Shalom 1988).
@@ -29,6 +34,7 @@ class IMMBank:
     stay_s  mean sojourn time [s] of each model; it is left for each other model alike
     rates   (r, r) instead of stay_s: rates [1/s] of switching from the model of a row to that of a column
     prior   (r,) probabilities of the models for new targets; None: in proportion to the sojourn times
+    kinds   (r,) number of the kind of target that each model is of; None: all are of one
 
     Models may have components beyond position and velocity. In the mixing, a component that the other model lacks
     keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
@@ -41,6 +47,7 @@ class IMMBank:
         *,
         rates: Floats | None = None,
         prior: Floats | None = None,
+        kinds: Sequence[int] | None = None,
     ) -> None:
         r = len(models)
         if r < 2 or (stay_s is not None and len(stay_s) != r):
@@ -63,8 +70,10 @@ class IMMBank:
             raise ConfigError("IMM: a model is never left; each needs a rate above zero")
         self.prior = 1 / self.left[:, 0] if prior is None else np.asarray(prior, float)
         self.prior = self.prior / self.prior.sum()
-        together = np.linalg.matrix_power((self.rates > 0) + np.eye(r), r) > 0
-        self._evenly = together / together.sum(axis=1)
+        kind = np.zeros(r) if kinds is None else np.asarray(kinds)
+        together = (kind == kind[:, None]).astype(float)
+        evenly, usual = (each / each.sum(axis=1, keepdims=True) for each in (together, together / self.left.T))
+        self._unseen = USUAL * usual + (1 - USUAL) * evenly
         self.model = models[0]
         self.banks = [KalmanBank(model) for model in models]
         self.mode = np.empty((0, r))
@@ -128,8 +137,13 @@ class IMMBank:
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def forget(self, rows: Ints) -> None:
-        """Make all modes that a target of these rows may switch to equally probable; what kind it is stays known."""
-        self.mode[rows] = self._expected[rows] @ self._evenly
+        """Nothing shows in which of the modes that it may switch to a target of these rows is; its kind stays known.
+
+        Their probabilities are between the usual ones, in proportion to the sojourn times, and equal ones. With equal
+        ones two targets that have flown together seem to part all the time; with the usual ones which is which
+        afterwards seems to be known.
+        """
+        self.mode[rows] = self._expected[rows] @ self._unseen
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
@@ -151,6 +165,20 @@ class IMMBank:
             bank.keep(rows)
         self.mode, self.hits, self.scale = self.mode[rows], self.hits[rows], self.scale[rows]
         self.x, self.P = self.x[rows], self.P[rows]
+
+    def only(self, rows: Ints) -> Self:
+        """A bank of its own of these rows (K,)."""
+        bank = copy(self)
+        bank.banks = [copy(each) for each in self.banks]
+        bank.keep(rows)
+        return bank
+
+    def put(self, rows: Ints, other: Self, at: Ints) -> None:
+        """Set these rows (K,) to rows `at` (K,) of another bank."""
+        for bank, theirs in zip(self.banks, other.banks, strict=True):
+            bank.put(rows, theirs, at)
+        for name in ("mode", "hits", "scale", "x", "P"):
+            setattr(self, name, replaced(getattr(self, name), rows, getattr(other, name), at))
 
     def _enter(self, count: int, scale: Floats) -> None:
         self.mode = np.concatenate([self.mode, np.tile(self.prior, (count, 1))])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.rows import replaced
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.decision import Decision
 from vidtrack.estimate.kernels import mixture_update, projection, propagation
 from vidtrack.estimate.motion.model import Motion
@@ -108,6 +110,17 @@ class KalmanBank:
         rows = np.arange(len(self))[rows]
         for name in self.STATE:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
+
+    def only(self, rows: Ints) -> Self:
+        """A bank of its own of these rows (K,)."""
+        bank = copy(self)
+        bank.keep(rows)
+        return bank
+
+    def put(self, rows: Ints, other: Self, at: Ints) -> None:
+        """Set these rows (K,) to rows `at` (K,) of another bank."""
+        for name in self.STATE:
+            setattr(self, name, replaced(getattr(self, name), rows, getattr(other, name), at))
 
 
 @lru_cache

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from copy import copy
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from vidtrack.arrays.rows import starts
+from vidtrack.arrays.rows import replaced, starts
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.decision import Decision
 from vidtrack.errors import ConfigError
@@ -151,6 +152,19 @@ class ParticleBank:
         self._moments = self.x[rows], self.P[rows]
         self.particles, self.log_weight = self.particles[rows], self.log_weight[rows]
         self.hits, self.scale = self.hits[rows], self.scale[rows]
+
+    def only(self, rows: Ints) -> Self:
+        """A bank of its own of these rows (K,), with random numbers of its own."""
+        bank = copy(self)
+        bank.rng = self.rng.spawn(1)[0]
+        bank.keep(rows)
+        return bank
+
+    def put(self, rows: Ints, other: Self, at: Ints) -> None:
+        """Set these rows (K,) to rows `at` (K,) of another bank."""
+        for name in ("particles", "log_weight", "hits", "scale"):
+            setattr(self, name, replaced(getattr(self, name), rows, getattr(other, name), at))
+        self._moments = None
 
     def _chosen(
         self,

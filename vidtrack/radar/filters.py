@@ -24,7 +24,7 @@ from vidtrack.radar.scans import Measurements
 
 AGILE_S = 20.0
 """s; mean time that each mode of an agile target lasts."""
-HARDER = 1.5
+HARDER = 3.0
 """Acceleration of agile targets, over that of others."""
 BECOMES_S, REMAINS_S = 5000.0, 1000.0
 """s; mean times after which a target becomes agile, and after which it is so no longer."""
@@ -78,7 +78,7 @@ def _imm(model: Motion, quiet: Motion, settings: RadarSettings) -> IMMBank:
     ])  # fmt: skip
     usual = (1 - share) / (rest + turn)
     prior = np.array([usual * rest, usual * turn, share / 2, share / 2])
-    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior)
+    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior, kinds=[0, 0, 1, 1])
 
 
 def _particles(model: Motion, settings: RadarSettings, seed: int) -> ParticleBank:

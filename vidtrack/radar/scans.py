@@ -133,22 +133,25 @@ def clutter_density(found: Measurements) -> float:
 
 
 def surveyed(found: Measurements) -> float:
-    """Volume of the measurement space: the bounding box of all plots, plus a margin that targets cross in a few scans.
-
-    Without the margin the plots of a single target would fill the space, and appear as dense clutter.
-    """
-    sides = np.ptp(found.z, axis=0)
-    for angle in found.sensor.angles:
-        sides[angle] = _sector(found.z[:, angle])
-    return float((sides + _margin(found)).prod())
+    """Volume of the measurement space that is surveyed."""
+    low, high = extent(found)
+    return float((high - low).prod())
 
 
 def extent(found: Measurements) -> tuple[Floats, Floats]:
-    """Lowest and highest (2,) values of the first two axes of the measurement space that is surveyed; angles: all."""
-    margin = _margin(found)[:2] / 2
-    low, high = found.z[:, :2].min(axis=0) - margin, found.z[:, :2].max(axis=0) + margin
-    for angle in set(found.sensor.angles) & {0, 1}:
-        low[angle], high[angle] = -np.pi, np.pi
+    """Lowest and highest (m,) measurements of what is surveyed: the bounding box of all plots, and around it a margin
+    that targets cross in a few scans. Without it the plots of a single target would fill the space, and appear as
+    dense clutter.
+
+    Of azimuths it is the smallest sector, from -pi..pi on, and at most a full turn; ranges begin at zero.
+    """
+    margin = _margin(found) / 2
+    low, high = found.z.min(axis=0) - margin, found.z.max(axis=0) + margin
+    for angle in found.sensor.angles:
+        first, width = _sector(found.z[:, angle])
+        side = min(width + 2 * margin[angle], 2 * np.pi)
+        low[angle], high[angle] = first + (width - side) / 2, first + (width + side) / 2
+        low[0] = max(low[0], 0.0)
     return low, high
 
 
@@ -162,7 +165,9 @@ def _margin(found: Measurements) -> Floats:
     return margin + np.sqrt(12 * np.diagonal(found.R, axis1=1, axis2=2).mean(axis=0))
 
 
-def _sector(angle: Floats) -> float:
-    """The smallest sector that contains all angles (N,) in -pi..pi: the circle minus the widest gap."""
+def _sector(angle: Floats) -> tuple[float, float]:
+    """Where the smallest sector with all angles (N,) begins, and its width: the circle without the widest gap."""
     turn = np.sort(angle)
-    return float(2 * np.pi - np.diff(turn, append=turn[0] + 2 * np.pi).max())
+    gap = np.diff(turn, append=turn[0] + 2 * np.pi)
+    widest = int(gap.argmax())
+    return float(turn[(widest + 1) % len(turn)]), float(2 * np.pi - gap[widest])

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
 from vidtrack.associate.redundancy import combined
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
@@ -21,6 +23,9 @@ from vidtrack.run.radar import build_point_tracker, radar_sinks, rates
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.tracking.station import Station
 from vidtrack.tracking.tracker import Tracker
+
+AHEAD_S = 60.0
+"""s; so much of the recordings is tracked ahead, so that the first scans come without the biases, too."""
 
 
 def run_network(
@@ -46,6 +51,7 @@ def network_pipeline(
     origin = _origin(radars, settings.radar)
     network = Network(read_feeds(paths, radars, settings.radar))
     refuse_link(settings.output, "radar runs")
+    learn_ahead(settings, network, seed)
     tracker = build_network_tracker(settings, network, explain=extras.explain, seed=seed)
     account = {
         "plots": sum(len(feed.plots) for feed in network.feeds),
@@ -92,6 +98,21 @@ def _origin(radars: Radars, settings: RadarSettings) -> tuple[float, float, floa
             f"{radars.path} has latitudes, so --radar-position (radar.geodetic) has no effect; leave one of them out"
         )
     return radars.origin or settings.geodetic
+
+
+def learn_ahead(settings: Settings, network: Network, seed: int = 0) -> None:
+    """Learn the biases from the first AHEAD_S of the recordings with a tracker of its own; the scans come once more."""
+    if not network.registration.prior.any():
+        return
+    tracker = build_network_tracker(settings, network, seed=seed)
+    end_s, last_s = np.inf, -np.inf
+    for turn in network:
+        end_s = min(end_s, turn.span.t + AHEAD_S)
+        if turn.span.t > end_s:
+            break
+        network.learn(turn, tracker.step(network.scan(turn)))
+        last_s = turn.span.t
+    network.learnt_until(last_s)
 
 
 def network_steps(network: Network, tracker: Tracker, redundant: float | None = None) -> Iterator[Step]:

@@ -154,8 +154,8 @@ def rates(radar: RadarSettings, found: Measurements, detection: float | None) ->
     """Detection probability and clutter density of the radar that made these measurements."""
     where: EvenClutter | None = None
     if radar.clutter_density is None:
-        box = extent(found)
-        where = ClutterMap(*box, polar=bool(found.sensor.angles)) if radar.clutter_map else EvenBox(*box)
+        low, high = (corner[:2] for corner in extent(found))
+        where = (ClutterMap if radar.clutter_map else EvenBox)(low, high, polar=bool(found.sensor.angles))
     return Rates(detection, radar.clutter_density, surveyed(found), where)
 
 

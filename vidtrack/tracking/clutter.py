@@ -51,13 +51,15 @@ class EvenBox(EvenClutter):
     when more than `_FEW` of the remembered measurements, and a share of more than `_RARE`, have been beyond it.
 
     low, high  (2,) corners of the box, on the first two axes of the measurements
+    polar      whether these are range and azimuth [rad], and not positions: the box is part of a ring
     """
 
     STATE: tuple[str, ...] = ("low", "high", "grown", "beyond", "seen")
     ADDED: ClassVar = {"beyond": lambda box: np.zeros((2, 2)), "seen": lambda box: 0.0}
 
-    def __init__(self, low: Floats, high: Floats) -> None:
+    def __init__(self, low: Floats, high: Floats, polar: bool = False) -> None:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
+        self.polar = polar
         self.grown = 1.0
         self.beyond: Floats = np.zeros((2, 2))
         """Measurements remembered below the box and above it (rows), along each axis, since its side moved."""
@@ -66,19 +68,29 @@ class EvenBox(EvenClutter):
 
     def reach(self, z: Floats) -> None:
         """Note which of measurements (N, m) are outside, and move the sides that too many have been beyond."""
-        side, place = self.high - self.low, z[:, :2]
+        side, place = self.high - self.low, self._places(z)
         self.seen += len(z)
         self.beyond += [(place < self.low).sum(axis=0), (place > self.high).sum(axis=0)]
         below, above = move = self.beyond > max(_FEW, _RARE * self.seen)
         self.beyond[move] = 0.0
         self.low = np.where(below, self.low - _STEP * side, self.low)
         self.high = np.where(above, self.high + _STEP * side, self.high)
+        if self.polar:
+            over = max(0.0, self.high[1] - self.low[1] - 2 * np.pi) / 2
+            self.low, self.high = np.array([max(self.low[0], 0.0), self.low[1] + over]), self.high - [0.0, over]
         self.grown *= float(((self.high - self.low) / side).prod())
 
     def forget(self, fade: float) -> None:
         """Keep this share of what is remembered."""
         self.beyond *= fade
         self.seen *= fade
+
+    def _places(self, z: Floats) -> Floats:
+        """(N, 2) measurements (N, m) on the axes of the box; azimuths within half a turn of its middle."""
+        if not self.polar:
+            return z[:, :2]
+        middle = (self.low[1] + self.high[1]) / 2
+        return np.column_stack([z[:, 0], middle + (z[:, 1] - middle + np.pi) % (2 * np.pi) - np.pi])
 
 
 class ClutterMap(EvenBox):
@@ -89,16 +101,12 @@ class ClutterMap(EvenBox):
     with the weight of 16 k^2 measurements, evenly: where they are few, a place has the density of what surrounds it.
     With k^2 the density has no steps that the data do not show (M. Lavine, "Some aspects of Polya tree distributions
     for statistical modelling", Annals of Statistics 20(3), 1992).
-
-    low, high  (2,) corners of the box, on the first two axes of the measurements
-    polar      whether these are range and azimuth, and not positions
     """
 
     STATE = ("count", *EvenBox.STATE)
 
     def __init__(self, low: Floats, high: Floats, polar: bool = False) -> None:
-        super().__init__(low, high)
-        self.polar = polar
+        super().__init__(low, high, polar)
         self.count: Floats = np.zeros((2**_LEVELS, 2**_LEVELS))
         """False measurements remembered in each cell."""
 
@@ -138,6 +146,6 @@ class ClutterMap(EvenBox):
         np.add.at(self.count, self._cells(z), false)
 
     def _cells(self, z: Floats) -> tuple[Ints, Ints]:
-        share = (z[:, :2] - self.low) / (self.high - self.low)
+        share = (self._places(z) - self.low) / (self.high - self.low)
         row, column = np.clip((share * len(self.count)).astype(np.int64), 0, len(self.count) - 1).T
         return row, column

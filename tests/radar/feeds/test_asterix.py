@@ -161,6 +161,24 @@ def test_a_recording_goes_on_after_bytes_that_are_no_block(tmp_path):
     assert len(seconds(path)) == 8
 
 
+@pytest.mark.parametrize(
+    "trash", [b"HTTP/1.1 200 OK\r\n\r\n", b"\x30\xff\xff" * 9, bytes(1000), b"\x30\0\5ab" * 3 + b"\7"]
+)
+def test_what_is_before_the_first_block_is_left_out_and_told(scene, tmp_path, caplog, trash):
+    clean = (scene[0] / "radar.ast").read_bytes()
+    path = recorded(tmp_path, trash, clean)
+    assert is_feed(path)
+    losses = Losses()
+    assert len(read_messages(path, losses)) == len(read_messages(scene[0] / "radar.ast", Losses()))
+    assert losses.damaged >= 1
+
+
+def test_other_binary_files_are_no_recordings(tmp_path):
+    rng = np.random.default_rng(0)
+    for k in range(5):
+        assert not is_feed(recorded(tmp_path, rng.bytes(200_000), name=f"{k}.bin"))
+
+
 def test_truncated_records_never_crash(scene):
     folder, _ = scene
     content = (folder / "radar.ast").read_bytes()[:120]

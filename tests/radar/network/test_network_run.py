@@ -15,7 +15,7 @@ from vidtrack.formats import read
 from vidtrack.radar.network.network import Network, read_feeds
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.fuse import common_plane, run_fusion
-from vidtrack.run.network import run_network
+from vidtrack.run.network import AHEAD_S, build_network_tracker, learn_ahead, run_network
 from vidtrack.simulate.radar_network import simulate_network, write_network
 
 
@@ -57,7 +57,26 @@ def test_one_degree_of_bias_leaves_one_track_a_target(biased):
     assert found["south"]["bias_azimuth_observed"] is True
     rows = list(csv.DictReader((biased / "run" / "registration.csv").open()))
     assert len(rows) == 2 * 120
-    assert float(rows[0]["bias_azimuth_sigma_deg"]) == pytest.approx(1.0, rel=1e-3)
+    assert float(rows[0]["bias_azimuth_sigma_deg"]) < 0.2  # learnt ahead of the first scan
+    sigma = [float(row["bias_azimuth_sigma_deg"]) for row in rows if row["radar"] == "south"]
+    assert sigma[0] == sigma[29] > sigma[-1]  # what was learnt ahead is not learnt again
+
+
+def test_only_the_first_minute_is_learnt_ahead(biased):
+    paths = [str(biased / "north.csv"), str(biased / "south.csv")]
+    network = Network(read_feeds(paths, read_radars(biased / "radars.toml"), load().radar))
+    assert network.registration.observed()[:, 1].sum() == 0
+    learn_ahead(load(), network)
+    bias, used = network.registration.bias.copy(), network.registration.used
+    assert used > 0
+    turns = list(network)
+    first = turns[0].span.t
+    tracker = build_network_tracker(load(), network)
+    for turn in turns:
+        network.learn(turn, tracker.step(network.scan(turn)))
+        if turn.span.t <= first + AHEAD_S:
+            np.testing.assert_array_equal(network.registration.bias, bias)
+    assert network.registration.used > used
 
 
 def test_a_known_bias_of_none_is_not_estimated(biased):

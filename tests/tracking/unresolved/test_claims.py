@@ -33,7 +33,7 @@ def decided(x, P, plots, cell=None, clutter=1e-9, detection=0.9):
     placed = Placed(scan.z, scan.R, x, P)
     every = np.arange(len(x))
     cell = cell or PolarCell((0.0, 0.0), (150.0, np.radians(1.5)))
-    return claims(problem, every, every + 1, np.zeros(len(x), int), placed, Correlations(), cell).tolist()
+    return claims(problem, every, every + 1, np.zeros(len(x), int), placed, Correlations(), cell)[0].tolist()
 
 
 def test_one_plot_between_two_near_targets_is_of_both_and_two_plots_are_of_one_each():

@@ -82,6 +82,34 @@ def test_the_middle_is_followed_and_the_difference_less_and_less_known():
     assert wide[-1] < 150**2
 
 
+@pytest.mark.parametrize("seed", [709, 717, 738], ids=["parted too early", "missed as they part", "parted late"])
+def test_what_later_scans_explain_otherwise_costs_no_track(tmp_path, seed):
+    seen = simulate_radar("radar-parting", seed)
+    write_radar(seen, tmp_path)
+    together = np.flatnonzero(seen.merged[0])
+    snapshots = [tracks for _, tracks in track_plots(tmp_path / "plots.csv")]
+    early = snapshots[together[0] - 2]
+    off = np.linalg.norm(early.xy[:, None] - seen.states[:, together[0] - 2, :2], axis=2).min(axis=1)
+    pair = early.id[(early.status != TENTATIVE) & (off < 1000)]
+    assert len(pair) == 2
+    for scan in range(together[0], len(snapshots)):
+        assert set(pair) <= set(snapshots[scan].id), scan
+    tracks = snapshots[-1]
+    off = np.linalg.norm(tracks.xy[np.isin(tracks.id, pair)][:, None] - seen.states[:, -1, :2], axis=2)
+    assert (off.min(axis=0) < 500).all()
+    assert (off.min(axis=1) < 500).all()
+
+
+def test_tracks_near_to_several_others_have_no_branches():
+    run = tracker()
+    x = np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0], [0.0, 10, 5000, 0]])
+    run.add(0.0, x, np.tile(np.diag([4.0, 1, 4, 1]), (3, 1, 1)))
+    for scan in scans(20):
+        tracks = run.step(scan)
+    assert tracks.id.tolist() == [1, 2, 3]
+    assert (tracks.status == MERGED).all()
+
+
 def test_a_saved_state_goes_on_as_if_it_had_not_been_saved():
     first, second = tracker(), tracker()
     steps = list(scans(14))

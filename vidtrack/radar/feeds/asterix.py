@@ -7,6 +7,7 @@ Exchange", parts 2a, 2b, 4, 9, 12.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from math import pi
 
@@ -28,13 +29,42 @@ Place = dict[str, int]
 def looks_like(content: bytes, at: int = 0) -> bool:
     """Whether data blocks begin at `at`: one that ends with the content, or at least two in a row."""
     blocks, at = 0, _timed(content, at)
-    while blocks < _ENOUGH and at < len(content):
-        size = int.from_bytes(content[at + 1 : at + _HEAD], "big")
-        if content[at] not in (*READ, *BESIDE) or not _HEAD < size <= len(content) - at:
-            break
+    while blocks < _ENOUGH and _is_block(content, at):
         blocks += 1
-        at = _timed(content, at + size)
+        at = _following(content, at)
     return blocks > 1 or (blocks == 1 and at == len(content))
+
+
+def first_block(content: bytes, farthest: int) -> int | None:
+    """Where sound blocks begin, no farther than so many octets; None: nowhere.
+
+    Several of them follow each other, or the only one ends with the content, and those that are read have no damage.
+    """
+    losses = Losses()
+    decoder = Decoder(losses)
+    for first in range(min(farthest, len(content))):
+        read, at = 0, _timed(content, first)
+        losses.damaged = 0
+        while read < _ENOUGH and not losses.damaged and _is_block(content, at):
+            after = _following(content, at)
+            if content[at] in READ:
+                read += 1
+                deque(decoder.messages(content[at:after]), maxlen=0)
+            at = after
+        if not losses.damaged and (read == _ENOUGH or (read and at == len(content))):
+            return first
+    return None
+
+
+def _is_block(content: bytes, at: int) -> bool:
+    """Whether a whole data block of a known category may be at `at`."""
+    size = int.from_bytes(content[at + 1 : at + _HEAD], "big")
+    return at < len(content) and content[at] in (*READ, *BESIDE) and _HEAD < size <= len(content) - at
+
+
+def _following(content: bytes, at: int) -> int:
+    """The place after the data block at `at`."""
+    return _timed(content, at + int.from_bytes(content[at + 1 : at + _HEAD], "big"))
 
 
 class Decoder:

@@ -7,10 +7,12 @@ pcap and pcapng: the Internet drafts draft-ietf-opsawg-pcap and draft-ietf-opsaw
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
+from vidtrack.arrays.types import Ints, Mask
 from vidtrack.radar.feeds.messages import Losses
 
 _PCAP = {b"\xd4\xc3\xb2\xa1": "<", b"\x4d\x3c\xb2\xa1": "<", b"\xa1\xb2\xc3\xd4": ">", b"\xa1\xb2\x3c\x4d": ">"}
@@ -58,6 +60,7 @@ def _pcap(content: bytes, order: str, losses: Losses) -> Iterator[tuple[int, byt
         return
     link = struct.unpack_from(f"{order}I", content, 20)[0] & 0xFFFF
     head = struct.Struct(f"{order}4I")
+    places = _Places(partial(_packets, content, order), len(content))
     at = 24
     while at + _PCAP_HEAD <= len(content):
         _, fraction, size, whole = head.unpack_from(content, at)
@@ -66,31 +69,63 @@ def _pcap(content: bytes, order: str, losses: Losses) -> Iterator[tuple[int, byt
             at += _PCAP_HEAD + size
         else:
             losses.damaged += 1
-            at = _next_packet(content, head, at + 1)
+            at = places.after(at + 1)
 
 
-def _next_packet(content: bytes, head: struct.Struct, at: int) -> int:
-    """Where the next packet is after which there is another, or the end; the end if there is none."""
-    while at + _PCAP_HEAD <= len(content):
-        part = np.frombuffer(content, np.uint8, min(_SEARCHED + _PCAP_HEAD - 1, len(content) - at), at)
-        word = np.lib.stride_tricks.sliding_window_view(part, 4).copy().view(f"{head.format[0]}u4")[:, 0]
-        fraction, size, whole = (word[k : len(word) - 12 + k] for k in (4, 8, 12))
-        sound = (fraction < _PARTS) & (size > 0) & (size <= whole) & (whole <= _LONGEST)
-        for start in (at + np.flatnonzero(sound)).tolist():
-            after = start + _PCAP_HEAD + head.unpack_from(content, start)[2]
-            if after == len(content):
-                return int(start)
-            if after + _PCAP_HEAD <= len(content):
-                _, fraction, size, whole = head.unpack_from(content, after)
-                if fraction < _PARTS and size <= whole <= _LONGEST:
-                    return int(start)
-        at += len(sound)
-    return len(content)
+class _Places:
+    """Where sound headers are. Each part of the content is searched once, however often it goes on after damage.
+
+    sound  gives the places (N,), ascending, from one octet to before another
+    end    place that is said when there is no more
+    """
+
+    def __init__(self, sound: Callable[[int, int], Ints], end: int) -> None:
+        self._sound = sound
+        self._end = end
+        self._part = -1
+        self._found = np.empty(0, np.int64)
+
+    def after(self, at: int) -> int:
+        """The first place from `at` on."""
+        while at < self._end:
+            part = at // _SEARCHED
+            if part != self._part:
+                self._part = part
+                self._found = self._sound(part * _SEARCHED, min((part + 1) * _SEARCHED, self._end))
+            later = self._found[np.searchsorted(self._found, at) :]
+            if len(later):
+                return int(later[0])
+            at = (part + 1) * _SEARCHED
+        return self._end
+
+
+def _packets(content: bytes, order: str, first: int, last: int) -> Ints:
+    """Places of packets after which there is another, or the end."""
+    octets = np.frombuffer(content, np.uint8)
+    head = _heads(octets, order, np.arange(first, min(last, len(content) - _PCAP_HEAD + 1)))
+    place = first + np.flatnonzero(_fits(head) & (head[:, 2] > 0))
+    after = place + _PCAP_HEAD + head[place - first, 2].astype(np.int64)
+    sound = after == len(content)
+    whole = np.flatnonzero(after + _PCAP_HEAD <= len(content))
+    sound[whole] = _fits(_heads(octets, order, after[whole]))
+    return place[sound]
+
+
+def _heads(octets: np.ndarray, order: str, place: Ints) -> np.ndarray:
+    """(N, 4) the words of packet headers at these places (N,)."""
+    words: np.ndarray = octets[place[:, None] + np.arange(_PCAP_HEAD)].view(f"{order}u4")
+    return words
+
+
+def _fits(head: np.ndarray) -> Mask:
+    """(N,) whether headers (N, 4) are sound."""
+    return (head[:, 1] < _PARTS) & (head[:, 2] <= head[:, 3]) & (head[:, 3] <= _LONGEST)
 
 
 def _pcapng(content: bytes, losses: Losses) -> Iterator[tuple[int, bytes]]:
     """Link type and frame of each packet in enhanced and simple packet blocks."""
     order, at = "<", 0
+    places = {each: _Places(partial(_blocks, content, each), len(content)) for each in "<>"}
     links: list[int] = []
     while at + 12 <= len(content):
         if content[at : at + 4] == _PCAPNG:
@@ -98,7 +133,7 @@ def _pcapng(content: bytes, losses: Losses) -> Iterator[tuple[int, bytes]]:
             links = []
         if not _is_block(content, order, at):
             losses.damaged += 1
-            at = _next_block(content, order, at + 4)
+            at = places[order].after(at + 4)
             continue
         kind, size = struct.unpack_from(f"{order}II", content, at)
         body = content[at + 8 : at + size - 4]
@@ -123,16 +158,15 @@ def _is_block(content: bytes, order: str, at: int) -> bool:
     return bool(struct.unpack_from(f"{order}I", content, at + size - 4)[0] == size)
 
 
-def _next_block(content: bytes, order: str, at: int) -> int:
-    """Where the next whole block is that matters; the end if there is none. Their lengths are multiples of four."""
-    while at + 12 <= len(content):
-        words = np.frombuffer(content, f"{order}u4", min(_SEARCHED, len(content) - at) // 4, at)
-        for start in (at + 4 * np.flatnonzero(np.isin(words, _KINDS))).tolist():
-            whole = start + 12 <= len(content) and _is_block(content, order, start)
-            if whole and start + struct.unpack_from(f"{order}I", content, start + 4)[0] <= len(content):
-                return int(start)
-        at += 4 * len(words)
-    return len(content)
+def _blocks(content: bytes, order: str, first: int, last: int) -> Ints:
+    """Places of whole blocks that matter. All lengths of blocks are multiples of four, and so are the places."""
+    word = np.frombuffer(content, f"{order}u4", len(content) // 4)
+    place = np.arange(first // 4, min(last // 4, len(word) - 2))
+    place = place[np.isin(word[place], _KINDS)]
+    size = word[place + 1].astype(np.int64)
+    whole = (size >= 12) & (size % 4 == 0) & (4 * place + size <= len(content))
+    place, size = place[whole], size[whole]
+    return 4 * place[word[place + size // 4 - 1] == size]
 
 
 def _datagram(link: int, frame: bytes) -> bytes:

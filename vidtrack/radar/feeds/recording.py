@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from vidtrack.config.radar import RadarSettings
-from vidtrack.errors import PlotFormatError, SourceError
+from vidtrack.errors import ConfigError, PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
@@ -25,7 +25,8 @@ _log = logging.getLogger(__name__)
 _LOOKED_AT = 1 << 20
 """Octets of a file from which its format is told."""
 _LOOKED_AT_AGAIN = 1 << 16
-"""Octets of a payload from which a decoder learns the time of day."""
+"""Octets of a payload from which a decoder learns the time of day, and in which the first block is looked for."""
+_PARQUET = b"PAR1"
 _PAYLOADS = 50
 """Payloads of a capture from which the format is told: other things may be in it."""
 
@@ -36,9 +37,10 @@ def is_feed(path: str | Path) -> bool:
     """Whether the file is a recording of ASTERIX, NMEA or AIS, by its content. False if it cannot be opened."""
     try:
         with Path(path).open("rb") as file:
-            return _kind(file.read(_LOOKED_AT)) is not None
+            beginning = file.read(_LOOKED_AT)
     except OSError:
         return False
+    return _kind(beginning) is not None or _before_blocks(beginning) > 0
 
 
 def decoder_of(payload: bytes) -> type[Decoder] | None:
@@ -55,6 +57,16 @@ def _kind(content: bytes) -> type[Decoder] | None:
     return found.most_common(1)[0][0] if found else None
 
 
+def _before_blocks(beginning: bytes) -> int:
+    """Octets before the first blocks of ASTERIX in a file that begins with something else; 0: there are none."""
+    if b"\0" not in beginning or beginning.startswith(_PARQUET):
+        return 0
+    try:
+        return asterix.first_block(beginning, _LOOKED_AT_AGAIN) or 0
+    except ConfigError:  # without its library no block is known to be one
+        return 0
+
+
 def read_messages(path: str | Path, losses: Losses) -> Messages:
     """All messages of a recording, in order of arrival; what is damaged is left out and counted.
 
@@ -66,6 +78,10 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}") from None
     kind = _kind(content[:_LOOKED_AT])
+    if kind is None and (trash := _before_blocks(content[:_LOOKED_AT])):
+        _log.warning("%s: the first block of ASTERIX is at octet %d; what is before it is left out", path, trash)
+        losses.damaged += 1
+        kind, content = asterix.Decoder, content[trash:]
     if kind is None:
         raise PlotFormatError(f"{path} is neither a recording of ASTERIX (raw, pcap, FINAL) nor of NMEA; give one")
     decoder = _informed(kind, content)

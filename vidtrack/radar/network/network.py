@@ -78,6 +78,7 @@ class Network:
         sigma[0, 2] = 0.0  # common to all clocks nothing can be told
         if len(feeds) == 1:
             sigma[:] = 0.0
+        self._told_s = -np.inf
         settings = feeds[0].settings
         self.registration = Registration(
             [feed.placed.xyz[:2] for feed in feeds], sigma, np.array([feed.scan_s for feed in feeds]),
@@ -109,13 +110,20 @@ class Network:
         return measurements(plots, feed.settings).scan_of(own, noise, bias[KINDS - 1], turn.station)
 
     def learn(self, turn: Turn, tracks: Tracks) -> None:
-        """Learn the biases from the plots that confirmed tracks took in this scan."""
+        """Learn the biases from the plots that confirmed tracks took in this scan, unless it has told them already."""
+        if turn.span.t <= self._told_s:
+            return
         took = np.flatnonzero((tracks.status != TENTATIVE) & (tracks.measurement >= 0) & (tracks.group < 0))
         plots = self.feeds[turn.station].plots.rows(turn.span.rows)
         rows = tracks.measurement[took]
         R = np.einsum("ni,ij->nij", plots.sigma[rows, :2] ** 2, np.eye(2))
         taken = Plotted(turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.v[took])
         self.registration.learn(turn.span.t, taken)
+
+    def learnt_until(self, t: float) -> None:
+        """The scans up to t come once more: they have told what they can of the biases."""
+        self._told_s = t
+        self.registration.begin_anew()
 
     def as_dict(self) -> dict[str, dict[str, float | bool]]:
         """The biases of each radar by name, with their standard deviations, and whether the targets have told them."""

@@ -104,6 +104,10 @@ class Registration:
         if len(new.track):
             self._taken.append(new)
 
+    def begin_anew(self) -> None:
+        """Tracks have other ids from now on; the biases stay known."""
+        self._taken = []
+
     def _drift(self, t: float) -> None:
         """Let the biases wander until t."""
         dt = 0.0 if self._t is None else max(t - self._t, 0.0)

@@ -52,13 +52,14 @@ class Placed(NamedTuple):
 
 def claims(
     problem: Problem, rows: Ints, ids: Ints, run: Ints, placed: Placed, correlations: Correlations, cell: PolarCell
-) -> Ints:
+) -> tuple[Ints, Ints]:
     """(T,) the measurement that each of these rows shares with others; -1: none. The cell learns its size.
 
-    ids (T,), run (T,) of all rows. Of overlapping claims the likeliest are taken.
+    Also the pairs (Q, 2) of rows that may be unresolved. ids (T,), run (T,) of all rows. Of overlapping claims the
+    likeliest are taken.
     """
     shared = np.full(problem.rows, -1)
-    offers = []
+    offers, near = [], []
     for i, j in close_pairs(rows, run, placed, cell) if problem.measurements else ():
         pair = np.array([i, j])
         joint = correlations.joint(ids[pair], placed.x[pair], placed.P[pair])
@@ -67,7 +68,8 @@ def claims(
         p = min(float(cell.probability @ p_by_size), 1 - TINY)
         if p < LEAST:
             continue
-        one = _one(problem, i, placed, cell.confined(joint, R))
+        near.append((i, j))
+        one = log_one(problem, i, placed, cell.confined(joint, R))
         log_odds = float(logsumexp(one)) - _two(problem, i, j)
         if not correlations.has(ids[pair]):  # of targets that were resolved just before, the distance is known
             cell.learn(p_by_size, log_odds)
@@ -75,7 +77,7 @@ def claims(
     for log_odds, i, j, a in sorted(offers, reverse=True):
         if log_odds > np.log(SURE / (1 - SURE)) and shared[i] in (-1, a) and shared[j] in (-1, a):
             shared[[i, j]] = a
-    return shared
+    return shared, np.array(near, np.int64).reshape(-1, 2)
 
 
 def close_pairs(rows: Ints, run: Ints, placed: Placed, cell: PolarCell) -> Ints:
@@ -107,7 +109,7 @@ def _two(problem: Problem, i: int, j: int) -> float:
     return float(logsumexp(np.concatenate([[miss_i + miss_j], ratio_i + miss_j, ratio_j + miss_i, both.ravel()])))
 
 
-def _one(problem: Problem, row: int, placed: Placed, joint: Joint) -> Floats:
+def log_one(problem: Problem, row: int, placed: Placed, joint: Joint) -> Floats:
     """(M,) ln of the same for each measurement as one of both targets; two echoes are missed if each of them is.
 
     The density of positions becomes that of the sensor's measurements by the ratio of the errors' volumes; other

@@ -66,6 +66,18 @@ class Correlations:
             self.pair = np.concatenate([self.pair, [[ids[i], ids[j]]]])
             self.cross = np.concatenate([self.cross.reshape(-1, s, s), block[None]])
 
+    def of(self, ids: tuple[int, int]) -> Correlations:
+        """Those of two tracks, as tracks 0 and 1."""
+        at = (self.pair == ids).all(axis=1)
+        return Correlations(np.array([[0, 1]])[: at.sum()], self.cross[at].copy())
+
+    def set(self, ids: tuple[int, int], other: Correlations) -> None:
+        """Set those of two tracks to what tracks 0 and 1 have in `other`."""
+        self.drop((self.pair == ids).all(axis=1))
+        if len(other.pair):
+            self.pair = np.concatenate([self.pair, [ids]])
+            self.cross = np.concatenate([self.cross.reshape(-1, *other.cross.shape[1:]), other.cross])
+
     def has(self, ids: Ints) -> bool:
         """Whether two tracks (2,) are correlated."""
         return bool((self.pair == np.sort(ids)).all(axis=1).any())

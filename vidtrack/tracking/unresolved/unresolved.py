@@ -27,6 +27,7 @@ from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.picture.picture import View
 from vidtrack.tracking.register import Register
+from vidtrack.tracking.unresolved.branches import Doubts
 from vidtrack.tracking.unresolved.cell import PolarCell
 from vidtrack.tracking.unresolved.claims import Placed, claims
 from vidtrack.tracking.unresolved.correlations import Correlations
@@ -47,6 +48,7 @@ class Unresolved:
     cells: Sequence[PolarCell] = ()
     correlations: Correlations = field(default_factory=Correlations, init=False)
     _made: int = field(default=0, init=False)
+    _doubts: Doubts = field(default_factory=Doubts, init=False)
     _placed: Placed | None = field(default=None, init=False)
     _predicted: dict[int, int] = field(default_factory=dict, init=False)
 
@@ -60,7 +62,8 @@ class Unresolved:
         self._placed = Placed.of(problem, bank)
         self._predicted = {track: row for row, track in enumerate(register.id.tolist())}
         self._predicted.update(zip(register.id[rows].tolist(), rows.tolist(), strict=True))
-        shared = claims(problem, rows, register.id, register.run, self._placed, self.correlations, self.cell)
+        shared, near = claims(problem, rows, register.id, register.run, self._placed, self.correlations, self.cell)
+        self._doubts.begin(problem, near, rows, register, bank, self.correlations, self.cell, dt)
         for row in np.flatnonzero(shared >= 0):  # all possible histories of a track
             shared[register.id == register.id[row]] = shared[row]
         return shared
@@ -74,8 +77,15 @@ class Unresolved:
         return shared, free
 
     def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
-        """Update the tracks that share a measurement jointly, and part those that are resolved again."""
+        """Update the tracks that share a measurement jointly, part those that are resolved again, and set right what
+        this scan shows of earlier decisions.
+        """
         self._part(found, register)
+        self._share(found, register, bank)
+        self._doubts.decide(found, register, bank, self.correlations, self.cell)
+
+    def _share(self, found: Association, register: Register, bank: Estimator) -> None:
+        """Update the tracks that share a measurement jointly."""
         rows = np.flatnonzero(found.shared >= 0)
         if not len(rows):
             return
