@@ -89,6 +89,10 @@ class Disturbance:
             self._apply(picture, -time_s, nothing)
         self._rewind(*pictures[0])
 
+    def kept(self, frame: Frame) -> Frame:
+        """The frame with the planes that the detector looks at."""
+        return self._view.kept(frame)
+
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""
         return self._apply(smooth(self._view.reduce(frame)), frame.time_s, known)
