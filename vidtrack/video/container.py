@@ -41,7 +41,7 @@ class VideoFile:
         self._container = _open(path, accelerator(settings.decoder))
         self._stream = _video_stream(self._container, path)
         self._stream.thread_type = "AUTO"
-        self._stream.codec_context.thread_count = decoders()
+        self._stream.codec_context.thread_count = decoders(self._stream.width * self._stream.height)
         # AVI stores no presentation times, only the order of decoding: FFmpeg's guess at them jumps to and fro.
         self._is_avi = self._container.format.name == "avi"
         self._packets = self._demuxed()

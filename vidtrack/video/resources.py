@@ -16,13 +16,19 @@ CORES = "VIDTRACK_CORES"
 """Variable of the environment: number of cores that this process may use; without it, all."""
 
 _DECODERS = 4  # at least: pictures take unlike times, and with three of them on two cores one is idle more often
+_SMALL = 640 * 480  # pixels
 _LARGEST = 31 << 20  # bytes; glibc learns nothing from a block of 32 MB or more
 
 
-def decoders() -> int:
-    """Number of the decoder's threads: the cores that this process was given, or enough for all of the machine."""
+def decoders(pixels: int) -> int:
+    """Number of the decoder's threads: the cores that this process was given, or enough for all of the machine.
+
+    One for small pictures: they are decoded faster than they are tracked, and threads would take time of their own.
+    """
     given = os.environ.get(CORES)
-    return int(given) if given else max(_DECODERS, os.cpu_count() or 1)
+    if given:
+        return int(given)
+    return 1 if pixels <= _SMALL else max(_DECODERS, os.cpu_count() or 1)
 
 
 def keep_freed_memory() -> None:

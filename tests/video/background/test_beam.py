@@ -5,7 +5,7 @@ import pytest
 
 from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
-from vidtrack.video.background.beam import lamps_light, mark_beams
+from vidtrack.video.background.beam import is_dark, mark_beams, shows_lamps
 from vidtrack.video.background.scene import BEAM
 from vidtrack.video.frame import Frame
 
@@ -59,9 +59,10 @@ def test_only_a_dark_scene_is_lit_by_lamps():
     dark, day = road(20), road(90)
     lamp = dark.copy()
     lamp[40, 60] = 200
-    assert lamps_light(lamp.astype(np.uint8), dark, BLACK)
-    assert not lamps_light(dark.astype(np.uint8), dark, BLACK)
-    assert not lamps_light(lamp.astype(np.uint8), day, BLACK)
+    assert is_dark(dark, BLACK)
+    assert not is_dark(day, BLACK)
+    assert shows_lamps(lamp.astype(np.uint8), BLACK)
+    assert not shows_lamps(dark.astype(np.uint8), BLACK)
 
 
 def played(beams, stands_s):

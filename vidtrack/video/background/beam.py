@@ -17,13 +17,18 @@ _SOFT = np.float32(0.2)  # change of the logarithm of the factor over two pixels
 _OPEN = 4  # least number of pixels over which a beam fades into the scene
 
 
-def lamps_light(luma: Image, scene: Levels, black: np.float32) -> bool:
-    """Whether lamps light the scene (h, w): it is dark, and they are seen in the picture's luma (h, w)."""
-    return bool(_dark(scene, black + np.float32(_DARK)) and luma.max() > black + _LAMP)
+def is_dark(scene: Levels, black: np.float32) -> bool:
+    """Whether the scene (h, w) is so dark that lamps light it."""
+    return bool(_mostly_below(scene, black + np.float32(_DARK)))
+
+
+def shows_lamps(luma: Image, black: np.float32) -> bool:
+    """Whether lamps are seen in the picture (h, w) of a dark scene."""
+    return bool(luma.max() > black + _LAMP)
 
 
 @kernel
-def _dark(scene: Levels, limit: np.float32) -> bool:
+def _mostly_below(scene: Levels, limit: np.float32) -> bool:
     """Whether most of the scene (h, w) is below a limit."""
     h, w = scene.shape
     dark = looked_at = 0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vidtrack.arrays import affine
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.video import DisturbanceSettings
-from vidtrack.video.background.beam import lamps_light, mark_beams
+from vidtrack.video.background.beam import is_dark, mark_beams, shows_lamps
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, haziness, strong, veil
 from vidtrack.video.background.exposure import follow_gain
@@ -54,6 +54,7 @@ class Disturbance:
         "_veil",
         "_sunlight",
         "_coloured",
+        "_dark",
     )
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
@@ -67,7 +68,7 @@ class Disturbance:
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
         self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
         self._sunlight = Sunlight()
-        self._coloured = True
+        self._coloured, self._dark = True, False
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
         self._frames = 0  # learnt since the start
@@ -88,6 +89,10 @@ class Disturbance:
         for time_s, picture in reversed(pictures):
             self._apply(picture, -time_s, nothing)
         self._rewind(*pictures[0])
+
+    def kept(self, frame: Frame) -> Frame:
+        """The frame with the planes that the detector looks at."""
+        return self._view.kept(frame)
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""
@@ -183,6 +188,7 @@ class Disturbance:
         self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
         self._veil = veil(picture.luma) or 0.0
         self._coloured = is_coloured(picture)
+        self._dark = is_dark(scene.luma, np.float32(self._view.black))
         return scene
 
     def _is_new_second(self, dt: float) -> bool:
@@ -190,11 +196,12 @@ class Disturbance:
         return math.floor(self._time_s) != math.floor(self._time_s - dt)
 
     def _judge_light(self, picture: Picture) -> None:
-        """Contrast and haze of the scene in view; a canvas has black rims where nothing was seen."""
+        """Contrast, haze, colour and darkness of the scene in view; a canvas has black rims where nothing was seen."""
         moves = self._camera.moves
         in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
         self._contrast, self._hazy = contrast(in_view.luma), haziness(in_view.luma)
         self._coloured = is_coloured(Picture(*in_view[:3]))
+        self._dark = is_dark(in_view.luma, np.float32(self._view.black))
         haze = veil(picture.luma)
         self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
 
@@ -221,7 +228,7 @@ class Disturbance:
             count = mark_shadow(told, scene, self._black, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
-        if s.beams and lamps_light(seen.luma, scene.luma, black):
+        if s.beams and self._dark and shows_lamps(seen.luma, black):
             mark_beams(seen.luma, scene.luma, black, weak)
         strong(weak, hit)
         if s.shadow and s.amid:

@@ -140,9 +140,12 @@ def absorb(
     steady_s, shadow_s  seconds of cover that suffice for unchanged cover, and for shadow
     """
     h, w = hit.shape
+    least = min(absorb_s, steady_s, shadow_s)
     for y in range(h):
         for x in range(w):
             covered_s = scene.covered_s[y, x]
+            if covered_s < least:
+                continue
             steady = min(covered_s, scene.steady_s[y, x])
             if covered_s >= absorb_s or steady >= steady_s or (covered_s >= shadow_s and hit[y, x] == SHADOW):
                 _adopt(picture, scene, y, x)

@@ -109,23 +109,24 @@ def cut_at_necks(regions: Regions, measure: _Measure, predicted: Floats) -> Regi
         if large[i]:
             least = typical[i] * np.sqrt(_CUT_PART if any(border) else _PART)
             cut = _cut(depth, _NECK, least, box[i])
-            if cut.total < 2:
+            if cut is None:
                 cut = _cut(depth, _SHALLOW, least, box[i])
-                if not _likelier(cut, box[i], typical[i], measure.sizes):
+                if cut is None or not _likelier(cut, box[i], typical[i], measure.sizes):
                     continue
             if _breaks(cut, predicted):
                 continue
         else:
             cut = _cut(depth, _NECK, np.ones(2), box[i])
-            if not _alike(cut):
+            if cut is None or not _alike(cut):
                 continue
         regions = regions.parted(i, cut)
     return regions
 
 
-def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> Regions:
+def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> Regions | None:
+    """The parts of a region; None: it has one."""
     label, count = parts(depth, neck, least)
-    return of_labels(label, count, box)
+    return of_labels(label, count, box) if count > 1 else None
 
 
 def _breaks(cut: Regions, predicted: Floats) -> bool:
@@ -156,8 +157,6 @@ def _likelier(cut: Regions, box: Ints, typical: Floats, sizes: SizeField) -> boo
 
 def _alike(cut: Regions) -> bool:
     """Whether the parts have similar sizes and each fills its box, as vehicles do."""
-    if cut.total < 2:
-        return False
     box = cut.boxes()
     whole = box[:, 2] * box[:, 3]
     return bool((whole >= _EQUAL * whole.max()).all() and (cut.areas() > _FULL * whole).all())

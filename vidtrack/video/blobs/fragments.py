@@ -94,7 +94,7 @@ def together(
                 other.append(j)
                 apart.append(distance)
     group, refused = np.arange(len(box)), np.zeros((len(box), len(box)), np.bool_)
-    for k in np.argsort(np.array(apart), kind="mergesort"):
+    for k in _nearest_first(apart):
         a, b = min(group[one[k]], group[other[k]]), max(group[one[k]], group[other[k]])
         if a == b or refused[a, b]:  # groups that do not fit together never will: they only grow
             continue
@@ -105,6 +105,19 @@ def together(
             group[i] = a if group[i] == b else group[i]
             refused[a, i] = refused[i, a] = refused[a, i] or refused[b, i]
     return components(group)
+
+
+@inlined
+def _nearest_first(apart: list[float]) -> Ints:
+    """(N,) indices by increasing distance, equal ones in their order: insertion, for they are few."""
+    order = np.empty(len(apart), np.int64)
+    for k in range(len(apart)):
+        place = k
+        while place > 0 and apart[order[place - 1]] > apart[k]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = k
+    return order
 
 
 @kernel

@@ -11,6 +11,7 @@ from vidtrack.compiled import inlined, kernel
 from vidtrack.video.frame import Image
 
 _LEVELS = np.float32(8)  # per pixel of distance, for sorting
+_ONE = np.uint64(1)
 _INSIDE = np.float32(0.5)  # px; pixels of the region are at least so far from the nearest one outside
 
 
@@ -47,23 +48,25 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
     for y in range(h):
         for x in range(w):
             deep[(y + 1) * wide + x + 1] = depth[y, x]
-    order = _deepest_first(deep)
+    order, across = _deepest_first(deep), np.uint64(wide)
     parent, peak = np.empty(len(order), np.int64), np.empty(len(order))
     one, other, saddle = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
     basins = 0
     for p in order:
         d = np.float64(deep[p])
-        lowest, highest = len(order), -1  # of the neighbours' labels; nearly all pixels have one, or none
-        for row in range(p - wide, p + wide + 1, wide):
-            for q in range(row - 1, row + 2):
-                lowest = min(lowest, label[q] if label[q] >= 0 else lowest)
-                highest = max(highest, label[q])
-        if lowest == highest:
-            label[p] = _root(parent, lowest)
+        lowest, highest = (
+            np.uint32(0xFFFFFFFF),
+            np.int32(-1),
+        )  # of the neighbours' labels; most pixels have one, or none
+        for row in (p - across, p, p + across):
+            for q in (row - _ONE, row, row + _ONE):
+                lowest, highest = min(lowest, np.uint32(label[q])), max(highest, label[q])  # -1 is the largest unsigned
+        if np.int64(lowest) == highest:
+            label[p] = _root(parent, highest)
             continue
         best, height = -1, -1.0
-        for row in range(p - wide, p + wide + 1, wide):
-            for q in range(row - 1, row + 2):
+        for row in (p - across, p, p + across):
+            for q in (row - _ONE, row, row + _ONE):
                 if label[q] < 0:
                     continue
                 root = _root(parent, np.int64(label[q]))
@@ -88,7 +91,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
 
 
 @inlined
-def _deepest_first(depth: NDArray[np.float32]) -> Ints:
+def _deepest_first(depth: NDArray[np.float32]) -> NDArray[np.uint64]:
     """The pixels of (N,) inside the region by decreasing depth; counting sort."""
     deepest = np.float32(0)
     for p in range(len(depth)):
@@ -100,7 +103,7 @@ def _deepest_first(depth: NDArray[np.float32]) -> Ints:
             count[most - int(depth[p] * _LEVELS) + 1] += 1
     for bucket in range(1, len(count)):
         count[bucket] += count[bucket - 1]
-    order = np.empty(count[-1], np.int64)
+    order = np.empty(count[-1], np.uint64)  # without a sign there is no question whether to count from the end
     for p in range(len(depth)):
         if depth[p] >= _INSIDE:
             bucket = most - int(depth[p] * _LEVELS)
