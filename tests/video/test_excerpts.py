@@ -68,8 +68,8 @@ def test_a_source_that_is_gone(tmp_path):
 def test_an_opening_has_all_pictures_that_lie_so_far_apart_and_fewer_others(tmp_path, name, codec, fewer):
     path, settings = write_clip(tmp_path / name, frames=70, codec=codec, spare=2), SourceSettings(start_s=0.4)
     with open_source(str(path), settings) as source:
-        every = list(source.opening_again(1.0, None))
-        some = {frame.time_s: frame.y for frame in source.opening_again(1.0, None, 0.2)}
+        every = list(source.opening(1.0, None))
+        some = {frame.time_s: frame.y for frame in source.opening(1.0, None, 0.2)}
     last_s = -1.0
     for frame in every:
         if frame.time_s > last_s + 0.2 - 1e-6:

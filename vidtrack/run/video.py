@@ -31,7 +31,6 @@ from vidtrack.traffic.metres import footprints_of
 from vidtrack.traffic.site import read_site
 from vidtrack.video import background
 from vidtrack.video.background.disturbance import PREVIEW_EVERY_S, Disturbance
-from vidtrack.video.background.picture import reduction
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.blobs.limits import LimitChecks
 from vidtrack.video.foreground import Background
@@ -44,9 +43,6 @@ if TYPE_CHECKING:
     from vidtrack.traffic.footprint import Footprints, Stand
 
 log = logging.getLogger(__name__)
-
-_WAITING_BYTES = 256 << 20  # pictures of ten seconds at 30 frames/s and 960x540 take 233 MB
-_BYTES_PER_PIXEL = 1.5  # luminance, and two planes of chroma of half the size
 
 
 @overload
@@ -83,7 +79,7 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
         if site is not None and road is None:
             raise ConfigError(f"{site} has no section [calibration], so nobody knows the metres; track without a site")
         detector = build_detector(settings)
-        look_ahead(source, detector, settings, whole=True)
+        look_ahead(source, detector, settings)
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
@@ -117,7 +113,7 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         if isinstance(source, Recording):
             source.restore = Checkpoint(detector, tracker, source.like).restore
         else:
-            look_ahead(source, detector, settings, whole=extras.video is not None or extras.rerun is not None)
+            look_ahead(source, detector, settings)
         subject = file_subject(extras.source or path, source, tracker.rates.as_dict, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S
@@ -148,21 +144,11 @@ def kept(settings: Settings, masked: Sequence[Corners] = (), width: int = 0, hei
     return without(None if path is None else read_mask(path), masked, width, height)
 
 
-def look_ahead(source: Source, detector: Background, settings: Settings, whole: bool = False) -> None:
-    """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene.
-
-    whole  the frames must keep their whole pictures; otherwise those looked at have what the detector looks at
-
-    The pictures wait in memory. They are decoded a second time where they do not fit.
-    """
+def look_ahead(source: Source, detector: Background, settings: Settings) -> None:
+    """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene."""
     seconds = settings.detector.disturbance.preview_s
-    if not isinstance(detector, Disturbance) or not seconds:
-        return
-    pixels = source.width * source.height / reduction(source.height, settings.source.scale) ** (0 if whole else 2)
-    if _BYTES_PER_PIXEL * pixels * source.fps * seconds <= _WAITING_BYTES:
-        detector.preview(source.opening(seconds, (lambda frame: frame) if whole else detector.kept))
-    else:
-        detector.preview(source.opening_again(seconds, settings.source.end_s, PREVIEW_EVERY_S))
+    if isinstance(detector, Disturbance) and seconds:
+        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S))
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

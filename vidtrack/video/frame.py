@@ -51,18 +51,3 @@ class Frame:
         large = (cv2.resize(plane, size, interpolation=cv2.INTER_LINEAR) for plane in (self.v, self.u))
         chroma = [cv2.convertScaleAbs(plane, alpha=gain, beta=128 - 128 * gain) for plane in large]
         return np.asarray(cv2.cvtColor(cv2.merge([luma, *chroma]), cv2.COLOR_YCrCb2BGR), dtype=np.uint8)
-
-
-@dataclass(slots=True)
-class ReducedFrame(Frame):
-    """A frame of which only the detector's reduced planes are kept.
-
-    whole  (H, W) of the picture as decoded
-    """
-
-    whole: tuple[int, int] = (0, 0)
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(H, W) of the picture as decoded."""
-        return self.whole

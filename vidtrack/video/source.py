@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import difflib
 import glob
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
@@ -18,7 +17,7 @@ from vidtrack.video.frame import Frame
 from vidtrack.video.pictures import ImageSequence, images_in, images_like
 from vidtrack.video.planes import matched, to_frame
 from vidtrack.video.readahead import ReadAhead
-from vidtrack.video.span import ROUNDING_S, Span
+from vidtrack.video.span import Span
 from vidtrack.video.stats import SourceStats
 
 _DEPTH = 4  # frames read ahead: enough to even out key frames, 50 MB at 4K
@@ -110,13 +109,12 @@ class Source:
         self.height, self.width = first.shape
         self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
         self._ahead = ReadAhead(self._alike(self._in_span(chain([first], frames)), first), _DEPTH)
-        self._kept: deque[Frame] = deque()
 
     def __iter__(self) -> Source:
         return self
 
     def __next__(self) -> Frame:
-        frame = self._kept.popleft() if self._kept else next(self._ahead)
+        frame = next(self._ahead)
         self.stats.frames_read += 1
         return frame
 
@@ -128,18 +126,7 @@ class Source:
     ) -> None:
         self.close()
 
-    def opening(self, seconds: float, keep: Callable[[Frame], Frame]) -> Iterator[Frame]:
-        """The frames of its first seconds, before iteration begins: it will then give what `keep` makes of them.
-
-        Raises SourceError if the span of time holds no frame.
-        """
-        for frame in self._ahead:
-            self._kept.append(keep(frame))
-            if frame.time_s > self._span.start_s + seconds + ROUNDING_S:
-                break
-            yield self._kept[-1]
-
-    def opening_again(self, seconds: float, end_s: float | None, every_s: float = 0.0) -> Iterator[Frame]:
+    def opening(self, seconds: float, end_s: float | None, every_s: float = 0.0) -> Iterator[Frame]:
         """The frames of its first seconds, at most to end_s, from a second reading; their numbers are 0.
 
         Some of those less than `every_s` apart may be missing.

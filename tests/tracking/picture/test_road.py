@@ -10,6 +10,7 @@ from vidtrack.state import gather, restore
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.picture.sizes import SizeField
+from vidtrack.tracking.picture.swarm import Swarm
 from vidtrack.tracks import TENTATIVE
 
 WIDTH, HEIGHT = 320, 240
@@ -146,6 +147,29 @@ def test_what_is_as_small_as_a_swarm_is_no_vehicle_while_it_lasts():
     assert road.travel_factor(places, sizes).tolist() == [1.0, 1.0, 1.0]
     fall(road.learn, 100, 8.0, first=50.0)
     assert Road(WIDTH, HEIGHT, careful=False).travel_factor(places, sizes).tolist() == [1.0, 1.0, 1.0]
+
+
+SHAPES = {
+    "narrow": lambda rng, n: 7 * rng.lognormal(0, 0.3, n),
+    "wide": lambda rng, n: 7 * rng.lognormal(0, 0.5, n),
+    "wider": lambda rng, n: 7 * rng.lognormal(0, 0.8, n),
+    "flat": lambda rng, n: 6 * 4 ** rng.uniform(0, 1, n),
+}
+
+
+@pytest.mark.parametrize("per_s", [80, 200])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_nearly_all_of_a_swarm_is_within_its_size_and_vehicles_are_not(shape, per_s):
+    rng, swarm, born = np.random.default_rng(5), Swarm(), []
+    for k in range(12 * 25):
+        sides = SHAPES[shape](rng, rng.poisson(per_s / 25))
+        vehicle = [[300.0, 200.0, 90.0, 60.0]] if k % 25 == 0 else []
+        boxes = [[10.0 * i, 100.0, side, side / 2] for i, side in enumerate(sides)] + vehicle
+        swarm.learn(tracks_of(k / 25, boxes, status=TENTATIVE, age_s=0.0))
+        born += list(sides)
+        if k > 5 * 25:
+            assert swarm.size < 90
+            assert np.mean(np.array(born) <= swarm.size) > 0.8
 
 
 def test_dense_traffic_is_no_swarm():

@@ -109,35 +109,11 @@ def test_the_opening_is_the_frames_of_the_span_and_tells_no_warning_twice(tmp_pa
         cv2.imwrite(str(tmp_path / f"{k:03d}.png"), picture)
     caplog.set_level(logging.WARNING)
     with open_source(str(tmp_path), SourceSettings(start_s=0.12, end_s=0.44)) as source:
-        ahead = list(source.opening_again(0.3, 0.44))
+        ahead = list(source.opening(0.3, 0.44))
         whole = list(source)
     assert [frame.time_s for frame in ahead] == pytest.approx([frame.time_s for frame in whole if frame.time_s < 0.43])
     assert all(np.array_equal(a.y, b.y) for a, b in zip(ahead, whole, strict=False))
     assert sum("carries no time" in record.message for record in caplog.records) == 1
-
-
-@pytest.mark.parametrize("whole", [False, True])
-def test_frames_that_were_looked_at_come_again_whole_or_as_the_detector_sees_them(tmp_path, whole):
-    for k, frame in enumerate(frames(3, drives_off)):
-        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), frame.y)
-    settings = load(assignments=["source.fps=10", "source.scale=0.5", "detector.disturbance.preview_s=1"])
-    with open_source(str(tmp_path), settings.source) as source:
-        plain = list(source)
-    detector, found = build_detector(settings), []
-    with open_source(str(tmp_path), settings.source) as source:
-        look_ahead(source, detector, settings, whole=whole)
-        for frame in source:
-            assert frame.shape == SHAPE
-            found.append((frame.index, frame.time_s, frame.y.shape, detector.apply(frame, NONE_KNOWN).mask))
-        assert source.stats.frames_read == len(plain)
-    again = build_detector(settings)
-    again.preview(frame for frame in plain if frame.time_s <= 1)
-    assert [each[:2] for each in found] == [(frame.index, frame.time_s) for frame in plain]
-    small = (SHAPE[0] // 2, SHAPE[1] // 2)
-    assert [each[2] for each in found[:10]] == 10 * [SHAPE if whole else small]
-    assert found[-1][2] == SHAPE
-    for frame, (*_, mask) in zip(plain, found, strict=True):
-        assert np.array_equal(again.apply(frame, NONE_KNOWN).mask, mask)
 
 
 def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):

@@ -53,13 +53,13 @@ def track_slice(
         size = source.width, source.height
         tracker = build_blob_tracker(settings.tracker, size, smooth=settings.output.smooth)
         both = _Both(detector, tracker)
-        if before is not None:
+        if before is None:
+            look_ahead(source, detector, settings)
+        else:
             restore(both, read_state(before / STATE))
         kept, count = KeptSteps(folder), 0
         frames = (frame for frame in source if cut.holds(frame.time_s))
         try:
-            if before is None:
-                look_ahead(source, detector, settings)
             for step in video_steps(frames, detector, tracker, settings):
                 count += 1
                 if step.time_s >= cut.kept_from_s:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,9 +13,8 @@ from vidtrack.tracks import Tracks
 
 _SWARM_PER_S = 30.0  # births in the whole picture, more than traffic has anywhere
 _FEW_PER_S = 1.0  # births of one size (a bin); sizes with fewer are not the swarm's
-_STEEP = (
-    0.7  # most that is left of a pair of sizes half an octave on; traffic begins where the swarm no longer ends so fast
-)
+_FALLEN = 0.25  # share of the most frequent pair of sizes, below which the swarm has begun to end
+_STEEP = 0.7  # most that is left of a pair half an octave on; traffic begins where the swarm no longer ends so fast
 _FORGET_S = 10.0
 _SOON_S = 3.0  # shortest time that births are taken to have come in: few scans are no swarm
 _AT_ONCE = 30  # births of one scan that count: the picture may change all at once
@@ -28,6 +28,7 @@ class Swarm:
     """
 
     STATE = ("births", "_time_s", "_watched_s")
+    ADDED: ClassVar = {"_watched_s": lambda swarm: _FORGET_S}
 
     def __init__(self) -> None:
         self.births: Floats = np.zeros(_BINS)
@@ -40,10 +41,11 @@ class Swarm:
         rate = self.births / max(self._watched_s, _SOON_S)
         if rate.sum() < _SWARM_PER_S:
             return 0.0
-        most = int(rate.argmax())
-        pair = rate[most:-1] + rate[most + 1 :]  # of half an octave
-        ends = (pair[:-2] < 2 * _FEW_PER_S) | (pair[2:] > _STEEP * pair[:-2])
-        return float(_LEAST_PX * 2 ** ((most + (int(ends.argmax()) if ends.any() else len(pair))) / _STEPS))
+        pair = rate[:-1] + rate[1:]  # of half an octave
+        rare, flat = pair[:-2] < 2 * _FEW_PER_S, pair[2:] > _STEEP * pair[:-2]
+        ends = rare | (flat & (pair[:-2] < _FALLEN * pair.max()))
+        ends[: int(pair.argmax())] = False
+        return float(_LEAST_PX * 2 ** ((int(ends.argmax()) if ends.any() else _BINS) / _STEPS))
 
     def learn(self, tracks: Tracks) -> None:
         """Count the tracks that began in this scan."""

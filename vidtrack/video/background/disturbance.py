@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import ClassVar
 
 import cv2
 import numpy as np
@@ -56,6 +57,7 @@ class Disturbance:
         "_coloured",
         "_dark",
     )
+    ADDED: ClassVar = {"_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black))}
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
@@ -89,10 +91,6 @@ class Disturbance:
         for time_s, picture in reversed(pictures):
             self._apply(picture, -time_s, nothing)
         self._rewind(*pictures[0])
-
-    def kept(self, frame: Frame) -> Frame:
-        """The frame with the planes that the detector looks at."""
-        return self._view.kept(frame)
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""

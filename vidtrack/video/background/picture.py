@@ -14,7 +14,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.errors import Error
 from vidtrack.video.background.filters import LARGEST_STEP, area_average, smoothed
 from vidtrack.video.foreground import Foreground
-from vidtrack.video.frame import Frame, Image, ReducedFrame
+from vidtrack.video.frame import Frame, Image
 
 FULL_SIZE_ROWS = 580  # taller pictures are reduced to at most this many rows
 _FAINT = 2.0  # grey levels of chroma that a codec adds to a picture without colour
@@ -77,16 +77,7 @@ class View:
             step = reduction(frame.shape[0], self._scale)
             self.step = max(1, min(step, min(frame.shape) // 2, LARGEST_STEP))
             self.black = 0 if frame.full_range else _VIDEO_BLACK
-        return reduce(frame, 1 if isinstance(frame, ReducedFrame) else self.step)
-
-    def kept(self, frame: Frame) -> Frame:
-        """The frame with what the detector needs of it: its reduced planes, if it is reduced at all."""
-        picture = self.reduce(frame)
-        if self.step == 1:
-            return frame
-        y, u, v = (plane if plane.size else None for plane in picture)
-        assert y is not None
-        return ReducedFrame(frame.index, frame.time_s, y, u, v, frame.full_range, whole=frame.shape)
+        return reduce(frame, self.step)
 
     def foreground(
         self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY,

@@ -22,6 +22,7 @@ _REACH = 1  # px to either side over which luminance differences are taken; fart
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
+_ENCLOSED = 4  # the same from amid its edges, where nearly all of it passes for shadow
 _LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
 _SOFT_PX = 3  # px
 _OWN = 0.05  # share of the pixels inside a shadow with edges of their own, from which it is a dark vehicle
@@ -167,7 +168,7 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> 
     """Set hit (h, w) uint8 from SHADOW back to 1 in regions that are nearly all shadow, but a dark vehicle.
 
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
-    on at least three of four sides is vehicle, too.
+    on all four sides is vehicle, too.
     """
     row, start, stop = find_runs(hit, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
@@ -188,7 +189,7 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> 
             for x in range(start[k], stop[k]):
                 if edge[row[k], x]:
                     hit[row[k], x] = 1
-    _fill(hit, row, start, stop, dark[label], 4)
+    _fill(hit, row, start, stop, dark[label], _ENCLOSED)
 
 
 @inlined

@@ -16,14 +16,14 @@ from vidtrack.video.camera.points import CELLS, Points, choose, no_points, shift
 from vidtrack.video.frame import Image
 
 _GOOD = 0.5  # share of the points that fit
-_AGREED = 0.8  # share of the points that must tell of a motion; seen: .84 to 1 of true ones, up to .73 of lamps
+_AGREED = 0.8  # share of the points that must tell of a motion; seen: .84 to 1 of true motions, up to .73 of lamps
 _THERE = 0.5  # share of the edges; where more are at their place, the scene is seen, in whatever light
 _STRANGE = 0.3  # with a smaller share the view has changed; a vehicle before the camera leaves more
 _SURE = 0.65  # the same if the search starts from the last motion only
 _LEAST_PX = 0.75  # displacement of a corner from which the picture is resampled
 _EVERY = 7  # every n-th point at full size is used for a still camera
 _CHOSEN_S, _HELD_S = 1.0, 10.0  # period of the choice of points while the camera moves, and while it is still
-_TRY_S = 0.3  # between failed searches
+_TRY_S = 0.3  # between searches from rest
 _FRESH = 0.8  # share of the points that fit; with less the points are outdated
 _DRIFT_PX = 0.3  # displacement of a still camera that counts as drift
 _STILL_PX = 0.5
@@ -66,7 +66,7 @@ class Camera:
         self._chosen_s = -np.inf
         self._still = affine.IDENTITY  # motion and time of the last rest
         self._still_s = 0.0
-        self._tried_s = -np.inf  # last search without success
+        self._tried_s = -np.inf  # last search from rest
         self._time_s = 0.0
         self._trusted_s = -np.inf  # when it can be trusted again
         self._lately_s = 0.0  # for how long it was lost lately
