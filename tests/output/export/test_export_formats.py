@@ -291,3 +291,12 @@ def test_a_length_is_a_mean_by_certainty(tmp_path):
     rows["length_m"][:], rows["length_sigma_m"][:] = [4, 8], [0.5, 1.0]
     (length,) = open_road_run(write_run(tmp_path, rows)).vehicles.length
     assert length == pytest.approx((4 * 4 + 8) / 5)
+
+
+@pytest.mark.parametrize("moved", [0, 5800000])
+def test_metres_of_a_point_of_ones_own_are_told(tmp_path, caplog, moved):
+    text = SITE
+    for north in (5800000, 5800060):
+        text = text.replace(str(north), str(north - moved))
+    export(open_road_run(write_run(tmp_path, *usual_ways(), site=text)), "geojson", tmp_path)
+    assert ("latitude 0.00" in caplog.text) == (moved > 0)

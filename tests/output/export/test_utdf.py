@@ -36,7 +36,7 @@ def test_each_movement_is_in_its_column(tmp_path, capsys, metres):
     counts = np.arange(1, 37).reshape(3, 12)
     day = write_day(tmp_path / "day", counts, coverage=[1, 0, 0.5], legs=MOVEMENTS, metres=metres)
     export(day, "--as", "utdf", "-o", tmp_path / "out")
-    assert capsys.readouterr().err == "site site; 1 intervals; 2 that were not watched whole are left out\n"
+    assert capsys.readouterr().err == "site site; 1 interval of 3: those that were not watched whole are left out\n"
     (row,) = volumes(tmp_path / "out" / "Volume.csv")
     assert (row["DATE"], row["TIME"], row["INTID"]) == ("06/01/2026", "0600", "1")
     for start, (way, *ends) in TURNS.items():

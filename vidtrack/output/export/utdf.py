@@ -61,7 +61,8 @@ def write(found: Findings, folder: Path) -> str:
             begin = zero + timedelta(seconds=round(float(found.edges[k])))
             numbers = (f"{column[k]:.0f}" for column in count.values())
             file.write(",".join([begin.strftime("%m/%d/%Y,%H%M"), str(_INTERSECTION), *numbers]) + "\n")
-    return f"{len(whole)} intervals; {len(found.coverage) - len(whole)} that were not watched whole are left out"
+    intervals = f"{len(whole)} interval{'s' * (len(whole) != 1)}"
+    return f"{intervals} of {len(found.coverage)}: those that were not watched whole are left out"
 
 
 def approaches(found: Findings, where: Drawn, legs: Iterable[str]) -> dict[str, str]:

@@ -68,7 +68,7 @@ def movements(sheet: Sheet, peak: PeakHour | None, clock: Clock) -> bytes:
 
 
 def speed_histograms(ways: Sequence[Speeds]) -> bytes:
-    """Speeds at each gate, with the 85th percentile and its bounds."""
+    """Speeds at each gate, with the 85th percentile and its bounds where the vehicles are enough for bounds."""
     shown = ways[:WAYS_DRAWN]
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
@@ -78,12 +78,12 @@ def speed_histograms(ways: Sequence[Speeds]) -> bytes:
     with drawing(0.4 + 1.5 * rows, rows, columns, shared=True) as (figure, axes):
         for axis, one in zip(axes.flat, shown, strict=False):
             axis.hist(np.clip(one.speed, 0, bins[-1]), bins, color=PALE, edgecolor=BLUE, linewidth=0.6)
-            axis.axvline(one.v85, color=SIGNAL, linewidth=1.4)
+            title = f"{one.gate}, {one.direction}: {len(one.speed)} vehicle{'s' * (len(one.speed) != 1)}"
             if np.isfinite(one.low):
+                axis.axvline(one.v85, color=SIGNAL, linewidth=1.4)
                 axis.axvspan(one.low, one.high, color=SIGNAL, alpha=0.2, linewidth=0)
-            axis.set_title(
-                f"{one.gate}, {one.direction}: {len(one.speed)} vehicles, v85 {one.v85:.0f} km/h", fontsize=7
-            )
+                title += f", v85 {one.v85:.0f} km/h"
+            axis.set_title(title, fontsize=7)
             whole_numbers(axis)
         for axis in axes.flat[len(shown) :]:
             axis.set_axis_off()
@@ -95,11 +95,13 @@ def speed_histograms(ways: Sequence[Speeds]) -> bytes:
 def over_the_day(
     legs: Sequence[LegDay], values: Sequence[Floats], what: str, clock: Clock, edges: Floats, coverage: Floats
 ) -> bytes:
-    """One row of bars for each leg; hatched where nobody watched."""
+    """One row of bars for each leg; pale where an interval was watched in part, hatched where nobody watched."""
+    colour = np.where(coverage < WATCHED, PALE, BLUE)
     with drawing(0.5 + 0.95 * len(legs), len(legs), shared=True) as (figure, axes):
         for axis, leg, height in zip(axes.flat, legs, values, strict=True):
             known = np.isfinite(height)
-            axis.bar(edges[:-1][known], height[known], np.diff(edges)[known], align="edge", color=BLUE, linewidth=0)
+            bars = edges[:-1][known], height[known], np.diff(edges)[known]
+            axis.bar(*bars, align="edge", color=colour[known], linewidth=0)
             not_watched(axis, edges, coverage)
             axis.set_title(f"from {leg.leg}")
         top = max((float(np.nanmax(height, initial=0)) for height in values), default=0)
