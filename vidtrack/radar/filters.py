@@ -24,7 +24,7 @@ from vidtrack.radar.scans import Measurements
 
 AGILE_S = 20.0
 """s; mean time that each mode of an agile target lasts."""
-HARDER = 3.0
+HARDER = 1.5
 """Acceleration of agile targets, over that of others."""
 BECOMES_S, REMAINS_S = 5000.0, 1000.0
 """s; mean times after which a target becomes agile, and after which it is so no longer."""
