@@ -100,13 +100,16 @@ def test_what_later_scans_explain_otherwise_costs_no_track(tmp_path, seed):
     assert (off.min(axis=1) < 500).all()
 
 
-def test_tracks_near_to_several_others_have_no_branches():
+@pytest.mark.parametrize(("north", "branches"), [([5020, 4980], True), ([5020, 4980, 5000], False)])
+def test_tracks_near_to_several_others_have_no_branches(north, branches):
     run = tracker()
-    x = np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0], [0.0, 10, 5000, 0]])
-    run.add(0.0, x, np.tile(np.diag([4.0, 1, 4, 1]), (3, 1, 1)))
+    run.add(0.0, np.array([[0.0, 10, y, 0] for y in north]), np.tile(np.diag([4.0, 1, 4, 1]), (len(north), 1, 1)))
+    had = False
     for scan in scans(20):
         tracks = run.step(scan)
-    assert tracks.id.tolist() == [1, 2, 3]
+        had |= bool(run.sharing._doubts.of_pair)
+    assert had == branches
+    assert tracks.id.tolist() == list(range(1, len(north) + 1))
     assert (tracks.status == MERGED).all()
 
 
