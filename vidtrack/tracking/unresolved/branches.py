@@ -16,7 +16,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import Problem
@@ -168,7 +167,7 @@ def _log_ratio(bank: Estimator, problem: Problem, rows: Ints, theirs: Ints) -> F
     with np.errstate(divide="ignore"):
         log_l = np.log(weight)[..., None] - 0.5 * (d2 + np.linalg.slogdet(S)[1] + m * np.log(TURN))
         seen = np.log(problem.detection[rows]) - np.log(np.maximum(problem.clutter[rows], TINY**2))
-    return seen[:, None] + np.asarray(logsumexp(log_l, axis=0))
+    return seen[:, None] + np.asarray(np.logaddexp.reduce(log_l, axis=0))
 
 
 @dataclass(slots=True)
