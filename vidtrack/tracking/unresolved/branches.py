@@ -270,6 +270,8 @@ class Doubts:
     ) -> None:  # fmt: skip
         """Continue a pair with a branch; the tracker's own states become a branch. Other doubts about
         these tracks end.
+
+        Which measurements start tracks stays as it is: a forest has begun their trees in the association.
         """
         doubt, every = self.of_pair[pair], np.concatenate(rows)
         best = doubt.branches.pop(number)
@@ -286,7 +288,7 @@ class Doubts:
         register.exchange[every] = best.exchange
         register.score[every] = np.maximum(register.score[every], best.score[whose])
         seen = np.array(best.plots)[whose]
-        found.shared[every] = np.where(best.shared, seen, -1)
+        found.choose(every, seen, best.shared)
         register.history[every[seen >= 0]] |= 1
         register.updated_s[every[seen >= 0]] = found.problem.scan.t
         self.of_pair = {
