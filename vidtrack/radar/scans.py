@@ -151,6 +151,7 @@ def extent(found: Measurements) -> tuple[Floats, Floats]:
         first, width = _sector(found.z[:, angle])
         side = min(width + 2 * margin[angle], 2 * np.pi)
         low[angle], high[angle] = first + (width - side) / 2, first + (width + side) / 2
+    if isinstance(found.sensor, RangeAzimuth | RangeAzimuthElevation):
         low[0] = max(low[0], 0.0)
     return low, high
 

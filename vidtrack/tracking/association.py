@@ -39,6 +39,16 @@ class Association(NamedTuple):
         on = shared[decision.parent]
         return cls(problem, decision, heaviest(decision), on, np.ones(problem.measurements, bool), free)
 
+    def choose(self, rows: Ints, measurement: Ints, shared: bool) -> None:
+        """Change what these successors (n,) took to these measurements (n,), -1: none; each alone, or all together."""
+        alone = np.where(shared, -1, measurement)
+        self.shared[rows] = np.where(shared, measurement, -1)
+        self.taken[rows] = alone
+        decision = self.decision
+        changed = np.isin(decision.row, rows)
+        decision.beta[changed] = decision.measurement[changed] == self.taken[decision.row[changed]]
+        decision.beta0[rows] = alone < 0
+
     @property
     def measurement(self) -> Ints:
         """(K,) measurement of each successor, alone or shared; -1: none."""

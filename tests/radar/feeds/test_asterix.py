@@ -11,7 +11,7 @@ from asterix_records import RADAR, block, mark, plot, sweeps, track
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, PlotFormatError
-from vidtrack.radar.feeds import layout
+from vidtrack.radar.feeds import asterix, layout
 from vidtrack.radar.feeds.asterix import Decoder
 from vidtrack.radar.feeds.messages import Kind, Losses
 from vidtrack.radar.feeds.recording import is_feed, read_messages
@@ -171,6 +171,23 @@ def test_what_is_before_the_first_block_is_left_out_and_told(scene, tmp_path, ca
     losses = Losses()
     assert len(read_messages(path, losses)) == len(read_messages(scene[0] / "radar.ast", Losses()))
     assert losses.damaged >= 1
+
+
+@pytest.mark.parametrize("ways_in", [b"\xff\x00", bytes([8, 0x40, 0]) * 5000], ids=["one chain", "many ways into it"])
+def test_a_long_chain_of_blocks_that_are_passed_over_is_walked_once(monkeypatch, ways_in):
+    content, walked = ways_in + bytes([8, 0, 4, 0]) * ((65536 - len(ways_in)) // 4), []
+    following = asterix._following
+    monkeypatch.setattr(asterix, "_following", lambda *where: walked.append(where[1]) or following(*where))
+    assert asterix.first_block(content, 1 << 16) is None
+    assert len(walked) == len(set(walked)) > 10_000
+    assert asterix.first_block(content + mark(0.0), 1 << 16) in (0, 2)
+
+
+@pytest.mark.parametrize("sound", [2, 3, 4])
+def test_blocks_from_different_starts_onto_one_chain_are_counted_together(sound):
+    good = mark(0.0)
+    content = bytes([8, 0, 3 + len(good)]) + good * sound + b"\xff"  # the first block hides a sound one
+    assert asterix.first_block(content, len(content)) == (3 if sound == 4 else None)
 
 
 def test_other_binary_files_are_no_recordings(tmp_path):

@@ -12,6 +12,7 @@ from vidtrack.simulate.radar_write import write_radar
 from vidtrack.state import gather, restore
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracking.unresolved.branches import Doubts
 from vidtrack.tracking.unresolved.cell import PolarCell
 from vidtrack.tracking.unresolved.unresolved import Unresolved
 from vidtrack.tracks import MERGED, TENTATIVE
@@ -100,13 +101,35 @@ def test_what_later_scans_explain_otherwise_costs_no_track(tmp_path, seed):
     assert (off.min(axis=1) < 500).all()
 
 
-def test_tracks_near_to_several_others_have_no_branches():
+@pytest.mark.parametrize("method", ["gnn", "jpda", "mht"])
+def test_a_pair_that_follows_a_branch_reports_its_plots(tmp_path, monkeypatch, method):
+    write_radar(simulate_radar("radar-parting", 712), tmp_path)
+    follow, followed, count = Doubts._follow, {}, 0
+
+    def noted(self, pair, number, *rest):
+        best = self.of_pair[pair].branches[number]
+        followed.update(zip(pair, best.plots, strict=True))
+        follow(self, pair, number, *rest)
+
+    monkeypatch.setattr(Doubts, "_follow", noted)
+    for _, tracks in track_plots(tmp_path / "plots.csv", load(assignments=[f"tracker.method={method}"])):
+        reported = dict(zip(tracks.id.tolist(), tracks.measurement.tolist(), strict=True))
+        assert {track: reported[track] for track in followed if track in reported}.items() <= followed.items()
+        count += len(followed)
+        followed.clear()
+    assert count
+
+
+@pytest.mark.parametrize(("north", "branches"), [([5020, 4980], True), ([5020, 4980, 5000], False)])
+def test_tracks_near_to_several_others_have_no_branches(north, branches):
     run = tracker()
-    x = np.array([[0.0, 10, 5020, 0], [0.0, 10, 4980, 0], [0.0, 10, 5000, 0]])
-    run.add(0.0, x, np.tile(np.diag([4.0, 1, 4, 1]), (3, 1, 1)))
+    run.add(0.0, np.array([[0.0, 10, y, 0] for y in north]), np.tile(np.diag([4.0, 1, 4, 1]), (len(north), 1, 1)))
+    had = False
     for scan in scans(20):
         tracks = run.step(scan)
-    assert tracks.id.tolist() == [1, 2, 3]
+        had |= bool(run.sharing._doubts.of_pair)
+    assert had == branches
+    assert tracks.id.tolist() == list(range(1, len(north) + 1))
     assert (tracks.status == MERGED).all()
 
 

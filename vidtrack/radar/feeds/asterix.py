@@ -42,17 +42,25 @@ def first_block(content: bytes, farthest: int) -> int | None:
     """
     losses = Losses()
     decoder = Decoder(losses)
+    known: dict[int, tuple[int, bool]] = {}  # of places walked: sound blocks from there on, whether up to the end
     for first in range(min(farthest, len(content))):
+        walked: list[tuple[int, int]] = []
         read, at = 0, _timed(content, first)
-        losses.damaged = 0
-        while read < _ENOUGH and not losses.damaged and _is_block(content, at):
+        while read < _ENOUGH and at not in known and _is_block(content, at):
             after = _following(content, at)
+            losses.damaged = 0
             if content[at] in READ:
-                read += 1
                 deque(decoder.messages(content[at:after]), maxlen=0)
+            if losses.damaged:
+                known[at] = 0, False
+                break
+            walked.append((at, read))
+            read += content[at] in READ
             at = after
-        if not losses.damaged and (read == _ENOUGH or (read and at == len(content))):
+        more, whole = known.get(at, (0, at == len(content)))
+        if read + more >= _ENOUGH or (whole and read + more):
             return first
+        known.update((place, (read + more - before, whole)) for place, before in walked)
     return None
 
 

@@ -16,7 +16,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import Problem
@@ -168,7 +167,7 @@ def _log_ratio(bank: Estimator, problem: Problem, rows: Ints, theirs: Ints) -> F
     with np.errstate(divide="ignore"):
         log_l = np.log(weight)[..., None] - 0.5 * (d2 + np.linalg.slogdet(S)[1] + m * np.log(TURN))
         seen = np.log(problem.detection[rows]) - np.log(np.maximum(problem.clutter[rows], TINY**2))
-    return seen[:, None] + np.asarray(logsumexp(log_l, axis=0))
+    return seen[:, None] + np.asarray(np.logaddexp.reduce(log_l, axis=0))
 
 
 @dataclass(slots=True)
@@ -271,6 +270,8 @@ class Doubts:
     ) -> None:  # fmt: skip
         """Continue a pair with a branch; the tracker's own states become a branch. Other doubts about
         these tracks end.
+
+        Which measurements start tracks stays as it is: a forest has begun their trees in the association.
         """
         doubt, every = self.of_pair[pair], np.concatenate(rows)
         best = doubt.branches.pop(number)
@@ -287,7 +288,7 @@ class Doubts:
         register.exchange[every] = best.exchange
         register.score[every] = np.maximum(register.score[every], best.score[whose])
         seen = np.array(best.plots)[whose]
-        found.shared[every] = np.where(best.shared, seen, -1)
+        found.choose(every, seen, best.shared)
         register.history[every[seen >= 0]] |= 1
         register.updated_s[every[seen >= 0]] = found.problem.scan.t
         self.of_pair = {

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
@@ -46,7 +46,8 @@ class PolarCell:
     @property
     def probability(self) -> Floats:
         """Of each of SIZES."""
-        return np.exp(self.log_p - logsumexp(self.log_p))
+        p = np.exp(self.log_p - self.log_p.max())
+        return np.asarray(p / p.sum())
 
     def axes(self, place: Floats) -> Floats:
         """(d, d) unit vectors at a place (d,), in rows: along range, azimuth[, elevation]."""

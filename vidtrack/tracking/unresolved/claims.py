@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.associate.problem import VANISHING, Problem
@@ -70,7 +69,7 @@ def claims(
             continue
         near.append((i, j))
         one = log_one(problem, i, placed, cell.confined(joint, R))
-        log_odds = float(logsumexp(one)) - _two(problem, i, j)
+        log_odds = float(np.logaddexp.reduce(one)) - _two(problem, i, j)
         if not correlations.has(ids[pair]):  # of targets that were resolved just before, the distance is known
             cell.learn(p_by_size, log_odds)
         offers.append((np.log(p) - np.log1p(-p) + log_odds, i, j, int(one.argmax())))
@@ -106,7 +105,9 @@ def _two(problem: Problem, i: int, j: int) -> float:
     (a, ratio_i), (b, ratio_j) = _gated(problem, i), _gated(problem, j)
     both = np.where(a[:, None] == b, -np.inf, ratio_i[:, None] + ratio_j)
     miss_i, miss_j = problem.log_missed[[i, j]]
-    return float(logsumexp(np.concatenate([[miss_i + miss_j], ratio_i + miss_j, ratio_j + miss_i, both.ravel()])))
+    return float(
+        np.logaddexp.reduce(np.concatenate([[miss_i + miss_j], ratio_i + miss_j, ratio_j + miss_i, both.ravel()]))
+    )
 
 
 def log_one(problem: Problem, row: int, placed: Placed, joint: Joint) -> Floats:

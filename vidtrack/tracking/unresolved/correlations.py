@@ -39,14 +39,19 @@ class Correlations:
         Correlations that P no longer admits, because a track was updated alone meanwhile, are reduced in proportion.
         """
         s = x.shape[1]
+        every = np.zeros((x.size, x.size))
+        for i, own in enumerate(P):
+            every[i * s : (i + 1) * s, i * s : (i + 1) * s] = own
         across = np.zeros((x.size, x.size))
         for i, j in combinations(range(len(ids)), 2):
             block = self._of(ids[i], ids[j], s)
             across[i * s : (i + 1) * s, j * s : (j + 1) * s] = block
             across[j * s : (j + 1) * s, i * s : (i + 1) * s] = block.T
+        if not across.any():
+            return Joint(x.ravel(), every, s // 2)
         white = block_diag(*(np.linalg.inv(np.linalg.cholesky(own)) for own in P))
         least = float(np.linalg.eigvalsh(white @ across @ white.T)[0])
-        return Joint(x.ravel(), block_diag(*P) + across * min(1.0, STRONGEST / max(-least, STRONGEST)), s // 2)
+        return Joint(x.ravel(), every + across * min(1.0, STRONGEST / max(-least, STRONGEST)), s // 2)
 
     def keep(self, ids: Ints, joint: Joint, P: Floats) -> None:
         """Set the correlations of tracks (k,) to those of their joint state; P (k, s, s) are their covariances now.

@@ -40,9 +40,10 @@ class Joint(NamedTuple):
 
     def selection(self, weight: Floats) -> Floats:
         """(dim, k s) matrix of the weighted sum of the positions, weight (k,)."""
-        axes = np.zeros((self.dim, 2 * self.dim))
-        axes[np.arange(self.dim), 2 * np.arange(self.dim)] = 1.0
-        return np.asarray(np.kron(weight, axes), dtype=float)
+        axis = np.arange(self.dim)
+        matrix = np.zeros((self.dim, len(weight), 2 * self.dim))
+        matrix[axis, :, 2 * axis] = weight
+        return matrix.reshape(self.dim, -1)
 
     def difference(self, i: int, j: int) -> Floats:
         """(dim, k s) matrix of the position of target i relative to target j."""
