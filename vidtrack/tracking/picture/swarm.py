@@ -11,9 +11,10 @@ from vidtrack.arrays.types import Floats
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracks import Tracks
 
-_SWARM_PER_S = 30.0  # births in the whole picture, more than traffic has anywhere
+_SWARM_PER_S = 30.0  # its births in the whole picture, more than traffic has anywhere
 _FEW_PER_S = 1.0  # births of one size (a bin); sizes with fewer are not the swarm's
 _FALLEN = 0.25  # share of the most frequent pair of sizes, below which the swarm has begun to end
+_WIDEST = 2 * 4  # bins above the most frequent pair, at most: lamps and pieces of vehicles at night have all sizes
 _STEEP = 0.7  # most that is left of a pair half an octave on; traffic begins where the swarm no longer ends so fast
 _FORGET_S = 10.0
 _SOON_S = 3.0  # shortest time that births are taken to have come in: few scans are no swarm
@@ -39,13 +40,13 @@ class Swarm:
     def size(self) -> float:
         """Longer side [px] up to which objects are of the swarm; larger ones begin seldom. Zero without a swarm."""
         rate = self.births / max(self._watched_s, _SOON_S)
-        if rate.sum() < _SWARM_PER_S:
-            return 0.0
         pair = rate[:-1] + rate[1:]  # of half an octave
+        most = int(pair.argmax())
         rare, flat = pair[:-2] < 2 * _FEW_PER_S, pair[2:] > _STEEP * pair[:-2]
-        ends = rare | (flat & (pair[:-2] < _FALLEN * pair.max()))
-        ends[: int(pair.argmax())] = False
-        return float(_LEAST_PX * 2 ** ((int(ends.argmax()) if ends.any() else _BINS) / _STEPS))
+        ends = rare | (flat & (pair[:-2] < _FALLEN * pair[most]))
+        ends[most + _WIDEST :] = True
+        end = most + int(ends[most:].argmax())
+        return float(_LEAST_PX * 2 ** (end / _STEPS)) if rate[:end].sum() > _SWARM_PER_S else 0.0
 
     def learn(self, tracks: Tracks) -> None:
         """Count the tracks that began in this scan."""

@@ -21,7 +21,7 @@ from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
-from vidtrack.video.background.shadow import Sunlight, find_dark, mark_shadow, reclaim
+from vidtrack.video.background.shadow import SOFT, Sunlight, find_dark, mark_shadow, reclaim
 from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
 from vidtrack.video.foreground import Foreground
@@ -232,7 +232,8 @@ class Disturbance:
         if s.shadow and s.amid:
             reclaim(hit)
         if s.shadow and s.dark:
-            find_dark(told, scene, self._black, hit)
+            sunlit = self._sunlight.tolerance is not SOFT and not self._dark  # lamps cast hard shadows, too
+            find_dark(told, scene, self._black, sunlit, hit)
         return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

@@ -24,6 +24,7 @@ _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
 _ENCLOSED = 4  # the same from amid its edges, where nearly all of it passes for shadow
 _LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
+_HARDLY = 0.15  # the same of a region that is a vehicle's shadow as a whole, in sunlight
 _SOFT_PX = 3  # px
 _OWN = 0.05  # share of the pixels inside a shadow with edges of their own, from which it is a dark vehicle
 _FEW = 10.0  # px; fewer are no body
@@ -164,11 +165,13 @@ def reclaim(hit: Image) -> None:
 
 
 @kernel
-def find_dark(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> None:
+def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, hit: Image) -> None:
     """Set hit (h, w) uint8 from SHADOW back to 1 in regions that are nearly all shadow, but a dark vehicle.
 
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
     on all four sides is vehicle, too.
+
+    sunlit  the sun casts hard shadows: a region with a part that is none is a vehicle beside its shadow
     """
     row, start, stop = find_runs(hit, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
@@ -183,7 +186,7 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> 
                 inside[region] += 1
                 edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
                 own[region] += edge[y, x]
-    dark = (lit < _LIT * whole) & (own > np.maximum(_OWN * inside, _FEW))
+    dark = (lit < (_HARDLY if sunlit else _LIT) * whole) & (own > np.maximum(_OWN * inside, _FEW))
     for k in range(len(row)):
         if dark[label[k]]:
             for x in range(start[k], stop[k]):
