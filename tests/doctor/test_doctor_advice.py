@@ -196,7 +196,7 @@ def test_too_few_pictures(clean, tmp_path):
     [
         (lambda p: noisy(p, 40), ["source.scale=0.5"]),
         (lambda p: [0.25 * q for q in p], [f"{THRESHOLD}=5"]),
-        (lambda p: flickering(p, 0.15, rows=1 / 90), [f"{THRESHOLD}=25"]),
+        (lambda p: flickering(p, 0.25, rows=1 / 90), [f"{THRESHOLD}=38"]),
     ],
     ids=["noise", "dark", "bands"],
 )
