@@ -39,7 +39,10 @@ class Swarm:
     @property
     def size(self) -> float:
         """Longer side [px] up to which objects are of the swarm; larger ones begin seldom. Zero without a swarm."""
-        rate = self.births / max(self._watched_s, _SOON_S)
+        seconds = max(self._watched_s, _SOON_S)
+        if self.births.sum() <= _SWARM_PER_S * seconds:
+            return 0.0
+        rate = self.births / seconds
         pair = rate[:-1] + rate[1:]  # of half an octave
         most = int(pair.argmax())
         rare, flat = pair[:-2] < 2 * _FEW_PER_S, pair[2:] > _STEEP * pair[:-2]

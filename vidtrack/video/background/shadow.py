@@ -187,6 +187,8 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
                 edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
                 own[region] += edge[y, x]
     dark = (lit < (_HARDLY if sunlit else _LIT) * whole) & (own > np.maximum(_OWN * inside, _FEW))
+    if not dark.any():
+        return
     for k in range(len(row)):
         if dark[label[k]]:
             for x in range(start[k], stop[k]):

@@ -54,10 +54,8 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
     basins = 0
     for p in order:
         d = np.float64(deep[p])
-        lowest, highest = (
-            np.uint32(0xFFFFFFFF),
-            np.int32(-1),
-        )  # of the neighbours' labels; most pixels have one, or none
+        # Least and greatest of the neighbours' labels; most pixels have one, or none.
+        lowest, highest = np.uint32(0xFFFFFFFF), np.int32(-1)
         for row in (p - across, p, p + across):
             for q in (row - _ONE, row, row + _ONE):
                 lowest, highest = min(lowest, np.uint32(label[q])), max(highest, label[q])  # -1 is the largest unsigned
