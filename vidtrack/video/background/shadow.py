@@ -176,17 +176,22 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
     row, start, stop = find_runs(hit, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
     whole, lit, inside, own = np.zeros((4, count))
+    for k in range(len(row)):
+        whole[label[k]] += stop[k] - start[k]
+        for x in range(start[k], stop[k]):
+            lit[label[k]] += hit[row[k], x] == 1
+    dim = lit < (_HARDLY if sunlit else _LIT) * whole
     edge = np.zeros(hit.shape, np.bool_)
     for k in range(len(row)):
         y, region = row[k], label[k]
-        whole[region] += stop[k] - start[k]
+        if not dim[region]:
+            continue
         for x in range(start[k], stop[k]):
-            lit[region] += hit[y, x] == 1
             if hit[y, x] == SHADOW and _is_inside(hit, y, x):
                 inside[region] += 1
                 edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
                 own[region] += edge[y, x]
-    dark = (lit < (_HARDLY if sunlit else _LIT) * whole) & (own > np.maximum(_OWN * inside, _FEW))
+    dark = dim & (own > np.maximum(_OWN * inside, _FEW))
     if not dark.any():
         return
     for k in range(len(row)):
