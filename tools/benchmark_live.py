@@ -4,7 +4,8 @@
 
 Each clip becomes an H.264 stream without B-frames, as cameras send it, in MPEG-TS over HTTP, round and round in real
 time. It is watched by so many live runs at once, each a process of its own, as `vidtrack live` starts them, all on one
-core; what sends the stream is on the others. The first 15 s with tracks do not count: kernels are loaded then.
+core; what sends the stream is on the others. Nothing counts until 15 s after the first tracks of the last camera:
+kernels are loaded until then.
 
 A row for each clip, rate and number of cameras: the mean number of vehicles, processor time per camera and frame (user
 and system, all threads, with decoding), the share of the core that they need, frames that were dropped, and the time
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import math
 import os
 import tempfile
 import time
@@ -24,6 +26,7 @@ from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Semaphore
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from typing import NoReturn
@@ -109,22 +112,24 @@ def send(pictures: list[bytes], size: tuple[int, int], fps: int, told: Connectio
     server.serve_forever()
 
 
-def watch(address: str, seconds: float, told: Connection) -> NoReturn:
-    """The process of a live run; tells what it needed."""
-    run_and_leave(lambda: told.send(_watched(address, seconds)))
+def watch(address: str, seconds: float, starting: Semaphore, told: Connection) -> NoReturn:
+    """The process of a live run, which takes one of the cameras that start; tells what it needed."""
+    run_and_leave(lambda: told.send(_watched(address, seconds, starting)))
 
 
-def _watched(address: str, seconds: float) -> Watched:
-    vehicles, latencies = [], []
+def _watched(address: str, seconds: float, starting: Semaphore) -> Watched:
+    vehicles, latencies, since_s = [], [], math.inf
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,  # late results may still be written into it
         LiveRun(address, Settings(), Path(folder) / "run") as run,
     ):
-        steps = iter(run)
-        next(steps)
-        since_s = time.monotonic() + SETTLING_S
-        for step in steps:
-            if (now_s := time.monotonic()) < since_s:
+        for number, step in enumerate(run):
+            now_s = time.monotonic()
+            if number == 0:
+                starting.acquire()
+            if since_s == math.inf and starting.get_value() == 0:
+                since_s = now_s + SETTLING_S
+            if now_s < since_s:
                 begin_s, begin_used_s, begin_dropped = now_s, _used(), run.board.now().reading["frames_dropped"]
                 continue
             vehicles.append(np.count_nonzero(step.tracks.status != TENTATIVE))
@@ -152,7 +157,8 @@ def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> li
     sender.start()
     address = f"http://127.0.0.1:{here.recv()}/"
     pipes = [context.Pipe() for _ in range(cameras)]
-    runs = [context.Process(target=watch, args=(address, seconds, told)) for _, told in pipes]
+    starting = context.Semaphore(cameras)
+    runs = [context.Process(target=watch, args=(address, seconds, starting, told)) for _, told in pipes]
     every_core = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {core})  # inherited by what starts now, with all its threads
     for run in runs:

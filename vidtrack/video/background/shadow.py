@@ -13,7 +13,7 @@ from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import CORNERS, OBJECTS, connect, find_runs
+from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs
 
 _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
@@ -161,7 +161,10 @@ def reclaim(hit: Image) -> None:
         whole[label[k]] += stop[k] - start[k]
         for x in range(start[k], stop[k]):
             lit[label[k]] += hit[row[k], x] == 1
-    _fill(hit, row, start, stop, lit[label] >= _LIT * whole[label], _AMID)
+    vehicle = np.empty(count, np.bool_)
+    for i in range(count):
+        vehicle[i] = lit[i] >= _LIT * whole[i]
+    _fill(hit, row, start, stop, label, vehicle, _AMID)
 
 
 @kernel
@@ -180,26 +183,29 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
         whole[label[k]] += stop[k] - start[k]
         for x in range(start[k], stop[k]):
             lit[label[k]] += hit[row[k], x] == 1
-    dim = lit < (_HARDLY if sunlit else _LIT) * whole
+    most = _HARDLY if sunlit else _LIT
     edge = np.zeros(hit.shape, np.bool_)
     for k in range(len(row)):
         y, region = row[k], label[k]
-        if not dim[region]:
+        if lit[region] >= most * whole[region]:
             continue
         for x in range(start[k], stop[k]):
             if hit[y, x] == SHADOW and _is_inside(hit, y, x):
                 inside[region] += 1
                 edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
                 own[region] += edge[y, x]
-    dark = dim & (own > np.maximum(_OWN * inside, _FEW))
-    if not dark.any():
+    dark, found = np.empty(count, np.bool_), False
+    for i in range(count):
+        dark[i] = own[i] > max(_OWN * inside[i], _FEW)
+        found |= dark[i]
+    if not found:
         return
     for k in range(len(row)):
         if dark[label[k]]:
             for x in range(start[k], stop[k]):
                 if edge[row[k], x]:
                     hit[row[k], x] = 1
-    _fill(hit, row, start, stop, dark[label], _ENCLOSED)
+    _fill(hit, row, start, stop, label, dark, _ENCLOSED)
 
 
 @inlined
@@ -221,8 +227,8 @@ def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -
 
 
 @inlined
-def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask, sides: int) -> None:
-    """Set hit from SHADOW to 1 between pixels with 1, in runs (R,) of a vehicle (R,)."""
+def _fill(hit: Image, row: Runs, start: Runs, stop: Runs, label: Ints, vehicle: Mask, sides: int) -> None:
+    """Set hit from SHADOW to 1 between pixels with 1, in runs (R,) of the regions with a `vehicle` (N,)."""
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)
     for k in range(len(row)):
@@ -238,7 +244,7 @@ def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask, sides: 
             side[y, x] |= np.uint8(seen) * _RIGHT | np.uint8(below) * _BELOW
             seen |= hit[y, x] == 1
     for k in range(len(row)):
-        if not vehicle[k]:
+        if not vehicle[label[k]]:
             continue
         for x in range(start[k], stop[k]):
             if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= sides:
