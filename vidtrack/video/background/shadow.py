@@ -159,8 +159,7 @@ def reclaim(hit: Image) -> None:
     whole, lit = np.zeros((2, count))
     for k in range(len(row)):
         whole[label[k]] += stop[k] - start[k]
-        for x in range(start[k], stop[k]):
-            lit[label[k]] += hit[row[k], x] == 1
+        lit[label[k]] += _lit(hit, row[k], start[k], stop[k])
     vehicle = np.empty(count, np.bool_)
     for i in range(count):
         vehicle[i] = lit[i] >= _LIT * whole[i]
@@ -181,8 +180,7 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
     whole, lit, inside, own = np.zeros((4, count))
     for k in range(len(row)):
         whole[label[k]] += stop[k] - start[k]
-        for x in range(start[k], stop[k]):
-            lit[label[k]] += hit[row[k], x] == 1
+        lit[label[k]] += _lit(hit, row[k], start[k], stop[k])
     most = _HARDLY if sunlit else _LIT
     edge = np.zeros(hit.shape, np.bool_)
     for k in range(len(row)):
@@ -206,6 +204,15 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
                 if edge[row[k], x]:
                     hit[row[k], x] = 1
     _fill(hit, row, start, stop, label, dark, _ENCLOSED)
+
+
+@inlined
+def _lit(hit: Image, y: int, start: int, stop: int) -> np.int32:
+    """Number of pixels in a run of row y that are no shadow."""
+    lit = np.int32(0)
+    for x in range(start, stop):
+        lit += np.int32(hit[y, x] == 1)
+    return lit
 
 
 @inlined
