@@ -120,6 +120,18 @@ def test_a_pair_that_follows_a_branch_reports_its_plots(tmp_path, monkeypatch, m
     assert count
 
 
+def test_a_pair_that_parts_keeps_its_order_under_mht(tmp_path):
+    """Both orders stay about equally probable for some scans: the report does not go to and fro between them."""
+    seen = simulate_radar("radar-parting", 428)
+    write_radar(seen, tmp_path)
+    nearest = []
+    for scan, tracks in track_plots(tmp_path / "plots.csv", load(assignments=["tracker.method=mht"])):
+        if scan > np.flatnonzero(seen.merged[0])[-1]:
+            off = np.linalg.norm(tracks.xy - seen.states[0, scan, :2], axis=1)
+            nearest.append(int(tracks.id[off.argmin()]))
+    assert len(set(nearest)) == 1
+
+
 @pytest.mark.parametrize(("north", "branches"), [([5020, 4980], True), ([5020, 4980, 5000], False)])
 def test_tracks_near_to_several_others_have_no_branches(north, branches):
     run = tracker()
