@@ -5,7 +5,8 @@
 
 Each argument after the scenario is one choice of settings, as in measure_radar.py. The stretch is from the first to the
 last scan with one plot for both. IDF1, GOSPA (order 2) and matches are within 1 km. NEES is of positions, with the
-track nearest to a target in the scan, because which is which is not in the data; 2 is right.
+track nearest to a target in the scan, because which is which is not in the data; 2 is right. The scenario `anywhere` is
+radar-unresolved with targets that are not 60 m apart in the stretch, but anywhere in a resolution cell.
 
 kept       runs in which the two tracks that follow the pair before the stretch are there in all its scans and after it
 switches   identity switches over the whole run, and their largest number in one run
@@ -29,7 +30,9 @@ from vidtrack import formats, score
 from vidtrack.config.load import load
 from vidtrack.config.settings import Settings
 from vidtrack.run.radar import track_plots
-from vidtrack.simulate.radar_scenarios import simulate_radar
+from vidtrack.simulate.flight import fly, sidestep
+from vidtrack.simulate.radar import Target
+from vidtrack.simulate.radar_scenarios import COARSE, SCENARIOS, simulate_radar
 from vidtrack.simulate.radar_write import write_radar
 from vidtrack.tracks import TENTATIVE, Tracks
 
@@ -42,6 +45,7 @@ class Outcome(NamedTuple):
 
     idf1: list[float]
     nees: list[float]
+    nees_whole: float
     gospa: float
     switches: float
     kept: bool
@@ -75,8 +79,28 @@ def outcome(scenario: str, seed: int, settings: Settings) -> Outcome:
         exchanged, stated = bool(crossed < straight), float(end.exchange[end.id == pair[0]][0])
     return Outcome(
         [float(one["idf1"]) for one in scores], [nees(cut(result, *part), truth) for part in parts],
-        float(whole["gospa"]), float(whole["switches"]), kept, exchanged, stated,
+        nees(result, truth), float(whole["gospa"]), float(whole["switches"]), kept, exchanged, stated,
     )  # fmt: skip
+
+
+def anywhere(rng: np.random.Generator) -> list[Target]:
+    """Two aircraft as in radar-unresolved, of which one may be anywhere in the resolution cell about the other."""
+    azimuth, course, r = *rng.uniform(0, 2 * np.pi, 2), rng.uniform(15e3, 30e3)
+    line, along = (np.array([np.sin(angle), np.cos(angle), 0.0]) for angle in (azimuth, course))
+    across = np.array([along[1], -along[0], 0.0])
+    side_m, side_deg = COARSE.cell
+    at_range, at_azimuth = rng.uniform(-1, 1, 2) * (side_m, np.radians(side_deg) * r)
+    apart = at_range * line + at_azimuth * np.array([line[1], -line[0], 0.0])
+    velocity = rng.uniform(180, 220) * along
+    return [
+        Target(
+            sidestep(
+                fly(r * line + side * apart / 2 - 100 * velocity, velocity),
+                side * 1200 * across, near=0.0, times_s=(20.0, 55.0, 145.0, 180.0),
+            )
+        )
+        for side in (-1, 1)
+    ]  # fmt: skip
 
 
 def table(steps: list[tuple[int, Tracks]]) -> formats.Table:
@@ -121,6 +145,8 @@ def show(name: str, found: list[Outcome]) -> None:
     idf1, nees = (np.nanmean([getattr(one, what) for one in found], axis=0) for what in ("idf1", "nees"))
     gospa, switches = (np.array([getattr(one, what) for one in found]) for what in ("gospa", "switches"))
     sys.stdout.write(f"{name or 'default'}\n    {', '.join(PARTS)}: IDF1 {idf1.round(3)}  NEES {nees.round(2)}\n")
+    over_all = np.array([one.nees_whole for one in found])
+    sys.stdout.write(f"    NEES of whole runs {over_all.mean():.2f} +- {over_all.std() / len(found) ** 0.5:.2f}\n")
     kept = [one for one in found if one.kept]
     sys.stdout.write(f"    GOSPA {gospa.mean():.1f} +- {gospa.std():.1f} m, switches {switches.mean():.2f}, ")
     sys.stdout.write(f"at most {switches.max():.0f}, kept {len(kept)} of {len(found)}\n")
@@ -135,11 +161,13 @@ def show(name: str, found: list[Outcome]) -> None:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario", choices=["radar-unresolved", "radar-parting"])
+    parser.add_argument("scenario", choices=["radar-unresolved", "radar-parting", "anywhere"])
     parser.add_argument("choices", nargs="*", default=[""], metavar="A.B=VALUE;...")
     parser.add_argument("--seeds", default="200-219", metavar="FIRST-LAST")
     options = parser.parse_intermixed_args()
     logging.disable(logging.WARNING)
+    radar, _, scans, holds = SCENARIOS["radar-unresolved"]
+    SCENARIOS["anywhere"] = radar, anywhere, scans, holds
     first, last = map(int, options.seeds.split("-"))
     for choice in options.choices:
         settings = load(assignments=[part for part in choice.split(";") if part])

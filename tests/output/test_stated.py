@@ -97,6 +97,23 @@ def test_a_box_that_the_border_cuts_is_less_certain_along_it(surveyed, more):
     assert np.sqrt(np.maximum(by, 0)) == pytest.approx(more, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("left", "off", "least"),
+    [(89.0, (2, 4), [2, 0]), (89.0, (-1.5, 4), [1.5, 0]), (0.0, (2, 4), [0, 0]), (89.0, (0.1, 0), [0, 0])],
+    ids=["cut", "the other way", "not cut", "less than the other errors"],
+)
+def test_what_the_border_cuts_is_off_the_middle_of_its_box(left, off, least):
+    step = step_of("own", np.diag([0.04, 1, 0.04, 1]), surveyed=(left, 0, 200, 100))
+    by = np.array([*off, 0, 0])
+    moved = replace(
+        step,
+        tracks=replace(step.tracks, box=step.tracks.box + by),
+        scan=replace(step.scan, box=step.scan.box + by),
+    )
+    expected = np.maximum(np.diag(position(step)), np.square(least))
+    assert np.diag(position(moved)) == pytest.approx(expected, rel=1e-9)
+
+
 def test_all_errors_of_a_small_blob_scale_with_the_processed_pixel():
     P = np.diag([4.0, 1, 4, 1])
     fine = position(step_of("own", P))

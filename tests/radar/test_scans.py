@@ -1,5 +1,7 @@
 """Plots as scans for the tracker."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from plot_files import HEADER, write
@@ -98,6 +100,17 @@ def test_near_the_radar_a_full_turn_is_surveyed_at_most(tmp_path):
     low, high = extent(read(tmp_path, *(f"{k},{4 * k},{50 + k},{18 * k},5,0.1" for k in range(20)), estimator="ekf"))
     assert high[1] - low[1] == pytest.approx(2 * np.pi)
     assert low[0] == 0.0
+
+
+def test_an_angle_without_ranges_may_turn_as_it_likes(tmp_path):
+    """The first component is a range for a radar only: of bearings alone none is taken for one."""
+
+    class Bearing:
+        angles = (0,)
+
+    found = replace(read(tmp_path, "0,0,1000,10,5,0.1", "1,4,1000,20,5,0.1", estimator="ekf"), sensor=Bearing(), dim=1)
+    low, high = extent(replace(found, z=found.z[:, 1:], R=found.R[:, 1:, 1:]))
+    assert (high - low).tolist() == pytest.approx([2 * np.pi])
 
 
 def test_a_single_plot_has_a_surveyed_space(tmp_path):

@@ -40,6 +40,8 @@ class IMMBank:
     keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
     """
 
+    STATE = ("banks", "mode", "hits", "scale", "x", "P")
+
     def __init__(
         self,
         models: Sequence[Motion],
@@ -75,7 +77,7 @@ class IMMBank:
         evenly, usual = (each / each.sum(axis=1, keepdims=True) for each in (together, together / self.left.T))
         self._unseen = USUAL * usual + (1 - USUAL) * evenly
         self.model = models[0]
-        self.banks = [KalmanBank(model) for model in models]
+        self.banks = tuple(KalmanBank(model) for model in models)
         self.mode = np.empty((0, r))
         self._expected = self.mode
         self.hits = np.empty(0, np.int64)
@@ -169,7 +171,7 @@ class IMMBank:
     def only(self, rows: Ints) -> Self:
         """A bank of its own of these rows (K,)."""
         bank = copy(self)
-        bank.banks = [copy(each) for each in self.banks]
+        bank.banks = tuple(copy(each) for each in self.banks)
         bank.keep(rows)
         return bank
 
@@ -186,7 +188,7 @@ class IMMBank:
         self.scale = np.concatenate([self.scale, scale])
         self.x, self.P = self._moments(self.banks, self.mode)
 
-    def _moved(self, dt: float) -> tuple[list[KalmanBank], Floats]:
+    def _moved(self, dt: float) -> tuple[tuple[KalmanBank, ...], Floats]:
         """The banks after mixing and a prediction by dt seconds, and the probabilities of the modes then."""
         switch = self._switching(dt)
         mode = self.mode @ switch
@@ -198,7 +200,7 @@ class IMMBank:
             mixed.x, mixed.P = _mixture(weight, np.stack([x for x, _ in lifted]), np.stack([P for _, P in lifted]))
             mixed.predict(dt)
             moved.append(mixed)
-        return moved, mode
+        return tuple(moved), mode
 
     def _switching(self, dt: float) -> Floats:
         """(r, r) transition probabilities of the models over dt seconds."""

@@ -13,7 +13,8 @@ L   what lasts, and what this picture contradicts:
     outline  of the blob's area a part may be missing or added at one end: what the majority in the detector's window
              decides about (`_PATCH`), and a share of the extent (`_SHARE`), by shadow and by what looks like the road.
              The share is larger for larger vehicles, which are higher: their shadows reach farther
-    border   where the border of the picture cuts the box, what is outside may lie to one side (`_BESIDE`)
+    border   where the border of the picture cuts the box, what is outside may lie to one side (`_BESIDE`). Across the
+             border the centroid is not the middle of what is seen, and is off by the difference at least
     blob     a blob of another size than the vehicle lacks the difference at one end, or has too much there; and where
              its middle is not that of the vehicle's box, the truth may be anywhere between: uniform errors. A shared
              blob that is smaller than the vehicle lacks the difference at one end
@@ -80,8 +81,9 @@ def _restated(steps: Sequence[Step]) -> Floats:
     """(N, n, n) stated covariances of the tracks of steps with scans that are alike."""
     scan, place = steps[0].scan, list(steps[0].tracks.position)
     pixel = scan.pixel
-    whole, box, group, measurement = (
-        np.concatenate([getattr(step.tracks, name) for step in steps]) for name in ("P", "box", "group", "measurement")
+    whole, box, xy, group, measurement = (
+        np.concatenate([getattr(step.tracks, name) for step in steps])
+        for name in ("P", "box", "xy", "group", "measurement")
     )
     P = whole[:, place][:, :, place]
     shared, own = group >= 0, measurement >= 0
@@ -93,7 +95,9 @@ def _restated(steps: Sequence[Step]) -> Floats:
     eye = np.eye(len(place))
     updated = np.linalg.solve(eye + P * measured[:, None, :], P)  # (P^-1 + W^-1)^-1, for a singular P too
     updated = (updated + np.swapaxes(updated, 1, 2)) / 2
-    return _with_position(whole, place, updated + _diagonal(lasting), pixel)
+    cov = updated + _diagonal(lasting)
+    cov += _diagonal(np.maximum(_off_middle(scan, box, xy) - np.einsum("tii->ti", cov), 0.0))
+    return _with_position(whole, place, cov, pixel)
 
 
 def _outline(side: Floats, pixel: float) -> Floats:
@@ -121,6 +125,12 @@ def _beside(scan: Scan, box: Floats, side: Floats) -> Floats:
     """(T, 2) variances along the border of the picture, where it cuts boxes (T, 4)."""
     cut = Border().of(scan).sides(box)
     return (_BESIDE * side) ** 2 * np.column_stack([cut[:, 1] | cut[:, 3], cut[:, 0] | cut[:, 2]])
+
+
+def _off_middle(scan: Scan, box: Floats, xy: Floats) -> Floats:
+    """(T, 2) squared differences of positions (T, 2) from the middles of boxes (T, 4), across borders that cut them."""
+    cut = Border().of(scan).sides(box)
+    return (box[:, :2] + box[:, 2:] / 2 - xy) ** 2 * (cut[:, :2] | cut[:, 2:])
 
 
 def _diagonal(values: Floats) -> Floats:

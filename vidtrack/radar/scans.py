@@ -157,10 +157,14 @@ def extent(found: Measurements) -> tuple[Floats, Floats]:
 
 
 def _margin(found: Measurements) -> Floats:
-    """(m,) distance that a target with twice the speed's standard deviation covers in REACH_SCANS scans."""
+    """(m,) distance that a target with twice the speed's standard deviation covers in REACH_SCANS scans.
+
+    An angle turns by that over the usual range; without ranges it may turn by as much as it likes.
+    """
     step = 2 * REACH_SCANS * 2 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)
     margin = np.full(found.z.shape[1], step)
-    if found.sensor.angles:
+    margin[list(found.sensor.angles)] = 2 * np.pi
+    if isinstance(found.sensor, RangeAzimuth | RangeAzimuthElevation):
         margin[1 : found.dim] = np.minimum(step / np.median(found.z[:, 0]), np.pi)
     margin[found.dim :] = 4 * found.speed
     return margin + np.sqrt(12 * np.diagonal(found.R, axis1=1, axis2=2).mean(axis=0))

@@ -13,6 +13,7 @@ from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, PlotFormatError
 from vidtrack.radar.feeds import asterix, layout
 from vidtrack.radar.feeds.asterix import Decoder
+from vidtrack.radar.feeds.layout import Layout
 from vidtrack.radar.feeds.messages import Kind, Losses
 from vidtrack.radar.feeds.recording import is_feed, read_messages
 from vidtrack.radar.reading import read
@@ -188,6 +189,16 @@ def test_blocks_from_different_starts_onto_one_chain_are_counted_together(sound)
     good = mark(0.0)
     content = bytes([8, 0, 3 + len(good)]) + good * sound + b"\xff"  # the first block hides a sound one
     assert asterix.first_block(content, len(content)) == (3 if sound == 4 else None)
+
+
+@pytest.mark.parametrize("octet", [0x30, 0x3E, 0x15])
+def test_records_of_blocks_that_overlap_are_decoded_once(monkeypatch, octet):
+    """Each octet begins a block of 5 to 16 thousand octets, and a record of a few or of all that follow."""
+    content, octets, places = bytes([octet]) * (4 * 257 * octet - 40) + b"\xff\xff\xff", [], Layout.places
+    monkeypatch.setattr(Layout, "places", lambda self, body, at: octets.append(len(body)) or places(self, body, at))
+    assert asterix.first_block(content, 1 << 16) != 0
+    assert 1000 < len(octets) <= len(content)
+    assert max(octets) <= 1024
 
 
 def test_other_binary_files_are_no_recordings(tmp_path):

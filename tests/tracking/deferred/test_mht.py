@@ -348,6 +348,26 @@ def test_settings_choose_the_rule_and_how_long_it_waits(method):
     assert chosen == {"mht": vt.MHT(n_scan=5), "split": vt.Split(n_scan=5)}[method]
 
 
+@pytest.mark.parametrize(
+    ("log_p", "follows", "reported"),
+    [
+        ((0.45, 0.40, 0.15), (True, False, True, False), 1),
+        ((0.70, 0.20, 0.10), (True, False, True, False), 0),
+        ((0.45, 0.15, 0.40), (True, False, False, True), 0),
+        ((0.45, 0.40, 0.15), (True, True, True, True), 0),
+    ],
+    ids=["about as probable", "clearly less probable", "other histories", "nothing to follow"],
+)
+def test_tracks_exchange_what_they_took_only_if_that_is_clearly_likelier(log_p, follows, reported):
+    """Leaves 0 and 1 are of one track, 2 and 3 of the other; the histories are 5 and 6 in both orders, or 5 and 7."""
+    past = np.array([[5], [6], [6], [5]])
+    exchanged, as_reported, another = [1, 3], [0, 2], [0, 3]
+    found = Hypotheses(
+        np.array([0, 3]), np.log(log_p), np.array([0, 2, 4, 6]), np.array(exchanged + as_reported + another)
+    )
+    assert found.steady(past, np.array(follows), log(3)).tolist() == [reported]
+
+
 @pytest.mark.parametrize("method", [vt.MHT(), vt.Split()])
 def test_a_saved_tracker_goes_on_as_if_it_had_not_stopped(method):
     def new():

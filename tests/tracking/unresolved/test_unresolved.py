@@ -5,11 +5,13 @@ import pytest
 
 from vidtrack.associate.hard import GNN
 from vidtrack.config.load import load
-from vidtrack.run.radar import track_plots
+from vidtrack.radar.plots import read_plots
+from vidtrack.radar.scans import measurements
+from vidtrack.run.radar import build_radar_tracker, track_plots
 from vidtrack.scan import Scan
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
-from vidtrack.state import gather, restore
+from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.tracker import Tracker
 from vidtrack.tracking.unresolved.branches import Doubts
@@ -120,6 +122,18 @@ def test_a_pair_that_follows_a_branch_reports_its_plots(tmp_path, monkeypatch, m
     assert count
 
 
+def test_a_pair_that_parts_keeps_its_order_under_mht(tmp_path):
+    """Both orders stay about equally probable for some scans: the report does not go to and fro between them."""
+    seen = simulate_radar("radar-parting", 428)
+    write_radar(seen, tmp_path)
+    nearest = []
+    for scan, tracks in track_plots(tmp_path / "plots.csv", load(assignments=["tracker.method=mht"])):
+        if scan > np.flatnonzero(seen.merged[0])[-1]:
+            off = np.linalg.norm(tracks.xy - seen.states[0, scan, :2], axis=1)
+            nearest.append(int(tracks.id[off.argmin()]))
+    assert len(set(nearest)) == 1
+
+
 @pytest.mark.parametrize(("north", "branches"), [([5020, 4980], True), ([5020, 4980, 5000], False)])
 def test_tracks_near_to_several_others_have_no_branches(north, branches):
     run = tracker()
@@ -131,6 +145,37 @@ def test_tracks_near_to_several_others_have_no_branches(north, branches):
     assert had == branches
     assert tracks.id.tolist() == list(range(1, len(north) + 1))
     assert (tracks.status == MERGED).all()
+
+
+@pytest.mark.parametrize(
+    ("method", "stop"),
+    [("gnn", "just before one is followed"), ("gnn", "restored twice"), ("mht", "while branches are kept")],
+)
+def test_branches_go_on_from_a_saved_state(tmp_path, monkeypatch, method, stop):
+    """A false plot parts this pair, which a branch keeps together."""
+    write_radar(simulate_radar("radar-parting", 709), tmp_path)
+    settings = load(assignments=[f"tracker.method={method}"])
+    found = measurements(read_plots(tmp_path / "plots.csv", settings.radar), settings.radar)
+    follow, followed, saved, expected = Doubts._follow, [], [], []
+    monkeypatch.setattr(Doubts, "_follow", lambda *given: (followed.append(len(expected)), follow(*given)))
+    straight = build_radar_tracker(settings, found)
+    for _, scan in found:
+        saved.append(gather(straight))
+        expected.append(straight.step(scan))
+    branches = [len(state.get("sharing.branches.whose", ())) for state in saved]
+    at = followed[0] if stop == "just before one is followed" else np.flatnonzero(branches)[2]
+    assert branches[at]
+    write_state(tmp_path / "state", saved[at])
+    state = read_state(tmp_path / "state")
+    for _ in range(1 + (stop == "restored twice")):
+        resumed = build_radar_tracker(settings, found)
+        restore(resumed, state)
+        state = gather(resumed)
+    for k, (_, scan) in enumerate(found):
+        if k >= at:
+            tracks = resumed.step(scan)
+            for name in ("x", "P", "id", "exchange", "status"):
+                np.testing.assert_array_equal(getattr(tracks, name), getattr(expected[k], name))
 
 
 def test_a_saved_state_goes_on_as_if_it_had_not_been_saved():

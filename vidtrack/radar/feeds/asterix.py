@@ -7,7 +7,6 @@ Exchange", parts 2a, 2b, 4, 9, 12.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator
 from math import pi
 
@@ -22,6 +21,10 @@ BESIDE = (8, 10, 11, 19, 20, 23, 63, 65)
 _HEAD = 3
 _ENOUGH = 4
 """Blocks in a row that are looked at."""
+_CHECKED = 512
+"""Octets of a block in which records are looked at to tell whether it is one."""
+_LONGEST, _NO_LENGTH = 1024, 1 << 16
+"""Octets of the longest record that is looked at, and more than any block has."""
 
 Place = dict[str, int]
 
@@ -38,20 +41,17 @@ def looks_like(content: bytes, at: int = 0) -> bool:
 def first_block(content: bytes, farthest: int) -> int | None:
     """Where sound blocks begin, no farther than so many octets; None: nowhere.
 
-    Several of them follow each other, or the only one ends with the content, and those that are read have no damage.
+    Several of them follow each other, or the only one ends with the content, and those that are read have no damage in
+    their first octets. Blocks from different places may overlap: each record is decoded once.
     """
-    losses = Losses()
-    decoder = Decoder(losses)
+    decoder, records = Decoder(Losses()), dict[tuple[int, int], int]()
     known: dict[int, tuple[int, bool]] = {}  # of places walked: sound blocks from there on, whether up to the end
     for first in range(min(farthest, len(content))):
         walked: list[tuple[int, int]] = []
         read, at = 0, _timed(content, first)
         while read < _ENOUGH and at not in known and _is_block(content, at):
             after = _following(content, at)
-            losses.damaged = 0
-            if content[at] in READ:
-                deque(decoder.messages(content[at:after]), maxlen=0)
-            if losses.damaged:
+            if content[at] in READ and not _is_sound(content, at, decoder, records):
                 known[at] = 0, False
                 break
             walked.append((at, read))
@@ -62,6 +62,20 @@ def first_block(content: bytes, farthest: int) -> int | None:
             return first
         known.update((place, (read + more - before, whole)) for place, before in walked)
     return None
+
+
+def _is_sound(content: bytes, at: int, decoder: Decoder, known: dict[tuple[int, int], int]) -> bool:
+    """Whether the records that begin in the first octets of a block are whole.
+
+    known  the places after records, by category and place
+    """
+    category, end = content[at], at + int.from_bytes(content[at + 1 : at + _HEAD], "big")
+    place = at + _HEAD
+    while place < min(end, at + _CHECKED):
+        if (category, place) not in known:
+            known[category, place] = place + decoder.length(category, content[place : place + _LONGEST])
+        place = known[category, place]
+    return place <= end
 
 
 def _is_block(content: bytes, at: int) -> bool:
@@ -100,6 +114,15 @@ class Decoder:
                 at = _timed(payload, at + size)
             else:
                 at = _timed(payload, at + size)
+
+    def length(self, category: int, body: bytes) -> int:
+        """Octets of the first record; more than any block has if it is damaged."""
+        try:
+            place, after = _layout(category, self._layouts[category], body, 0).places(body, 0)
+            _READERS[category](body, place, NAN)
+        except (Damaged, IndexError):
+            return _NO_LENGTH
+        return after
 
     def _block(self, category: int, body: bytes) -> Iterator[Message]:
         kinds, read, source = self._layouts[category], _READERS[category], 0

@@ -112,8 +112,8 @@ def _children(
 
 
 @kernel
-def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, young: Mask) -> Mask:
-    """(H,) hypotheses that agree with the likeliest of their cluster about one scan in the past.
+def agreeing(first: Ints, start: Ints, leaf: Ints, chosen: Ints, tree: Ints, decided: Ints, young: Mask) -> Mask:
+    """(H,) hypotheses that agree with the chosen one (C,) of their cluster about one scan in the past.
 
     Of each leaf: tree (T,), decided (T,) its measurement in that scan, young (T,) whether its tree began in that scan.
     A track that only one of two hypotheses has is no disagreement: the other has deleted it since.
@@ -122,13 +122,13 @@ def agreeing(first: Ints, start: Ints, leaf: Ints, tree: Ints, decided: Ints, yo
     taken = np.empty(tree.max() + 1 if len(tree) else 0, np.int64)
     has = np.zeros(len(taken), np.bool_)
     for c in range(len(first) - 1):
-        best = first[c]
+        best = chosen[c]
         begun = 0
         for e in range(start[best], start[best + 1]):
             t = leaf[e]
             has[tree[t]], taken[tree[t]] = True, decided[t]
             begun += young[t]
-        for h in range(best + 1, first[c + 1]):
+        for h in range(first[c], first[c + 1]):
             others = 0
             for e in range(start[h], start[h + 1]):
                 t = leaf[e]

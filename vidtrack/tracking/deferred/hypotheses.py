@@ -38,10 +38,37 @@ class Hypotheses(NamedTuple):
     @property
     def best(self) -> Ints:
         """Leaves of the likeliest hypothesis of every cluster, ascending."""
-        head = self.first[:-1]
-        begin, size = self.start[head], self.start[head + 1] - self.start[head]
+        return self.leaves(self.first[:-1])
+
+    def leaves(self, hypothesis: Ints) -> Ints:
+        """Leaves of these hypotheses (C,), ascending."""
+        begin, size = self.start[hypothesis], self.start[hypothesis + 1] - self.start[hypothesis]
         entry = np.arange(size.sum()) + np.repeat(begin - np.cumsum(size) + size, size)
         return np.sort(self.leaf[entry])
+
+    def steady(self, past: Ints, follows: Mask, slack: float) -> Ints:
+        """(C,) the hypothesis of each cluster to report: the likeliest, but for the names of its tracks.
+
+        Of hypotheses with the same histories `past` (T, N) of leaves, one all whose leaves follow what was reported
+        (T,) comes before a likelier one in which tracks have exchanged them, unless it is less probable by over `slack`
+        [ln]. Where the histories of two targets are equally probable for either the report would else go to and fro.
+        """
+        found = self.first[:-1].copy()
+        broken = np.zeros(len(self.log_p), bool)
+        broken[np.repeat(np.arange(len(broken)), np.diff(self.start))[~follows[self.leaf]]] = True
+        for c in np.flatnonzero(broken[found]):
+            best = found[c]
+            for h in range(best + 1, self.first[c + 1]):
+                if self.log_p[h] < self.log_p[best] - slack:
+                    break
+                if not broken[h] and self._histories(past, h) == self._histories(past, best):
+                    found[c] = h
+                    break
+        return found
+
+    def _histories(self, past: Ints, hypothesis: int) -> list[list[int]]:
+        """Those of its leaves, in a fixed order."""
+        return sorted(past[self.leaf[self.start[hypothesis] : self.start[hypothesis + 1]]].tolist())
 
     def only(self, kept: Mask) -> Hypotheses:
         """The hypotheses of a mask (H,), which holds some of every cluster; probabilities sum to one again."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,6 +21,8 @@ from vidtrack.tracks import TENTATIVE
 
 SURE = 0.9
 """Smallest total probability of the hypotheses with a track, for its confirmation."""
+CLEAR = float(np.log(3))
+"""ln of the odds for an exchange of tracks from which it is reported and decided."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,8 @@ class MHT:
     new_share    density of the measurements that new targets begin with, per density of false ones
 
     A track is confirmed by its life cycle if nearly all hypotheses, by probability, contain it. The output is the
-    likeliest hypothesis after each scan, so a later scan may contradict it. Blobs of several vehicles (Occlusion) are
+    likeliest hypothesis after each scan, so a later scan may contradict it; tracks exchange what they took only if that
+    is clearly likelier. Blobs of several vehicles (Occlusion) are
     not recognised.
     """
 
@@ -73,9 +78,11 @@ class HypothesisForest:
     hypotheses  which leaves are true together
     window      what each leaf took in the undecided scans
     told        (T,) rows whose tree has been in the output
+    follows     (T,) rows that continue what the output had of their tree, if it had anything
     """
 
-    STATE = ("hypotheses", "window", "sure", "told", "shown")
+    STATE = ("hypotheses", "window", "sure", "told", "follows", "shown")
+    ADDED: ClassVar = {"follows": lambda forest: np.ones(len(forest.told), bool)}
 
     def __init__(self, rule: MHT) -> None:
         self.rule = rule
@@ -83,6 +90,7 @@ class HypothesisForest:
         self.window = Window(rule.n_scan)
         self.sure = np.empty(0, bool)
         self.told = np.empty(0, bool)
+        self.follows = np.empty(0, bool)
         self.shown = np.empty(0, np.int64)
 
     def grow(self, problem: Problem, register: Register, starts: Mask, events: list[Event]) -> Growth:
@@ -94,16 +102,19 @@ class HypothesisForest:
         rows, count = problem.rows, problem.measurements
         source = np.concatenate([problem.pairs.row, np.arange(rows)])  # leaf that a code comes from; then births
         taken = np.concatenate([problem.pairs.measurement, np.full(rows, -1)])
-        found = found.only(self._agreeing(found, source, tree, count))
+        window, follows = self._moved(source, taken, tree, count)
+        chosen = found.steady(window.past, follows, CLEAR)
+        found = found.only(self._agreeing(found, chosen, source, tree, count))
         used = np.zeros(len(source) + count, bool)
         used[found.leaf] = True
         grown, born = used[: len(source)], used[len(source) :]
         parent, taken = source[grown], taken[grown]
 
         self.hypotheses = found._replace(leaf=(np.cumsum(used) - 1)[found.leaf])
-        self.window.move(parent, taken, np.flatnonzero(born), count)
+        window.keep(used)
+        self.window, self.follows = window, follows[used]
         self.told = np.concatenate([self.told[parent], np.zeros(born.sum(), bool)])
-        self.shown = self.hypotheses.best
+        self.shown = self._reported()
         gone = np.setdiff1d(register.id, register.id[parent])
         events.extend(Event(problem.scan.t, int(i), "delete", "no likely hypothesis holds it") for i in gone)
         register.keep(parent)
@@ -114,7 +125,7 @@ class HypothesisForest:
 
         A tree that is no longer shown comes back, if ever, under another id.
         """
-        best, p = self.hypotheses.best, self._held()
+        best, p = self._reported(), self._held()
         self.shown = np.concatenate([best, self._doubted(best, p, register)])
         now = np.isin(register.id, register.id[self.shown])
         for old, new in zip(*register.rename(self.told & ~now), strict=True):
@@ -132,8 +143,8 @@ class HypothesisForest:
         found = self.hypotheses.marginal(label)
         self.hypotheses = found._replace(leaf=(np.cumsum(kept) - 1)[found.leaf])
         self.window.keep(kept)
-        self.told = self.told[kept]
-        self.shown = self.hypotheses.best
+        self.told, self.follows = self.told[kept], self.follows[kept]
+        self.shown = self._reported()
 
     def add(self, count: int) -> None:
         """Trees in the only hypothesis of a cluster of their own."""
@@ -148,7 +159,20 @@ class HypothesisForest:
         self.window.add(count)
         self.shown = np.concatenate([self.shown, first + more - 1])
         self.told = np.concatenate([self.told, np.ones(count, bool)])
+        self.follows = np.concatenate([self.follows, np.ones(count, bool)])
         self.sure = np.concatenate([self.sure, np.ones(count, bool)])
+
+    def _reported(self) -> Ints:
+        """Rows of the hypotheses that are reported, ascending."""
+        return self.hypotheses.leaves(self.hypotheses.steady(self.window.past, self.follows, CLEAR))
+
+    def _moved(self, source: Ints, taken: Ints, tree: Ints, count: int) -> tuple[Window, Mask]:
+        """The window and `follows` of all codes, as of `children`."""
+        window = copy(self.window)
+        window.move(source, taken, np.arange(count), count)
+        follows = ~np.isin(tree, tree[self.shown])
+        follows[self.shown] = True
+        return window, np.concatenate([follows[source], np.ones(count, bool)])
 
     def _children(self, problem: Problem, tree: Ints, starts: Mask) -> Hypotheses:
         """The hypotheses after this scan that survive pruning; their leaves are codes, as of `children`."""
@@ -162,13 +186,13 @@ class HypothesisForest:
         )  # fmt: skip
         return found.only(surviving(found.first, found.log_p, rule.threshold, rule.hypotheses, rule.mass))
 
-    def _agreeing(self, found: Hypotheses, source: Ints, tree: Ints, count: int) -> Mask:
-        """(H,) hypotheses that have the scan N back as the likeliest of their cluster has it."""
+    def _agreeing(self, found: Hypotheses, chosen: Ints, source: Ints, tree: Ints, count: int) -> Mask:
+        """(H,) hypotheses that have the scan N back as the chosen one (C,) of their cluster has it."""
         none = np.full(count, -1)
         whose = np.concatenate([tree[source], len(tree) + np.arange(count)])
         then = np.concatenate([self.window.past[source, -1], none])
         young = np.concatenate([self.window.age[source] + 1, none]) == self.rule.n_scan
-        return agreeing(found.first, found.start, found.leaf, whose, then, young)
+        return agreeing(found.first, found.start, found.leaf, chosen, whose, then, young)
 
     def _clustered(self, tree: Ints, row: Ints, measurement: Ints, count: int) -> tuple[Hypotheses, Ints]:
         """The hypotheses in the clusters that this scan makes, and the cluster (M,) of each measurement.

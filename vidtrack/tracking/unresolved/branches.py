@@ -188,7 +188,7 @@ class Doubt:
 
 @dataclass(slots=True)
 class Doubts:
-    """The doubts about pairs of tracks, by their ids, the smaller one first. They are no part of a saved state."""
+    """The doubts about pairs of tracks, by their ids, the smaller one first."""
 
     of_pair: dict[tuple[int, int], Doubt] = field(default_factory=dict)
     _problem: Problem | None = None

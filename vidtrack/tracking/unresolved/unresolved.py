@@ -32,6 +32,7 @@ from vidtrack.tracking.unresolved.cell import PolarCell
 from vidtrack.tracking.unresolved.claims import Placed, claims
 from vidtrack.tracking.unresolved.correlations import Correlations
 from vidtrack.tracking.unresolved.joint import Joint, equivalent, exchange_probability
+from vidtrack.tracking.unresolved.packed import Packed
 from vidtrack.tracks import TENTATIVE
 
 
@@ -49,15 +50,27 @@ class Unresolved:
     correlations: Correlations = field(default_factory=Correlations, init=False)
     _made: int = field(default=0, init=False)
     _doubts: Doubts = field(default_factory=Doubts, init=False)
+    _restored: Packed | None = field(default=None, init=False)
     _placed: Placed | None = field(default=None, init=False)
     _predicted: dict[int, int] = field(default_factory=dict, init=False)
 
-    STATE = ("cell", "correlations", "_made")
+    STATE = ("cell", "correlations", "_made", "branches")
+
+    @property
+    def branches(self) -> Packed:
+        """Other explanations of pairs, as a saved state has them."""
+        return self._restored or Packed.of(self._doubts.of_pair)
+
+    @branches.setter
+    def branches(self, packed: Packed) -> None:
+        self._restored = packed
 
     def unresolved(self, problem: Problem, shown: Mask, register: Register, bank: Estimator, dt: float) -> Ints:
         """(T,) the measurement that each row shares, as the rows that are shown (T,) have it; -1: none."""
         self.cell = self.cells[problem.scan.station] if self.cells else self.cell
         self.correlations.predict(dt)
+        if self._restored is not None:
+            self._doubts.of_pair, self._restored = self._restored.doubts(bank), None
         rows = np.flatnonzero(shown & (register.status != TENTATIVE))
         self._placed = Placed.of(problem, bank)
         self._predicted = {track: row for row, track in enumerate(register.id.tolist())}
