@@ -4,19 +4,20 @@
 
 Each clip becomes an H.264 stream without B-frames, as cameras send it, in MPEG-TS over HTTP, round and round in real
 time. It is watched by so many live runs at once, each a process of its own, as `vidtrack live` starts them, all on one
-core; what sends the stream is on the others. The first 5 s of a run do not count.
+core; what sends the stream is on the others. Nothing counts until 15 s after the first tracks of the last camera:
+kernels are loaded until then.
 
 A row for each clip, rate and number of cameras: the mean number of vehicles, processor time per camera and frame (user
 and system, all threads, with decoding), the share of the core that they need, frames that were dropped, and the time
-from a picture's arrival to its tracks in the last frames of a run: median, and the 99th percentile of the worst camera.
-`a core` is how many cameras the processor time of one leaves room for. Latencies hold on a machine that does nothing
-else.
+from a picture's arrival to its tracks: median, and the 99th percentile of the worst camera. `a core` is how many
+cameras the processor time of one leaves room for. Latencies hold on a machine that does nothing else.
 """
 
 from __future__ import annotations
 
 import argparse
 import io
+import math
 import os
 import tempfile
 import time
@@ -25,17 +26,20 @@ from fractions import Fraction
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Semaphore
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
+from typing import NoReturn
 
 import av
 import numpy as np
 
 from vidtrack.config.settings import Settings
+from vidtrack.run.live.leave import run_and_leave
 from vidtrack.run.live.run import LiveRun
 from vidtrack.tracks import TENTATIVE
 
-SETTLING_S = 5.0
+SETTLING_S = 15.0
 
 
 @dataclass(frozen=True)
@@ -108,26 +112,34 @@ def send(pictures: list[bytes], size: tuple[int, int], fps: int, told: Connectio
     server.serve_forever()
 
 
-def watch(address: str, seconds: float, told: Connection) -> None:
-    """A live run; tells what it needed."""
-    vehicles, begin, frames, dropped = [], 0.0, 0, 0
-    with tempfile.TemporaryDirectory() as folder, LiveRun(address, Settings(), Path(folder) / "run") as run:
-        first_s = time.monotonic()
-        for step in run:
-            now = time.monotonic() - first_s
-            if now < SETTLING_S:
-                begin, dropped = _used(), run.board.now().reading["frames_dropped"]
+def watch(address: str, seconds: float, starting: Semaphore, told: Connection) -> NoReturn:
+    """The process of a live run, which takes one of the cameras that start; tells what it needed."""
+    run_and_leave(lambda: told.send(_watched(address, seconds, starting)))
+
+
+def _watched(address: str, seconds: float, starting: Semaphore) -> Watched:
+    vehicles, latencies, since_s = [], [], math.inf
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,  # late results may still be written into it
+        LiveRun(address, Settings(), Path(folder) / "run") as run,
+    ):
+        for number, step in enumerate(run):
+            now_s = time.monotonic()
+            if number == 0:
+                starting.acquire()
+            if since_s == math.inf and starting.get_value() == 0:
+                since_s = now_s + SETTLING_S
+            if now_s < since_s:
+                begin_s, begin_used_s, begin_dropped = now_s, _used(), run.board.now().reading["frames_dropped"]
                 continue
-            frames += 1
             vehicles.append(np.count_nonzero(step.tracks.status != TENTATIVE))
-            if now > SETTLING_S + seconds:
-                used = _used() - begin
-                dropped = run.board.now().reading["frames_dropped"] - dropped
-                latency = run.board.latency_ms()
+            latencies.append(run.board.latency_s(step.time_s))
+            if now_s > since_s + seconds:
                 break
-    told.send(
-        Watched(now - SETTLING_S, used, frames, dropped, float(np.mean(vehicles)), latency["p50"], latency["p99"])
-    )
+        used_s = _used() - begin_used_s
+        dropped = run.board.now().reading["frames_dropped"] - begin_dropped
+    median_ms, late_ms = 1e3 * np.percentile(latencies, [50, 99])
+    return Watched(now_s - begin_s, used_s, len(vehicles), dropped, float(np.mean(vehicles)), median_ms, late_ms)
 
 
 def _used() -> float:
@@ -136,7 +148,7 @@ def _used() -> float:
 
 
 def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> list[Watched]:
-    """So many cameras at once."""
+    """So many cameras at once. Raises EOFError if one of the runs fails."""
     context = get_context("spawn")
     with av.open(str(clip)) as film:
         size = film.streams.video[0].width, film.streams.video[0].height
@@ -145,12 +157,15 @@ def measure(clip: Path, fps: int, cameras: int, seconds: float, core: int) -> li
     sender.start()
     address = f"http://127.0.0.1:{here.recv()}/"
     pipes = [context.Pipe() for _ in range(cameras)]
-    runs = [context.Process(target=watch, args=(address, seconds, told)) for _, told in pipes]
+    starting = context.Semaphore(cameras)
+    runs = [context.Process(target=watch, args=(address, seconds, starting, told)) for _, told in pipes]
     every_core = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {core})  # inherited by what starts now, with all its threads
     for run in runs:
         run.start()
     os.sched_setaffinity(0, every_core)
+    for _, told in pipes:
+        told.close()  # so that the end of a run that failed is heard
     found = [heard.recv() for heard, _ in pipes]
     for run in runs:
         run.join()

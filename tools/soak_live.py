@@ -24,6 +24,7 @@ import numpy as np
 
 from vidtrack.config.load import load
 from vidtrack.errors import SourceError
+from vidtrack.run.live.leave import run_and_leave
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.run import LiveRun
 from vidtrack.video.live import source
@@ -137,4 +138,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_and_leave(main)

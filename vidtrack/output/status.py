@@ -69,7 +69,7 @@ class StatusBoard:
 
     source     address without credentials
     account    returns the source's account
-    latency_s  returns the time [s] since a frame's capture time
+    latency_s  returns the time [s] since a frame's capture time; also an attribute
     counter    None without lines
     zone       of the clock on the pictures; None: this machine's
     """
@@ -86,7 +86,7 @@ class StatusBoard:
         self._zone = zone
         self._source = source
         self._account = account
-        self._latency_s = latency_s
+        self.latency_s = latency_s
         self._quality = settings.jpeg_quality
         self._counter = counter
         self._started = time.time()
@@ -97,7 +97,7 @@ class StatusBoard:
 
     def step(self, step: Step) -> None:
         """Keep the newest step."""
-        self._latencies.append(self._latency_s(step.time_s))
+        self._latencies.append(self.latency_s(step.time_s))
         self._done.append(time.monotonic())
         with self._changed:
             self._newest = step
@@ -121,7 +121,7 @@ class StatusBoard:
         if step is None or step.frame is None:
             return None
         lines, totals = ([], None) if self._counter is None else (self._counter.lines, self._counter.totals())
-        wall = datetime.fromtimestamp(time.time() - self._latency_s(step.time_s), self._zone)
+        wall = datetime.fromtimestamp(time.time() - self.latency_s(step.time_s), self._zone)
         return annotated_jpeg(step, lines, totals, wall, self._quality)
 
     def latency_ms(self) -> dict[str, float]:

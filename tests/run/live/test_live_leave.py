@@ -42,6 +42,28 @@ main()
 """
 
 
+FAILS = """
+import threading
+import cv2, numpy as np
+from vidtrack.run.live.leave import run_and_leave
+
+def abandoned():
+    picture = np.zeros((720, 1280, 3), np.uint8)
+    while True:
+        cv2.imencode(".png", picture)
+        entered.set()
+
+def fails():
+    for _ in range(3):
+        threading.Thread(target=abandoned, daemon=True).start()
+    entered.wait()
+    raise AssertionError("nobody expected this")
+
+entered = threading.Event()
+run_and_leave(fails)
+"""
+
+
 POOL = """
 from concurrent.futures import ThreadPoolExecutor
 from vidtrack.run.live.leave import leave
@@ -55,6 +77,11 @@ leave(3)
 def test_a_pool_that_nobody_closed_does_not_delay_it():
     done = subprocess.run([sys.executable, "-c", POOL], capture_output=True, text=True, timeout=HANG_S, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (3, "done\n", "")
+
+
+def test_an_unexpected_error_beside_threads_in_compiled_code_does_not_abort_it():
+    done = subprocess.run([sys.executable, "-c", FAILS], capture_output=True, text=True, timeout=HANG_S, check=False)
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (1, "AssertionError: nobody expected this")
 
 
 @pytest.mark.parametrize("code", [0, 3])

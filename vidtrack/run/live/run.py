@@ -65,6 +65,8 @@ class LiveRun:
     cannot be written are counted.
     Raises SourceError, ConfigError, FormatError, OutputError at the start.
 
+    What cannot be finished in time is left to a thread. A process that ends soon after the run ends by `leave`.
+
     stats  of the camera, which other threads may read before the first picture; None: of the run alone
     after  why the process before this one ended, which is told as an event; None: it did not crash
     """

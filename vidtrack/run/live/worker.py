@@ -8,14 +8,16 @@ import os
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Lock, Thread
 from types import FrameType
+from typing import NoReturn
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import Error
-from vidtrack.run.live.leave import leave
+from vidtrack.run.live.leave import run_and_leave
 from vidtrack.run.live.outputs import LiveExtras
 from vidtrack.run.live.run import LiveRun
 from vidtrack.run.live.view import View
@@ -48,8 +50,12 @@ class _Terminated(BaseException):
     """SIGTERM before the run exists."""
 
 
-def work(job: Job, channel: Connection) -> None:
+def work(job: Job, channel: Connection) -> NoReturn:
     """Track a camera until SIGTERM or the end of the parent; the exit code is that of a single live run."""
+    run_and_leave(partial(_work, job, channel))
+
+
+def _work(job: Job, channel: Connection) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent sends SIGTERM
     signal.signal(signal.SIGTERM, _terminate)
     job.prepare(job.name)
@@ -69,10 +75,10 @@ def work(job: Job, channel: Connection) -> None:
     except Error as error:
         log.error("%s", error)
         answers.end(str(error))
-        leave(error.exit_code)
+        return error.exit_code
     else:
         answers.end()
-    leave(0)
+    return 0
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

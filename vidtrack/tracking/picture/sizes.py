@@ -79,12 +79,13 @@ class SizeField:
             for _ in range(_ROUNDS):
                 expected = np.maximum(self._place @ fit, self._floor[axis])
                 error = np.log(size / expected)
-                scale = max(_SIGMAS * float(np.median(np.abs(error[error > 0]))), 0.02) if (error > 0).any() else 0.02
-                side = np.where(error > 0, _QUANTILE, 1 - _QUANTILE)
+                above = error > 0
+                scale = max(_SIGMAS * float(np.median(error[above])), 0.02) if above.any() else 0.02
+                side = np.where(above, _QUANTILE, 1 - _QUANTILE)
                 weight = vote * side / np.maximum(np.abs(error), 0.1 * scale) * scale / expected**2
                 flat = np.diag([0.0, 1.0, 1.0]) * (scale / (_FLAT * 10 * median)) ** 2
-                normal = (self._place * weight[:, None]).T @ self._place + flat
-                fit = np.linalg.solve(normal, (self._place * weight[:, None]).T @ size)
+                weighted = (self._place * weight[:, None]).T
+                fit = np.linalg.solve(weighted @ self._place + flat, weighted @ size)
             self._fit[:, axis], self.spread[axis] = fit, scale
 
 

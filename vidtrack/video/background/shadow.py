@@ -13,7 +13,7 @@ from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
 from vidtrack.video.frame import Image
-from vidtrack.video.runs import CORNERS, OBJECTS, connect, find_runs
+from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs
 
 _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
@@ -159,9 +159,11 @@ def reclaim(hit: Image) -> None:
     whole, lit = np.zeros((2, count))
     for k in range(len(row)):
         whole[label[k]] += stop[k] - start[k]
-        for x in range(start[k], stop[k]):
-            lit[label[k]] += hit[row[k], x] == 1
-    _fill(hit, row, start, stop, lit[label] >= _LIT * whole[label], _AMID)
+        lit[label[k]] += _lit(hit, row[k], start[k], stop[k])
+    vehicle = np.empty(count, np.bool_)
+    for i in range(count):
+        vehicle[i] = lit[i] >= _LIT * whole[i]
+    _fill(hit, row, start, stop, label, vehicle, _AMID)
 
 
 @kernel
@@ -176,25 +178,41 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
     row, start, stop = find_runs(hit, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
     whole, lit, inside, own = np.zeros((4, count))
+    for k in range(len(row)):
+        whole[label[k]] += stop[k] - start[k]
+        lit[label[k]] += _lit(hit, row[k], start[k], stop[k])
+    most = _HARDLY if sunlit else _LIT
     edge = np.zeros(hit.shape, np.bool_)
     for k in range(len(row)):
         y, region = row[k], label[k]
-        whole[region] += stop[k] - start[k]
+        if lit[region] >= most * whole[region]:
+            continue
         for x in range(start[k], stop[k]):
-            lit[region] += hit[y, x] == 1
             if hit[y, x] == SHADOW and _is_inside(hit, y, x):
                 inside[region] += 1
                 edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
                 own[region] += edge[y, x]
-    dark = (lit < (_HARDLY if sunlit else _LIT) * whole) & (own > np.maximum(_OWN * inside, _FEW))
-    if not dark.any():
+    dark, found = np.empty(count, np.bool_), False
+    for i in range(count):
+        dark[i] = own[i] > max(_OWN * inside[i], _FEW)
+        found |= dark[i]
+    if not found:
         return
     for k in range(len(row)):
         if dark[label[k]]:
             for x in range(start[k], stop[k]):
                 if edge[row[k], x]:
                     hit[row[k], x] = 1
-    _fill(hit, row, start, stop, dark[label], _ENCLOSED)
+    _fill(hit, row, start, stop, label, dark, _ENCLOSED)
+
+
+@inlined
+def _lit(hit: Image, y: int, start: int, stop: int) -> np.int32:
+    """Number of pixels in a run of row y that are no shadow."""
+    lit = np.int32(0)
+    for x in range(start, stop):
+        lit += np.int32(hit[y, x] == 1)
+    return lit
 
 
 @inlined
@@ -216,8 +234,8 @@ def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -
 
 
 @inlined
-def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask, sides: int) -> None:
-    """Set hit from SHADOW to 1 between pixels with 1, in runs (R,) of a vehicle (R,)."""
+def _fill(hit: Image, row: Runs, start: Runs, stop: Runs, label: Ints, vehicle: Mask, sides: int) -> None:
+    """Set hit from SHADOW to 1 between pixels with 1, in runs (R,) of the regions with a `vehicle` (N,)."""
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)
     for k in range(len(row)):
@@ -233,7 +251,7 @@ def _fill(hit: Image, row: Ints, start: Ints, stop: Ints, vehicle: Mask, sides: 
             side[y, x] |= np.uint8(seen) * _RIGHT | np.uint8(below) * _BELOW
             seen |= hit[y, x] == 1
     for k in range(len(row)):
-        if not vehicle[k]:
+        if not vehicle[label[k]]:
             continue
         for x in range(start[k], stop[k]):
             if hit[row[k], x] == SHADOW and _SIDES[side[row[k], x]] >= sides:
