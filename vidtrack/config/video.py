@@ -34,7 +34,7 @@ class DisturbanceSettings(Group):
     contrast: bool = True
     """luma_threshold decreases with the scene's contrast in haze or dusk, to half at least"""
     exposure: bool = True
-    """changes of the camera's gain are compensated at once"""
+    """changes of the camera's gain and white balance are compensated at once"""
     learn_s: float = Field(2.0, gt=0)
     """s; time constant of the scene's average"""
     noise_s: float = Field(4.0, gt=0)

@@ -221,6 +221,27 @@ def test_a_step_of_light_does_not_flood(light):
     assert not foreground.mask.any()
 
 
+@pytest.mark.parametrize(("red", "blue"), [(1.2, 0.85), (0.9, 1.1)])
+def test_a_change_of_white_balance_does_not_flood_and_a_coloured_car_shows(red, blue):
+    street, detector = Street(), disturbance()
+    play(detector, street, 2)
+    for k in range(20):
+        share = min(1.0, k / 10)
+        frame = tinted(street.frame(2 + k / 10), 1 + share * (red - 1), 1 + share * (blue - 1))
+        assert not detector.apply(frame, NONE_KNOWN).mask.any(), k
+    frame = street.frame(4.0)
+    frame.v[25:37, 30:50] += 35
+    assert covered(detector.apply(tinted(frame, red, blue), NONE_KNOWN), 60, 50) > 0.9
+
+
+def tinted(frame, red, blue):
+    """A frame whose red and blue are amplified by these factors."""
+    picture = frame.bgr() * np.array([blue, 1.0, red])
+    y, u, v = cv2.split(cv2.cvtColor(picture.astype(np.float32) / 255, cv2.COLOR_BGR2YCrCb)[..., [0, 2, 1]])
+    half = [np.rint(255 * plane[::2, ::2]).clip(0, 255).astype(np.uint8) for plane in (u, v)]
+    return replace(frame, y=np.rint(255 * y).clip(0, 255).astype(np.uint8), u=half[0], v=half[1])
+
+
 def test_another_view_is_learnt_in_seconds_and_does_not_flood():
     street, other, detector = Street(seed=1), Street(seed=2), disturbance()
     other.road = 240 - other.road[::-1] * 1.2

@@ -16,7 +16,7 @@ from vidtrack.config.video import DisturbanceSettings
 from vidtrack.video.background.beam import is_dark, mark_beams, shows_lamps
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import contrast, disturbance, haziness, strong, veil
-from vidtrack.video.background.exposure import follow_gain
+from vidtrack.video.background.exposure import follow_gain, follow_tint
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
@@ -148,6 +148,7 @@ class Disturbance:
         s, scene = self._settings, self._scene
         if s.exposure:
             follow_gain(picture, scene, np.float32(self._view.black))
+            follow_tint(picture, scene, np.float32(self._view.black))
         strength, hit, weak_hit = self._disturbed(picture, scene, dt)
         mask, weak = np.empty_like(hit), np.empty_like(hit)
         majority(hit, s.majority_px, mask)

@@ -1,4 +1,4 @@
-"""The camera's automatic exposure: one gain for the whole picture, from a sparse grid of points."""
+"""The camera's automatic exposure and white balance, for the whole picture, from a sparse grid of points."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ _DARK, _BRIGHT = np.float32(24), np.float32(235)  # grey levels between which a 
 _CLIPPED = np.float32(250)
 _STEP = np.float32(0.02)  # a smaller change is left to learning
 _LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covered, or the picture is missing
+_TINT_STEP = np.float32(0.01)  # share of the light; a smaller change of the white balance is left to learning
+_LARGEST_TINT = np.float32(0.5)
+_LIT = np.float32(64)  # grey levels of points that tell the white balance; of darker ones chroma is coarse
 
 
 @kernel
@@ -64,3 +67,41 @@ def _mostly_steady(ratio: Floats) -> bool:
         above += r > np.float32(1) + _STEP
         below += r < np.float32(1) - _STEP
     return 2 * max(above, below) < len(ratio)
+
+
+@kernel
+def follow_tint(picture: Picture, scene: Scene, black: np.float32) -> None:
+    """Shift the scene's chroma by the camera's white balance relative to it, if learning is too slow for that.
+
+    A camera that amplifies red or blue more shifts the chroma of what is grey in proportion to its light.
+    """
+    for plane, levels in ((picture.cb, scene.cb), (picture.cr, scene.cr)):
+        shift = tint(plane, levels, picture.luma, scene, black)
+        if abs(shift) > _TINT_STEP:
+            for y in range(len(levels)):
+                for x in range(levels.shape[1]):
+                    levels[y, x] += shift * (scene.luma[2 * y, 2 * x] - black)
+
+
+@inlined
+def tint(chroma: Image, learnt: Levels, luma: Image, scene: Scene, black: np.float32) -> np.float32:
+    """Median of (C - learnt) / (B - black) over points that were not covered in the last picture; 0 if too few.
+
+    chroma, learnt  (h / 2, w / 2) the same plane of the picture and of the scene
+    """
+    h, w = chroma.shape
+    stride = max(1, int(np.sqrt(h * w / _POINTS)))
+    shift = np.empty((h // stride + 1) * (w // stride + 1))
+    n = above = below = 0
+    for y in range(0, h, stride):
+        for x in range(0, w, stride):
+            B = scene.luma[2 * y, 2 * x]
+            if scene.covered_s[2 * y, 2 * x] == 0 and _LIT < B < _BRIGHT and luma[2 * y, 2 * x] <= _CLIPPED:
+                shift[n] = (np.float32(chroma[y, x]) - learnt[y, x]) / (B - black)
+                above += shift[n] > _TINT_STEP
+                below += shift[n] < -_TINT_STEP
+                n += 1
+    if 10 * n < len(shift) or 2 * max(above, below) < n:
+        return np.float32(0)
+    t = np.float32(median(shift[:n]))
+    return t if abs(t) < _LARGEST_TINT else np.float32(0)
