@@ -246,7 +246,7 @@ def test_one_looks_and_judges_by_keys(tmp_path, video):
         tab.press("Enter")
         tab.until("state.missed.length === 1")
         assert tab.js("document.querySelector('#missed li').firstChild.textContent").startswith("0:00:01.5 ·")
-        assert tab.js("document.querySelector('#zone').textContent") == "times: hours after the first picture"
+        assert tab.js("document.querySelector('#zone').textContent") == "Times: hours after the first picture"
         assert tab.js("document.querySelector('#progress').textContent") == "2 of 4 looked at · 2 false · 1 missed"
         tab.js("document.activeElement.blur()")
         tab.press("z")

@@ -321,7 +321,7 @@ async function begin() {
   ({ state } = data);
   document.title = `Review ${data.name}`;
   $("name").textContent = data.name;
-  $("zone").textContent = `times: ${data.zone}`;
+  $("zone").textContent = `Times: ${data.zone}`;
   const classes = data.events.some((one) => one.kind !== null);
   const keys = Object.entries(KEYS).filter(([found]) => classes || found !== "wrong class");
   $("verdicts").append(...keys.map(([found, key]) => {
