@@ -253,23 +253,40 @@ def _solve_one(band: Floats, right: Floats) -> None:
 
 
 @kernel
-def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> float:
-    """Solve for one right side a (n,) of the path, together with the size, in place: its share in the solution.
-
-    Returns a' times that: the variance of a' path, for noise and walk as they are stated above.
-    """
-    by_size, before, total = np.zeros(SIZE), a.copy(), 0.0
-    for r in range(len(a)):
-        if a[r] != 0.0:
-            for s in range(SIZE):
-                by_size[s] -= a[r] * right[r, s]
+def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
+    """Solve for one right side a (n,) of the path, together with the size, in place: the path's share."""
+    by_size = _of_size(right, a, 0, len(a))
     _solve_one(band, a)
     size = cov @ by_size
     for r in range(len(a)):
         for s in range(SIZE):
             a[r] -= right[r, s] * size[s]
-        total += before[r] * a[r]
+
+
+@kernel
+def _variance(band: Floats, right: Floats, cov: Floats, a: Floats, begin: int, end: int) -> float:
+    """Variance of a' path, for noise and walk as they are stated above; a (n,) is 0 but from begin to end, and lost."""
+    by_size = _of_size(right, a, begin, end)
+    total = 0.0
+    for r in range(begin, len(a)):
+        for d in range(1, min(r - begin, _BAND) + 1):
+            a[r] -= band[r, d] * a[r - d]
+        a[r] *= band[r, 0]
+        total += a[r] ** 2
+    for s in range(SIZE):
+        for q in range(SIZE):
+            total += by_size[s] * cov[s, q] * by_size[q]
     return total
+
+
+@kernel
+def _of_size(right: Floats, a: Floats, begin: int, end: int) -> Floats:
+    """(SIZE,) by how much a' path changes with the size; a (n,) is 0 but from begin to end."""
+    by_size = np.zeros(SIZE)
+    for r in range(begin, end):
+        for s in range(SIZE):
+            by_size[s] -= a[r] * right[r, s]
+    return by_size
 
 
 @kernel
@@ -300,7 +317,8 @@ def _speed(
     ex, ey = vx / max(v, 1e-9), vy / max(v, 1e-9)
     a = np.zeros(len(band))
     a[2 * j], a[2 * j + 1], a[2 * i], a[2 * i + 1] = ex / h, ey / h, -ex / h, -ey / h
-    variance = _respond(band, right, cov, a)
+    _respond(band, right, cov, a)
+    variance = (ex * (a[2 * j] - a[2 * i]) + ey * (a[2 * j + 1] - a[2 * i + 1])) / h
     walked, c = 0.0, np.empty(3)
     for k in range(1, len(t) - 1):
         _bending(t, k, c)
@@ -334,7 +352,7 @@ def _walk(
             bend += c[m] * (path[at, 0] * ex + path[at, 1] * ey)
             a[2 * at], a[2 * at + 1] = c[m] * ex, c[m] * ey
         squares += bend**2
-        freedom += max(1 - _respond(band, right, cov, a), 0.0)
+        freedom += max(1 - _variance(band, right, cov, a, 2 * k - 2, 2 * k + 4), 0.0)
     return squares / freedom
 
 
