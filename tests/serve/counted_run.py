@@ -83,10 +83,11 @@ def write_run(folder, video, lines=()):
     return folder
 
 
-def write_measures(folder, run):
-    """The run measured: the two tracks pass two gates to the right."""
+def write_measures(folder, run, start=None):
+    """The run measured: the two tracks pass two gates to the right; `start` of the site, in TOML."""
     folder.mkdir()
-    (folder / "site.toml").write_text(SITE)
+    text = SITE if start is None else SITE.replace("[gates.middle]", f"start = {start}\n[gates.middle]")
+    (folder / "site.toml").write_text(text)
     found = measured([str(run)], read_site(folder / "site.toml"))
     write_figures(folder, found.tables, found.report)
     return folder

@@ -119,6 +119,23 @@ def test_events_come_with_all_that_is_known(measures):
         assert rows[1]["d2"] == 0.25
 
 
+def test_times_are_those_of_the_site(tmp_path, video):
+    """As in the report: of its zone, which the page names."""
+    run = write_run(tmp_path / "run", video, [("line", 100)])
+    with served(write_measures(tmp_path / "measures", run, "2026-06-01T23:59:58+02:00")) as client:
+        found = json.loads(client.get("events")[2])
+        assert found["zone"] == "UTC+02:00"
+        first = min(found["events"], key=lambda one: one["time_s"])
+        assert (round(first["time_s"], 1), first["clock"]) == (2.4, "00:00:00.4")
+        state = client.post("missed", changes=0, time_s=62.04, gate="middle", direction="right")[1]
+        assert [one["clock"] for one in state["missed"]] == ["00:01:00.0"]
+    with served(run) as client:
+        assert json.loads(client.get("events")[2])["zone"] == "hours after the first picture"
+    (run / "site.toml").write_text((tmp_path / "measures" / "site.toml").read_text())
+    with served(run) as client:
+        assert json.loads(client.get("events")[2])["zone"] == "UTC+02:00"
+
+
 def test_verdicts_are_kept_beside_the_counts(measures):
     before = {path.name: path.read_bytes() for path in measures.iterdir()}
     with served(measures) as client:
@@ -128,7 +145,7 @@ def test_verdicts_are_kept_beside_the_counts(measures):
         assert state["all"]["corrected"] == 3
         _, state = client.post("verdict", changes=1, number=0, verdict="right")
         _, state = client.post("missed", changes=2, time_s=5.5, gate="late", direction="left")
-        assert state["missed"] == [{"time_s": 5.5, "gate": "late", "direction": "left"}]
+        assert state["missed"] == [{"time_s": 5.5, "clock": "0:00:05.5", "gate": "late", "direction": "left"}]
         assert [(way["counted"], way["corrected"]) for way in state["ways"]] == [(2, 1), (0, 0), (2, 2), (0, 1)]
         assert len(read_corrections(measures)) == 3
         client.post("missed", changes=3, number=0)
@@ -228,7 +245,8 @@ def test_one_looks_and_judges_by_keys(tmp_path, video):
         tab.type("1.5")
         tab.press("Enter")
         tab.until("state.missed.length === 1")
-        assert tab.js("document.querySelector('#missed li').firstChild.textContent").startswith("1.5 s")
+        assert tab.js("document.querySelector('#missed li').firstChild.textContent").startswith("0:00:01.5 ·")
+        assert tab.js("document.querySelector('#zone').textContent") == "Times: hours after the first picture"
         assert tab.js("document.querySelector('#progress').textContent") == "2 of 4 looked at · 2 false · 1 missed"
         tab.js("document.activeElement.blur()")
         tab.press("z")

@@ -98,6 +98,7 @@ BAD = {
     "not a number": ("[10, 0], [10, 10]]", "[10, 0], [10, nan]]", "finite number"),
     "unequal": (", [50, 690]]", "]", "3 points in picture, 4 in ground"),
     "twice": ("[50, 690]", "[100, 100]", "the point (100, 100) stands twice in picture"),
+    "ground beyond the Earth": ("[12, 0],", "[1e300, 0],", "the point (1e+300, 0) in ground is farther away"),
     "unknown role": ('role = "entry"', 'role = "in"', "'entry', 'exit', 'both' or 'neutral'"),
     "bounds": ("[3.2, 5.4]", "[5.4, 3.2]", "write the shortest length, then the longest"),
     "no width": ("width = 1280\n", "", "site.width is missing"),

@@ -90,7 +90,8 @@ class Review:
                 "sampled": self._sampled,
                 "total": len(events),
                 "ways": self._counted.ways,
-                "events": [_plain(k, events[k]) for k in self._order],
+                "zone": self._counted.clock.zone,
+                "events": [self._plain(k) for k in self._order],
                 "no_clips": await asyncio.to_thread(self._clips.why_not),
                 "state": self._state(),
             }
@@ -187,10 +188,18 @@ class Review:
         self._file.replace(rows)
         self._changes += 1
 
+    def _plain(self, number: int) -> dict[str, Any]:
+        """An event for JSON."""
+        event = self._counted.events[number]
+        values = {name: getattr(event, name) for name in event.__slots__}
+        known = {name: value if value == value else None for name, value in values.items()}  # NaN is not itself
+        clock = self._counted.clock.moment(event.time_s)
+        return {"number": number, "doubt": round(event.doubt, 4), "clock": clock, **known}
+
     def _state(self) -> dict[str, Any]:
         """What changes with every verdict."""
         audit, events = self._audit(), self._counted.events
-        sample = sample_of(self._random, audit)
+        sample, clock = sample_of(self._random, audit), self._counted.clock.moment
 
         def figures(gate: str | None = None, direction: str | None = None) -> AuditFigures:
             return figures_of(events, audit, sample, gate, direction)
@@ -199,17 +208,14 @@ class Review:
         return {
             "changes": self._changes,
             "verdicts": {str(k): verdict for k, verdict in audit.verdicts.items()},
-            "missed": [{"time_s": one.time_s, "gate": one.gate, "direction": one.direction} for one in audit.missed],
+            "missed": [
+                {"time_s": one.time_s, "clock": clock(one.time_s), "gate": one.gate, "direction": one.direction}
+                for one in audit.missed
+            ],
             "homeless": len(audit.homeless),
             "all": figures().as_dict(),
             "ways": [{"gate": gate, "direction": way, **figures(gate, way).as_dict()} for gate, way in ways],
         }
-
-
-def _plain(number: int, event: Event) -> dict[str, Any]:
-    values = {name: getattr(event, name) for name in event.__slots__}
-    known = {name: None if value != value else value for name, value in values.items()}  # NaN is not equal to itself
-    return {"number": number, "doubt": round(event.doubt, 4), **known}
 
 
 async def _told(request: Request, error: Exception) -> Response:

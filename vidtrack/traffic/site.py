@@ -19,6 +19,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.polyline import crosses_itself
 
 _NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
+_FARTHEST_M = 1e8
 _ASPECT_PX = 1.0  # what rounding to whole pixels may do to a picture's height
 
 
@@ -131,6 +132,8 @@ class Calibration(Group):
             if len(set(points)) < len(points):
                 twice = next(point for point in points if points.count(point) > 1)
                 raise ValueError(f"the point {_written(twice)} stands twice in {name}")
+        if far := [point for point in self.ground if max(map(abs, point)) > _FARTHEST_M]:
+            raise ValueError(f"the point {_written(far[0])} in ground is farther away than any place on Earth")
         if self.geographic and self.epsg is None:
             raise ValueError("geographic needs epsg, the metric system to measure in, for example 25832")
         if self.geographic and not all(abs(lon) <= 180 and abs(lat) <= 90 for lon, lat in self.ground):

@@ -6,6 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from browser import browser
 from made_up_day import MOVEMENTS, write_day
 
 from vidtrack.output.report.report import write_report
@@ -41,3 +42,29 @@ def test_every_picture_shows_and_nothing_is_wider_than_the_screen(tmp_path):
     seen, images, width = map(int, re.search(r"<title>pictures (\d+) of (\d+), wide (\d+)", dom).groups())
     assert (seen, images) == (5, 5)
     assert width <= 500
+
+
+def test_no_table_is_cut_on_a_telephone(tmp_path):
+    """The sheet stands there leg by leg, all of it on a wider screen and on paper."""
+    write_day(tmp_path / "day", np.ones((4, 12)), speeds=np.arange(40), legs=MOVEMENTS)
+    out = tmp_path / "report"
+    out.mkdir()
+    write_report(out, read_findings(tmp_path / "day"), None)
+    hidden = "[...document.querySelectorAll('.wide')].filter((one) => one.scrollWidth > one.clientWidth).length"
+    sheets = "[...document.querySelectorAll('.sheet')].filter((one) => one.checkVisibility()).length"
+    with browser(tmp_path) as tab:
+        tab.open((out / "report.html").as_uri())
+        for width, shown in ((390, 1), (1280, 1)):
+            tab.size(width, 844)
+            assert tab.js(hidden) == 0
+            assert tab.js(sheets) == shown
+        tab.size(390, 844)
+        legs = tab.js("[...document.querySelectorAll('.by-leg summary')].map((one) => one.textContent)")
+        for leg in range(len(legs)):
+            tab.js(f"document.querySelectorAll('.by-leg details')[{leg}].open = true")
+        assert tab.js(sheets) == len(legs) > 1
+        assert tab.js(hidden) == 0
+        whole = tab.js("document.querySelector('.whole tfoot td:last-child').textContent")
+        assert sum(int(leg.rpartition(": ")[2]) for leg in legs) == int(whole)
+        tab.send("Emulation.setEmulatedMedia", media="print")
+        assert tab.js(sheets) == 1

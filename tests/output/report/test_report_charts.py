@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 
 from vidtrack.output.report.charts import over_the_day, speed_histograms
 from vidtrack.output.report.style import BLUE, PALE, SIGNAL
-from vidtrack.traffic.report.findings import Clock
+from vidtrack.traffic.clock import Clock
 from vidtrack.traffic.report.legs import LegDay
 from vidtrack.traffic.report.speeds import Speeds, v85_of
 

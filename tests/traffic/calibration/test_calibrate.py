@@ -177,7 +177,8 @@ BAD = {
         LINE[[0, 1, 2, 4]],
         "points 1, 2, 3 of the 4 in picture lie on one",
     ),
-    "all but one on a line": (LINE, LINE, "the points determine no plane"),
+    "all but one on a line": (LINE, LINE, "points 1, 2, 3, 4 of the 5 in picture lie on one line"),
+    "all on a line of the ground": (POINTS, POINTS * [1e-4, 1], "of the 8 in ground lie on one line"),
     "three of four on a line of the ground": (
         POINTS[:4],
         [[0, 0], [5, 0], [10, 0], [5, 9]],

@@ -188,6 +188,14 @@ def test_times_that_cannot_be(tmp_path, suffixes, error, words):
         measured([run + suffix for run, suffix in zip(runs, suffixes, strict=True)], site())
 
 
+def test_a_run_that_is_given_twice_is_not_counted_twice(tmp_path):
+    run = write_run(tmp_path / "a", [straight(1, 2.0, 50, 240, 100, 5)])
+    with pytest.raises(ConfigError, match="a is given twice"):
+        measured([run, f"{tmp_path}/./a/"], site())
+    day = measured([f"{run}@2026-06-01T07:00:00Z", f"{run}@2026-06-01T08:00:00Z"], site())
+    assert day.tables["trips"].num_rows == 2
+
+
 def test_the_folder_above_the_parts_stands_for_them(tmp_path):
     whole = write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], began=BEGAN)
     (tmp_path / "cam").mkdir()

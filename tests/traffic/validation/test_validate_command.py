@@ -75,6 +75,7 @@ def test_and_from_the_intervals(folder, capsys):
         ("time_s,gate,direction\n", "run", 2, "is empty"),
         ("", "run", 2, "has no column time_s or utc"),
         ("when,gate,direction\n1,north,up\n", "run", 2, "has no column time_s or utc; it has when, gate, direction"),
+        ("time_s;gate;direction\n1;north;up\n", "run", 2, "separate columns by commas"),
         ("time_s,direction\n1,up\n", "run", 2, "has no column gate"),
         ("time_s,gate\n1,north\n", "run", 2, "has no column direction"),
         ("time_s,gate,direction\nsoon,north,up\n", "run", 2, "line 2: time_s is 'soon'; write seconds"),

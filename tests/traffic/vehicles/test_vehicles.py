@@ -48,6 +48,18 @@ def test_the_stated_error_is_the_true_one():
     assert abs(np.mean(off)) < 0.5
 
 
+def test_a_speed_is_less_sure_where_the_path_bends():
+    """Something else draws the edges along for the last 0.6 s, by 0.8 m, as where another vehicle comes near."""
+    t, xy, heading = DRIVES["towards"]
+    ahead = np.array([np.sin(heading[0]), np.cos(heading[0])])
+    drawn = xy + 0.8 * np.clip((t - t[-1]) / 0.6 + 1, 0, 1)[:, None] ** 2 * ahead
+    at = [t[-1] - 0.2]
+    calm, _ = fitted([(t, xy, heading, CAR)], at)
+    bent, _ = fitted([(t, drawn, heading, CAR)], at)
+    assert bent.speed[0] - 14.0 > 5 * calm.own[0]
+    assert bent.own[0] > 2 * calm.own[0]
+
+
 def test_the_calibration_s_error_is_kept_apart_and_grows_with_its_covariance():
     t, xy, heading = DRIVES["away"]
     speeds, _ = fitted([(t, xy, heading, CAR)], [t.mean()])

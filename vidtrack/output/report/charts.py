@@ -21,7 +21,7 @@ from vidtrack.output.report.style import (
     time_axis,
     whole_numbers,
 )
-from vidtrack.traffic.report.findings import Clock
+from vidtrack.traffic.clock import Clock
 from vidtrack.traffic.report.legs import LegDay
 from vidtrack.traffic.report.paths import Ways
 from vidtrack.traffic.report.sheet import WATCHED, PeakHour, Sheet

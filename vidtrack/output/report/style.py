@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from vidtrack.arrays.types import Floats
-from vidtrack.traffic.report.findings import Clock
+from vidtrack.traffic.clock import Clock
 
 INK, BLUE, PALE, GREY, SIGNAL = "#1c2733", "#2f5d8a", "#c3d3e3", "#8a949e", "#b3471b"
 WIDTH = 5.4

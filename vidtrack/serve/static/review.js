@@ -40,18 +40,12 @@ const event = () => data.events[at];
 const verdict = (one) => state.verdicts[one.number];
 const percent = (share) => `${(100 * share).toFixed(share > 0 && share < 1 ? 1 : 0)} %`;
 
-function clock(one) {
-  const minutes = Math.floor(one.time_s / 60);
-  const since = `${minutes}:${(one.time_s - 60 * minutes).toFixed(1).padStart(4, "0")}`;
-  return one.utc ? `${one.utc.slice(11, 21)} UTC` : since;
-}
-
 function facts(one) {
   const speed = one.speed_kmh === null ? null
     : `${one.speed_kmh.toFixed(0)}${one.speed_sigma_kmh === null ? "" : ` ± ${(1.96 * one.speed_sigma_kmh).toFixed(0)}`} km/h`;
   const sure = one.confidence === null ? null : `confidence ${one.confidence.toFixed(2)}`;
   const near = one.headway_s !== null && one.headway_s < 2 ? `${one.headway_s.toFixed(1)} s behind another` : null;
-  return [clock(one), `track ${one.track_id}`, one.kind, speed, sure, one.reason === "seen" ? null : one.reason, near].filter(Boolean);
+  return [one.clock, `track ${one.track_id}`, one.kind, speed, sure, one.reason === "seen" ? null : one.reason, near].filter(Boolean);
 }
 
 /* Rows */
@@ -269,7 +263,7 @@ function show() {
   rows.forEach((_, place) => mark(place));
   for (const button of $("verdicts").children) button.ariaPressed = String(button.value === verdict(event()));
   $("missed").replaceChildren(...state.missed.map((one, number) => {
-    const item = element("li", `${one.time_s.toFixed(1)} s · ${one.gate} ${one.direction}`), button = element("button", "Take back");
+    const item = element("li", `${one.clock} · ${one.gate} ${one.direction}`), button = element("button", "Take back");
     button.onclick = () => change("missed", { number }).then(() => undone.splice(0, undone.length, ...undone.filter((one) => one.place !== undefined)));
     item.append(button);
     return item;
@@ -327,6 +321,7 @@ async function begin() {
   ({ state } = data);
   document.title = `Review ${data.name}`;
   $("name").textContent = data.name;
+  $("zone").textContent = `Times: ${data.zone}`;
   const classes = data.events.some((one) => one.kind !== null);
   const keys = Object.entries(KEYS).filter(([found]) => classes || found !== "wrong class");
   $("verdicts").append(...keys.map(([found, key]) => {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from scipy.special import chdtri
@@ -257,24 +256,22 @@ def _distances(pairs: Pairs, k: Floats) -> tuple[Floats, Floats]:
 
 
 def _refuse_lines(picture: Floats, ground: Floats, calibration: Calibration) -> None:
-    """Raise ConfigError for four pairs of which three are on a line."""
-    if len(picture) > 4:
-        return
-    for three in combinations(range(4), 3):
-        for name, points, sigma in (
-            ("picture", picture, calibration.sigma_picture_px),
-            ("ground", ground, calibration.sigma_ground_m),
-        ):
-            if _altitude(points[list(three)]) <= max(_IN_LINE * sigma, 1e-9 * np.ptp(points)):
-                numbers = ", ".join(str(i + 1) for i in three)
+    """Raise ConfigError for pairs of which all but one are on a line."""
+    count = len(picture)
+    for name, points, sigma in (
+        ("picture", picture, calibration.sigma_picture_px),
+        ("ground", ground, calibration.sigma_ground_m),
+    ):
+        for i in range(count):
+            if _width(np.delete(points, i, axis=0)) <= max(_IN_LINE * sigma, 1e-9 * np.ptp(points)):
+                numbers = ", ".join(str(k + 1) for k in range(count) if k != i)
                 raise ConfigError(
-                    f"calibration: points {numbers} of the 4 in {name} lie on one line, within their errors; no plane "
-                    "is determined; give 4 of which no 3 are in line, or more"
+                    f"calibration: points {numbers} of the {count} in {name} lie on one line, within their errors; no "
+                    "plane is determined; give 4 of which no 3 are in line, or more"
                 )
 
 
-def _altitude(corners: Floats) -> float:
-    """The smallest altitude of a triangle (3, 2)."""
-    sides = corners - np.roll(corners, 1, axis=0)
-    longest = np.linalg.norm(sides, axis=1).max()
-    return float(abs(sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]) / longest) if longest else 0.0
+def _width(points: Floats) -> float:
+    """By how much points (N, 2) spread across the line that fits them best."""
+    off = points - points.mean(axis=0)
+    return float(np.ptp(off @ np.linalg.svd(off, full_matrices=False)[2][1]))

@@ -98,6 +98,9 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
     cannot be read, SourceError where there is no run.
     """
     found = [_found(run) for run in runs]
+    for k, one in enumerate(found):
+        if one.zero is None and any(one.folder.samefile(other.folder) for other in found[:k]):
+            raise ConfigError(f"{one.folder} is given twice; its vehicles would be counted twice")
     zeros = [one.zero for one in found]
     if zeros[0] is None:
         if start is None and any(zeros):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta, timezone, tzinfo
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import FormatError, SourceError
+from vidtrack.traffic.clock import Clock
 from vidtrack.traffic.site import Site, read_site
 
 COLUMNS = {
@@ -31,34 +32,6 @@ CONFLICTS = (
 """What is read of the table of conflicts, which only calibrated sites have"""
 KEYS = ("site", "metres", "runs", "utc_of_time_0", "watched_s", "tracks", "joins", "impossible_movements")
 """What is read of measures.json."""
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """The site's time in words. `zero`: when its time 0 was, in the site's zone; None: not known."""
-
-    zero: datetime | None
-
-    def label(self, t: float) -> str:
-        """Time of day of t [s]; without a known time hours and minutes after the first picture."""
-        if self.zero is not None:
-            time = self.zero + timedelta(seconds=round(t))
-            return time.strftime("%H:%M:%S" if time.second else "%H:%M")
-        minutes, seconds = divmod(round(t), 60)
-        return f"{minutes // 60}:{minutes % 60:02d}" + (f":{seconds:02d}" if seconds else "")
-
-    def stamp(self, t: float) -> str:
-        """Date and time of t [s], where they are known; else as `label`."""
-        return f"{self.date(t) or ''} {self.label(t)}".strip()
-
-    def date(self, t: float) -> str | None:
-        """Date of t [s]."""
-        return None if self.zero is None else (self.zero + timedelta(seconds=t)).date().isoformat()
-
-    @property
-    def zone(self) -> str:
-        """What times are told in."""
-        return "hours after the first picture" if self.zero is None else str(self.zero.tzinfo)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +53,8 @@ class Findings:
     @property
     def clock(self) -> Clock:
         """Of the zone of the site's start; else UTC."""
-        utc, start = self.report["utc_of_time_0"], self.site.camera.start
-        zone: tzinfo = UTC if start is None or start.utcoffset() is None else timezone(start.utcoffset() or timedelta())
-        return Clock(None if utc is None else datetime.fromisoformat(utc).astimezone(zone))
+        utc = self.report["utc_of_time_0"]
+        return Clock.of(None if utc is None else datetime.fromisoformat(utc), self.site.camera.start)
 
     @property
     def metres(self) -> bool:

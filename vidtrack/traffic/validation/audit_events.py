@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,10 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Ints
 from vidtrack.errors import FormatError, SourceError
+from vidtrack.traffic.clock import Clock
 from vidtrack.traffic.lines import Line, parse_lines
 from vidtrack.traffic.measures.runs import Recording, measured_run, open_day
+from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Point, Site, read_site
 
 MERGED, COASTED, DOUBLE = 0.05, 0.1, 0.2
@@ -37,7 +40,6 @@ class Event:
     direction: str
     run: int
     track_id: int
-    utc: str | None = None
     kind: str | None = None
     speed_kmh: float | None = None
     speed_sigma_kmh: float | None = None
@@ -66,6 +68,7 @@ class CountedEvents:
     gates       corners of each gate [px], in pictures of `size`
     ways        the two directions of each gate
     recordings  runs whose tracks are still there; `gone`: why others are not, in words
+    clock       tells their times
     """
 
     events: tuple[Event, ...]
@@ -73,6 +76,7 @@ class CountedEvents:
     size: tuple[int, int]
     recordings: tuple[Recording, ...]
     gone: str
+    clock: Clock
 
     @property
     def ways(self) -> dict[str, tuple[str, str]]:
@@ -120,20 +124,23 @@ def _measured(folder: Path) -> CountedEvents:
         except SourceError as error:
             gone = str(error)
     gates = {name: gate.line for name, gate in site.gates.items()}
-    return CountedEvents(_events(table), gates, _size(site), tuple(recordings), gone)
+    utc = report["utc_of_time_0"]
+    clock = Clock.of(None if utc is None else datetime.fromisoformat(utc), site.camera.start)
+    return CountedEvents(_events(table), gates, _size(site), tuple(recordings), gone, clock)
 
 
 def _events(table: pa.Table) -> tuple[Event, ...]:
     columns: dict[str, list[Any]] = {name: table[name].to_pylist() for name in _NEEDED}
-    for name in ("speed_kmh", "speed_sigma_kmh", "headway_s", "class", "utc"):
+    for name in ("speed_kmh", "speed_sigma_kmh", "headway_s", "class"):
         columns[name] = table[name].to_pylist() if name in table.column_names else [None] * len(table)
     columns["kind"] = columns.pop("class")
-    columns["utc"] = [None if utc is None else utc.isoformat(timespec="milliseconds") for utc in columns["utc"]]
     return tuple(Event(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
 
 
 def _run(folder: Path) -> CountedEvents:
-    recording = open_day([str(folder)], None).recordings[0]
+    start = read_site(folder / SITE_COPY).camera.start if (folder / SITE_COPY).is_file() else None
+    day = open_day([str(folder)], start)
+    recording = day.recordings[0]
     settings = _json(folder / "summary.json")["settings"]
     lines = parse_lines(settings["output"]["lines"], *recording.size)
     try:
@@ -151,7 +158,7 @@ def _run(folder: Path) -> CountedEvents:
         last[line, direction] = time_s
         events.append(Event(time_s, line, direction, 0, track, headway_s=None if before is None else time_s - before))
     gates = {line.name: ((line.x1, line.y1), (line.x2, line.y2)) for line in lines}
-    return CountedEvents(tuple(events), gates, recording.size, (recording,), "")
+    return CountedEvents(tuple(events), gates, recording.size, (recording,), "", Clock.of(day.utc, start))
 
 
 def _size(site: Site) -> tuple[int, int]:

@@ -80,7 +80,8 @@ def read_manual(path: Path, clocks: Iterable[str]) -> Events:
                 f"{path} has times of day, and the counted table has none: give time_s in seconds of the video, or "
                 "measure with a site that has a start"
             )
-        raise ConfigError(f"{path} has no column time_s or utc; it has {', '.join(names) or 'none'}")
+        hint = "; separate columns by commas" if len(names) == 1 else ""
+        raise ConfigError(f"{path} has no column time_s or utc; it has {', '.join(names) or 'none'}{hint}")
     if not rows:
         raise ConfigError(f"{path} is empty: there is nothing to compare with")
     return _events(path, rows, names, clock)
@@ -124,7 +125,11 @@ def seconds(text: str, clock: str, where: str) -> float:
             return value
         moment = datetime.fromisoformat(text.strip())
     except ValueError:
-        wanted = "seconds" if clock == "time_s" else "a date and a time, for example 2026-06-01T07:00:00+02:00"
+        wanted = (
+            "seconds, for example 3.2"
+            if clock == "time_s"
+            else "a date and a time, for example 2026-06-01T07:00:00+02:00"
+        )
         raise ConfigError(f"{where}: {clock} is {text!r}; write {wanted}") from None
     if moment.tzinfo is None:
         raise ConfigError(f"{where}: utc is {text!r}, without a zone; write it with Z or, for example, +02:00")

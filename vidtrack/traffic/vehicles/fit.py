@@ -26,6 +26,10 @@ MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 1.0, 1.2, 1.0])
 _LEAST = np.array([0.3, 0.3, 0.5, -5.0])
 _JOLT = 1.0
 """m2/s3; by how much the variance of a velocity grows in a second"""
+_WALK, _WALK_BENDS = 0.3, 0.5
+"""Variance of the velocity's walk, in units of _JOLT, that is expected, and how many bends of the path that is worth"""
+_NEAR = 4
+"""Steps on either side, that of the speed among them, whose bends tell how far the velocity walks there"""
 _EDGE_PX, _ROW_PX = 0.4, 1.8
 """px; standard deviation of the edges of a knot, and that of one row which goes down with their number"""
 _SHAPE_M = np.array([0.10, 0.30, 0.10, 0.06])
@@ -180,16 +184,22 @@ def _normal(
         total += squares
     c = np.empty(3)
     for k in range(1, len(t) - 1):
-        before, after = t[k] - t[k - 1], t[k + 1] - t[k]
-        c[0], c[1], c[2] = 1 / before, -1 / before - 1 / after, 1 / after
-        w = 2 / (_JOLT * (before + after))
+        _bending(t, k, c)
         for axis in range(2):
             bend = c[0] * path[k - 1, axis] + c[1] * path[k, axis] + c[2] * path[k + 1, axis]
             for i in range(3):
                 for j in range(i + 1):
-                    band[2 * (k - 1 + i) + axis, 2 * (i - j)] += w * c[i] * c[j]
-                right[2 * (k - 1 + i) + axis, SIZE] -= w * c[i] * bend
+                    band[2 * (k - 1 + i) + axis, 2 * (i - j)] += c[i] * c[j]
+                right[2 * (k - 1 + i) + axis, SIZE] -= c[i] * bend
     return total / max(count, 1), strange / max(count, 1)
+
+
+@kernel
+def _bending(t: Floats, k: int, c: Floats) -> None:
+    """Write the factors (3,) of the places k - 1, k, k + 1 in the change of velocity there, in standard deviations."""
+    before, after = t[k] - t[k - 1], t[k + 1] - t[k]
+    root = np.sqrt(2 / (_JOLT * (before + after)))
+    c[0], c[1], c[2] = root / before, -root / before - root / after, root / after
 
 
 @kernel
@@ -243,6 +253,43 @@ def _solve_one(band: Floats, right: Floats) -> None:
 
 
 @kernel
+def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
+    """Solve for one right side a (n,) of the path, together with the size, in place: the path's share."""
+    by_size = _of_size(right, a, 0, len(a))
+    _solve_one(band, a)
+    size = cov @ by_size
+    for r in range(len(a)):
+        for s in range(SIZE):
+            a[r] -= right[r, s] * size[s]
+
+
+@kernel
+def _variance(band: Floats, right: Floats, cov: Floats, a: Floats, begin: int, end: int) -> float:
+    """Variance of a' path, for noise and walk as they are stated above; a (n,) is 0 but from begin to end, and lost."""
+    by_size = _of_size(right, a, begin, end)
+    total = 0.0
+    for r in range(begin, len(a)):
+        for d in range(1, min(r - begin, _BAND) + 1):
+            a[r] -= band[r, d] * a[r - d]
+        a[r] *= band[r, 0]
+        total += a[r] ** 2
+    for s in range(SIZE):
+        for q in range(SIZE):
+            total += by_size[s] * cov[s, q] * by_size[q]
+    return total
+
+
+@kernel
+def _of_size(right: Floats, a: Floats, begin: int, end: int) -> Floats:
+    """(SIZE,) by how much a' path changes with the size; a (n,) is 0 but from begin to end."""
+    by_size = np.zeros(SIZE)
+    for r in range(begin, end):
+        for s in range(SIZE):
+            by_size[s] -= a[r] * right[r, s]
+    return by_size
+
+
+@kernel
 def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) -> None:
     """Take the path out of the size's equations (Schur complement): coupling (2 K, SIZE), solved (2 K, SIZE + 1)."""
     for k in range(len(coupling)):
@@ -270,19 +317,43 @@ def _speed(
     ex, ey = vx / max(v, 1e-9), vy / max(v, 1e-9)
     a = np.zeros(len(band))
     a[2 * j], a[2 * j + 1], a[2 * i], a[2 * i + 1] = ex / h, ey / h, -ex / h, -ey / h
-    by_size = np.zeros(SIZE)
-    for s in range(SIZE):
-        for r in (2 * i, 2 * i + 1, 2 * j, 2 * j + 1):
-            by_size[s] -= a[r] * right[r, s]
-    _solve_one(band, a)
-    variance = (ex * (a[2 * j] - a[2 * i]) + ey * (a[2 * j + 1] - a[2 * i + 1])) / h * misfit
-    for s in range(SIZE):
-        for r in range(SIZE):
-            variance += by_size[s] * cov[s, r] * by_size[r] * misfit
+    _respond(band, right, cov, a)
+    variance = (ex * (a[2 * j] - a[2 * i]) + ey * (a[2 * j + 1] - a[2 * i + 1])) / h
+    walked, c = 0.0, np.empty(3)
+    for k in range(1, len(t) - 1):
+        _bending(t, k, c)
+        for axis in range(2):
+            r = 2 * k + axis
+            walked += (c[0] * a[r - 2] + c[1] * a[r] + c[2] * a[r + 2]) ** 2
+    variance = (variance - walked) * misfit + walked * _walk(t, path, i, ex, ey, band, right, cov, a)
     variance += (_DRIFT * v) ** 2 + (_ROUNDING_M * _turning(t, path, i, j)) ** 2
     if size[0] < _WALKER_M:
         variance += _GAIT_M_S**2
     speed[0], speed[1], speed[2], speed[3], speed[4], speed[5] = v, np.sqrt(variance), ex, ey, i, j
+
+
+@kernel
+def _walk(
+    t: Floats, path: Floats, i: int, ex: float, ey: float, band: Floats, right: Floats, cov: Floats, a: Floats,
+) -> float:  # fmt: skip
+    """Variance of the velocity's walk along (ex, ey) near the step from i, in units of _JOLT, by the bends of the path.
+
+    Of the square of each bend 1 - leverage is left by the fit, and so much of a degree of freedom it is worth. Where
+    edges are drawn along by something else for some tenths of a second, the path follows them, and bends.
+    a (2 K,) is room to work in
+    """
+    c, squares, freedom = np.empty(3), _WALK * _WALK_BENDS, _WALK_BENDS
+    for k in range(max(i + 1 - _NEAR, 1), min(i + _NEAR, len(t) - 2) + 1):
+        _bending(t, k, c)
+        a[:] = 0.0
+        bend = 0.0
+        for m in range(3):
+            at = k - 1 + m
+            bend += c[m] * (path[at, 0] * ex + path[at, 1] * ey)
+            a[2 * at], a[2 * at + 1] = c[m] * ex, c[m] * ey
+        squares += bend**2
+        freedom += max(1 - _variance(band, right, cov, a, 2 * k - 2, 2 * k + 4), 0.0)
+    return squares / freedom
 
 
 @kernel
