@@ -152,7 +152,7 @@ def road_with(body, rng_seed=3):
     hit = np.zeros(road.shape, np.uint8)
     hit[20:40, 20:60] = SHADOW
     before = hit.copy()
-    find_dark(Picture(noisy, NO_COLOUR, NO_COLOUR), scene, BLACK, False, hit)
+    find_dark(Picture(noisy, NO_COLOUR, NO_COLOUR), scene, np.full(road.shape, BLACK), False, hit)
     return before, hit
 
 

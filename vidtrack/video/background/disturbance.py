@@ -22,6 +22,7 @@ from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import SOFT, Sunlight, find_dark, mark_shadow, reclaim
+from vidtrack.video.background.veil import VeilByPlace
 from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
 from vidtrack.video.foreground import Foreground
@@ -54,6 +55,7 @@ class Disturbance:
         "_hazy",
         "_veil",
         "_sunlight",
+        "_veil_by_place",
         "_coloured",
         "_dark",
     )
@@ -70,6 +72,7 @@ class Disturbance:
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
         self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
         self._sunlight = Sunlight()
+        self._veil_by_place = VeilByPlace()
         self._coloured, self._dark = True, False
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
@@ -159,6 +162,8 @@ class Disturbance:
             return np.zeros_like(mask), weak, strength
         if s.holes:
             fill_holes(mask)
+        if s.veil:
+            self._veil_by_place.learn(picture.luma, mask, dt)
         spare(scene.covered_s, known, _KNOWN_S)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
@@ -224,7 +229,8 @@ class Disturbance:
         disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak, hit)
         if s.shadow:
             told = seen if self._coloured else seen.grey()
-            count = mark_shadow(told, scene, self._black, self._sunlight.tolerance, weak)
+            black_here = self._veil_by_place.black(self._black, weak.shape)
+            count = mark_shadow(told, scene, black_here, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
         if s.beams and self._dark and shows_lamps(seen.luma, black):
@@ -234,7 +240,7 @@ class Disturbance:
             reclaim(hit)
         if s.shadow and s.dark:
             sunlit = self._sunlight.tolerance is not SOFT and not self._dark  # lamps cast hard shadows, too
-            find_dark(told, scene, self._black, sunlit, hit)
+            find_dark(told, scene, black_here, sunlit, hit)
         return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

@@ -90,7 +90,7 @@ class Sunlight:
 
 
 @kernel
-def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: Tolerance, hit: Image) -> Floats:
+def mark_shadow(picture: Picture, scene: Scene, black: Levels, tolerance: Tolerance, hit: Image) -> Floats:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's times one factor r.
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
@@ -105,8 +105,10 @@ def mark_shadow(picture: Picture, scene: Scene, black: np.float32, tolerance: To
     for k in range(len(row)):
         y = row[k]
         for x in range(start[k], stop[k]):
-            light = scene.luma[y, x] - black
-            r = (np.float32(picture.luma[y, x]) - black) / light
+            light = scene.luma[y, x] - black[y, x]
+            if light <= 0:
+                continue
+            r = (np.float32(picture.luma[y, x]) - black[y, x]) / light
             if not r < _LIGHTEST:
                 continue
             missed, structure = _texture(picture.luma, scene.luma, y, x, r)
@@ -167,7 +169,7 @@ def reclaim(hit: Image) -> None:
 
 
 @kernel
-def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, hit: Image) -> None:
+def find_dark(picture: Picture, scene: Scene, black: Levels, sunlit: bool, hit: Image) -> None:
     """Set hit (h, w) uint8 from SHADOW back to 1 in regions that are nearly all shadow, but a dark vehicle.
 
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
@@ -190,7 +192,7 @@ def find_dark(picture: Picture, scene: Scene, black: np.float32, sunlit: bool, h
         for x in range(start[k], stop[k]):
             if hit[y, x] == SHADOW and _is_inside(hit, y, x):
                 inside[region] += 1
-                edge[y, x] = _is_own_edge(picture.luma, scene, black, y, x)
+                edge[y, x] = _is_own_edge(picture.luma, scene, black[y, x], y, x)
                 own[region] += edge[y, x]
     dark, found = np.empty(count, np.bool_), False
     for i in range(count):
