@@ -4,7 +4,8 @@
         [--variants NAME ...] [--set KEY=VALUE ...] [--events]
 
 Every 2nd and 3rd frame, half size, mirrored, backward, every picture twice, flickering light, no colour, too much
-light, noise, rain, haze, dusk, and a camera that sways by 0.5, 1 and 3 px (at 640 px of width). A rule that helps a
+light, noise, rain, haze, dusk, snow, glare, clouds, a wandering white balance, night, coarse encoding, and a camera
+that sways by 0.5, 1 and 3 px (at 640 px of width). A rule that helps a
 clip and hurts its variants was fitted to the clip. The clips are made once, in --clips; --peers-in and --set are
 those of benchmark_video.py.
 """

@@ -37,7 +37,8 @@ class Variant:
     backward  from the last frame to the first
     doubled   every second frame is the one before it once more, as of a camera that sends more than it sees
     light     factor of the light at a time [s]
-    view      changes one picture; called as view(picture, rng)
+    view      changes one picture; called as view(picture, time_s, rng)
+    coarse    encoded in H.264 at this constant rate factor first
     sway      standard deviation of the camera's displacement, px at a width of 640; None: the camera stands
     """
 
@@ -47,37 +48,38 @@ class Variant:
     backward: bool = False
     doubled: bool = False
     light: Callable[[float], float] | None = None
-    view: Callable[[Picture, Generator], Picture] | None = None
+    view: Callable[[Picture, float, Generator], Picture] | None = None
+    coarse: int | None = None
     sway: float | None = None
 
 
-def haze(picture: Picture, rng: Generator) -> Picture:
+def haze(picture: Picture, time_s: float, rng: Generator) -> Picture:
     """Half the contrast under a bright veil, with the sensor's noise."""
     return _noisy(0.5 * picture + 90.0, np.full((1, 1, 1), 3.0), rng)
 
 
-def dusk(picture: Picture, rng: Generator) -> Picture:
+def dusk(picture: Picture, time_s: float, rng: Generator) -> Picture:
     """A quarter of the light, with the noise of few photons."""
     light = 0.25 * picture + 4.0
     return _noisy(light, np.sqrt(2.0 + 0.3 * light), rng)
 
 
-def grey(picture: Picture, rng: Generator) -> Picture:
+def grey(picture: Picture, time_s: float, rng: Generator) -> Picture:
     """No colour."""
     return np.asarray(cv2.cvtColor(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR), np.uint8)
 
 
-def bright(picture: Picture, rng: Generator) -> Picture:
+def bright(picture: Picture, time_s: float, rng: Generator) -> Picture:
     """Too much light: pale, and flat where it is bright."""
     return np.rint(255 * (picture / 255.0) ** 0.55).astype(np.uint8)
 
 
-def noise(picture: Picture, rng: Generator) -> Picture:
+def noise(picture: Picture, time_s: float, rng: Generator) -> Picture:
     """A poor sensor's noise."""
     return _noisy(picture.astype(np.float32), np.full((1, 1, 1), 9.0), rng)
 
 
-def rain(picture: Picture, rng: Generator) -> Picture:
+def rain(picture: Picture, time_s: float, rng: Generator) -> Picture:
     """Streaks of drops, less contrast, and noise."""
     height, width = picture.shape[:2]
     long = int(0.05 * height)
@@ -90,6 +92,52 @@ def rain(picture: Picture, rng: Generator) -> Picture:
         cv2.line(streaks, (x, y), (x + int(0.15 * long), y + long), lit, 1)
     light = 0.8 * picture + 33.0 + streaks[..., None]
     return _noisy(light.astype(np.float32), np.full((1, 1, 1), 3.0), rng)
+
+
+def snow(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """Flakes that fall, near and far, less contrast, and noise."""
+    height, width = picture.shape[:2]
+    scale, flakes = width / 640, np.random.default_rng(1)
+    count = int(6e-4 * height * width)
+    place = flakes.uniform(0, 1, (count, 2)) * (width, height)
+    speed = scale * np.column_stack([flakes.normal(20, 30, count), flakes.uniform(60, 160, count)])
+    light = (0.75 * picture + 50).astype(np.float32)
+    for (x, y), radius in zip(
+        np.mod(place + speed * time_s, (width, height)).astype(int).tolist(),
+        np.maximum(np.rint(scale * flakes.uniform(0.5, 2.2, count)), 1).astype(int).tolist(), strict=True,
+    ):  # fmt: skip
+        cv2.circle(light, (x, y), radius, (235, 235, 235), -1)
+    return _noisy(light, np.full((1, 1, 1), 2.5), rng)
+
+
+def glare(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """The light of a low sun beside the picture, added to it near one corner, more and less with thin clouds."""
+    height, width = picture.shape[:2]
+    y, x = np.mgrid[:height, :width]
+    veil = 150 * np.exp(-((np.hypot(x - 0.8 * width, y + 0.1 * height) / (0.5 * width)) ** 2))
+    swell = 1 + 0.15 * np.sin(time_s / 2)
+    return np.clip(0.9 * picture + swell * veil[..., None], 0, 255).astype(np.uint8)
+
+
+def clouds(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """Shadows of clouds, 35 % darker, with soft edges, that drift from left to right within seconds."""
+    place, covered = divmod(time_s / 5, 2)[1], (time_s / 5) % 4 >= 2
+    width = picture.shape[1]
+    front = (1.8 * place - 0.4) * width
+    lit = 1 / (1 + np.exp(-(np.arange(width) - front) / (0.06 * width)))
+    return (picture * (0.65 + 0.35 * (1 - lit if covered else lit)[None, :, None])).astype(np.uint8)
+
+
+def balance(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """A white balance that wanders: red up and blue down by 12 %, and back."""
+    swing = 0.12 * np.sin(time_s / 3)
+    return np.clip(picture * np.array([1 + swing, 1.0, 1 - swing]), 0, 255).astype(np.uint8)
+
+
+def night(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """An eighth of the light, amplified, with the noise of few photons."""
+    photons = rng.poisson(1.2 * (0.12 * picture.astype(np.float32) + 2))
+    return np.clip(photons * 2.5, 0, 255).astype(np.uint8)
 
 
 def flicker(time_s: float) -> float:
@@ -116,6 +164,12 @@ VARIANTS = {
     "rain": Variant(view=rain),
     "haze": Variant(view=haze),
     "dusk": Variant(view=dusk),
+    "snow": Variant(view=snow),
+    "glare": Variant(view=glare),
+    "clouds": Variant(view=clouds),
+    "balance": Variant(view=balance),
+    "night": Variant(view=night),
+    "coarse": Variant(coarse=38),
     "sway-0.5": Variant(sway=0.5),
     "sway-1": Variant(sway=1.0),
     "sway-3": Variant(sway=3.0),
@@ -134,7 +188,12 @@ def derive(clip: Clip, name: str, folder: Path) -> Clip:
         count = sum(1 for _ in container.decode(video=0)) if variant.backward else 0
     if not path.is_file():
         part = path.with_name(f"part-{path.name}")
-        _write(part, _pictures(clip.video, variant, float(rate)), rate / variant.every)
+        pictures = _pictures(clip.video, variant, float(rate))
+        if variant.coarse is not None:
+            coarse = path.with_name(f"coarse-{path.name}")
+            _write(coarse, pictures, rate, "libx264", {"crf": str(variant.coarse)})
+            pictures = _decoded(coarse)
+        _write(part, pictures, rate / variant.every)
         part.rename(path)
     lines = tuple(_line(text, variant, size) for text in clip.lines)
     events = tuple(_event(event, variant, count) for event in clip.events)
@@ -143,8 +202,7 @@ def derive(clip: Clip, name: str, folder: Path) -> Clip:
 
 def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
     rng = np.random.default_rng(0)
-    with av.open(str(video)) as container:
-        decoded = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)]
+    decoded = list(_decoded(video))
     if variant.backward:
         decoded.reverse()
     if variant.doubled:
@@ -164,8 +222,14 @@ def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
         if variant.light is not None:
             changed = np.clip(variant.light(k / rate) * changed, 0, 255).astype(np.uint8)
         if variant.view is not None:
-            changed = variant.view(changed, rng)
+            changed = variant.view(changed, k / rate, rng)
         yield changed
+
+
+def _decoded(video: Path) -> Iterator[Picture]:
+    with av.open(str(video)) as container:
+        for frame in container.decode(video=0):
+            yield np.asarray(frame.to_ndarray(format="bgr24"), np.uint8)
 
 
 def _sway(count: int, rng: Generator) -> NDArray:
@@ -217,10 +281,12 @@ def _event(event: Event, variant: Variant, count: int) -> Event:
     return replace(event, frame=event.frame / variant.every, direction=direction, tolerance=tolerance)
 
 
-def _write(path: Path, pictures: Iterator[Picture], rate: Fraction) -> None:
+def _write(
+    path: Path, pictures: Iterator[Picture], rate: Fraction, codec: str = "ffv1", options: dict[str, str] | None = None
+) -> None:
     first = next(pictures)
     with av.open(str(path), "w") as container:
-        stream = container.add_stream("ffv1", rate=rate)
+        stream = container.add_stream(codec, rate=rate, options=options)
         stream.height, stream.width = first.shape[:2]
         stream.pix_fmt = "yuv420p"
         for picture in (first, *pictures):

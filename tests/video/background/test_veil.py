@@ -49,7 +49,7 @@ def test_one_pale_vehicle_after_dark_ones_says_little_and_many_of_them_much():
 
 
 def glare(k, cars):
-    """Frame k of a road under a veil of 140 grey levels on its right half; cars: (left, roof, windows [grey levels])."""
+    """Frame k of a road, its right half under a veil of 140 grey levels; cars: (left, grey levels of roof, windows)."""
     light = 100 + np.kron(np.random.default_rng(1).uniform(-8, 8, (15, 20)), np.ones((8, 8)))
     light[::20, :60] = 10  # steep edges: the air is clear
     for left, roof, windows in cars:

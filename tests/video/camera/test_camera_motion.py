@@ -274,6 +274,27 @@ def test_a_camera_that_never_holds_still_is_told_once_and_nothing_is_reported():
     assert reported < 5
 
 
+def snowfall(k, rng):
+    """Frame k of a road in faint light, before it flakes that are brighter than anything on it."""
+    ground = cv2.GaussianBlur(np.random.default_rng(1).normal(60, 60, SHAPE), (0, 0), 5.0)
+    light = np.clip(ground + rng.normal(0, 1, SHAPE), 0, 255).astype(np.uint8)
+    for x, y in rng.integers(0, SHAPE[::-1], (150, 2)).tolist():
+        cv2.circle(light, (x, y), 1, 235, -1)
+    grey = np.full((SHAPE[0] // 2, SHAPE[1] // 2), 128, np.uint8)
+    return Frame(k, k / FPS, light, grey, grey, full_range=True)
+
+
+def test_flakes_in_the_first_picture_are_no_view_that_changes_again_and_again():
+    found, rng = detector(), np.random.default_rng(5)
+    for k in range(15 * FPS):
+        found.apply(snowfall(k, rng), NONE_KNOWN)
+    for k in range(15 * FPS, 17 * FPS):
+        frame = snowfall(k, rng)
+        frame.y[80:110, 80:140] = 200
+        shown = found.apply(frame, NONE_KNOWN).mask[80:110, 80:140]
+        assert (shown > 0).mean() > 0.9, k
+
+
 def test_a_knock_is_no_traffic_where_nobody_measures_the_motion():
     world, blind = World(), detector(registration=False, relearn_share=1.0)
     seen = [blind.apply(world.frame(k), NONE_KNOWN) for k in range(3 * FPS)]

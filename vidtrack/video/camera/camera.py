@@ -91,13 +91,18 @@ class Camera:
         return affine.boxes(affine.inverse(affine.rescaled(self.place, float(step))), box) / step
 
     def restart(self) -> None:
-        """The last picture becomes the scene; after a change of view, with new coordinates."""
+        """The last picture becomes the scene; after a change of view, with new coordinates.
+
+        If registration was lost again and again, as on snow flakes, points are chosen once the scene has been learnt.
+        """
         self.place = affine.IDENTITY if self._away else affine.after(self.place, affine.inverse(self.motion))
         self.motion = affine.IDENTITY
         self.moves = self._away = False
         self.lost_s = 0.0
         self._points = no_points()
         self._chosen_s = -np.inf
+        if self._lately_s > _RESTLESS_S:
+            self._chosen_s, self._trusted_s = self._time_s, self._time_s + _CHOSEN_S + _HOLD_S
 
     def follow(self, luma: Image, scene: Scene, known: Floats, time_s: float) -> Scene:
         """Register the picture (h, w) with the scene; returns the scene, on another canvas if necessary.
