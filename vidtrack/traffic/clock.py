@@ -40,7 +40,7 @@ class Clock:
 
     def date(self, t: float) -> str | None:
         """Date of t [s]."""
-        return None if self.zero is None else (self.zero + timedelta(seconds=t)).date().isoformat()
+        return None if self.zero is None else (self.zero + timedelta(seconds=round(t))).date().isoformat()
 
     @property
     def zone(self) -> str:

@@ -90,3 +90,18 @@ def test_a_state_from_before_there_was_a_veil_is_taken():
     after.apply(glare(0, []), NOTHING)
     restore(after, state)
     np.testing.assert_array_equal(after.scene(), before.scene())
+
+
+def test_what_was_learnt_in_one_view_is_no_veil_in_the_next():
+    detector = create(DetectorSettings(), None, None)
+    for k in range(400):
+        detector.apply(glare(k, [(-40 + 4 * (k % 50), 40, 5)]), NOTHING)
+    light = np.kron(np.random.default_rng(2).uniform(60, 140, (15, 20)), np.ones((8, 8)))
+    grey = np.full((60, 80), 128, np.uint8)
+    for k in range(400, 600):
+        y = light.copy()
+        if k > 550:
+            y[50:74, 100:140] *= 0.7
+        y = np.clip(y + np.random.default_rng(k).normal(0, 1, SHAPE), 0, 255).astype(np.uint8)
+        mask = detector.apply(Frame(k, k / 25, y, grey, grey, full_range=True), NOTHING).mask
+    assert (mask[50:74, 100:140] > 0).mean() < 0.1

@@ -16,7 +16,9 @@ def run_and_leave(command: Callable[[], int | None]) -> NoReturn:
     try:
         code = command() or 0
     except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else 0
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        if isinstance(end.code, str):
+            sys.stderr.write(f"{end.code}\n")
     except BaseException:
         sys.excepthook(*sys.exc_info())
         code = 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +21,8 @@ from vidtrack.traffic.site import Calibration, Site
 _log = logging.getLogger(__name__)
 
 _FALSE_ALARM = 0.01
-_IN_LINE = 3.0
-"""Standard deviations of its error by which a point may lie off the line through two others and still be on it."""
+_OFF_LINE = 1e-3
+"""Probability that errors alone put points on one line as far off it as that."""
 _LEAST_SHARE = 1e-6
 """Smallest singular value over the largest, of the fit: below it the points determine no homography."""
 
@@ -263,7 +264,8 @@ def _refuse_lines(picture: Floats, ground: Floats, calibration: Calibration) -> 
         ("ground", ground, calibration.sigma_ground_m),
     ):
         for i in range(count):
-            if _width(np.delete(points, i, axis=0)) <= max(_IN_LINE * sigma, 1e-9 * np.ptp(points)):
+            off, errors = _off_line(np.delete(points, i, axis=0)), sigma * math.sqrt(chdtri(count - 3, _OFF_LINE))
+            if off <= max(errors, 1e-9 * np.ptp(points)):
                 numbers = ", ".join(str(k + 1) for k in range(count) if k != i)
                 raise ConfigError(
                     f"calibration: points {numbers} of the {count} in {name} lie on one line, within their errors; no "
@@ -271,7 +273,7 @@ def _refuse_lines(picture: Floats, ground: Floats, calibration: Calibration) -> 
                 )
 
 
-def _width(points: Floats) -> float:
-    """By how much points (N, 2) spread across the line that fits them best."""
+def _off_line(points: Floats) -> float:
+    """Root of the sum of squared distances of points (N, 2) from the line that fits them best."""
     off = points - points.mean(axis=0)
-    return float(np.ptp(off @ np.linalg.svd(off, full_matrices=False)[2][1]))
+    return float(np.linalg.svd(off, compute_uv=False)[1])

@@ -20,7 +20,7 @@ from vidtrack.video.background.exposure import follow_gain, follow_tint
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
+from vidtrack.video.background.scene import Levels, Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import SOFT, Sunlight, find_dark, mark_shadow, reclaim
 from vidtrack.video.background.veil import VeilByPlace
 from vidtrack.video.camera.camera import Camera
@@ -162,8 +162,8 @@ class Disturbance:
             return np.zeros_like(mask), weak, strength
         if s.holes:
             fill_holes(mask)
-        if s.veil:
-            self._veil_by_place.learn(picture.luma, mask, dt)
+        if s.veil and not self._camera.moves:
+            self._veil_by_place.learn(picture.luma, mask, min(dt, _GAP_S))
         spare(scene.covered_s, known, _KNOWN_S)
         if s.ghosts:
             self._heal_ghosts(picture, scene, mask)
@@ -191,6 +191,7 @@ class Disturbance:
         scene = start(picture)
         self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
         self._veil = veil(picture.luma) or 0.0
+        self._veil_by_place = VeilByPlace()
         self._coloured = is_coloured(picture)
         self._dark = is_dark(scene.luma, np.float32(self._view.black))
         return scene
@@ -214,6 +215,13 @@ class Disturbance:
         """Luminance of black as it is seen: haze lifts it where it blurs the scene."""
         return np.float32(self._view.black + self._hazy * max(0.0, self._veil - self._view.black))
 
+    def _black_by_place(self, picture: Picture) -> Levels:
+        """(h, w) the same at each place; a canvas that grows has no cells of its own."""
+        shape = picture.luma.shape
+        if self._settings.veil and not self._camera.moves:
+            return self._veil_by_place.black(self._black, shape)
+        return np.full(shape, self._black)
+
     @property
     def _unsure(self) -> bool:
         return self._time_s - self._start_s < _UNSURE_S
@@ -229,7 +237,7 @@ class Disturbance:
         disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak, hit)
         if s.shadow:
             told = seen if self._coloured else seen.grey()
-            black_here = self._veil_by_place.black(self._black, weak.shape)
+            black_here = self._black_by_place(picture)
             count = mark_shadow(told, scene, black_here, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
