@@ -53,20 +53,20 @@ def gain(luma: Image, scene: Scene, black: np.float32) -> np.float32:
             if scene.covered_s[y, x] == 0 and _DARK < B < _BRIGHT and luma[y, x] <= _CLIPPED:
                 ratio[n] = (np.float32(luma[y, x]) - black) / (B - black)
                 n += 1
-    if 10 * n < len(ratio) or _mostly_steady(ratio[:n]):
+    if 10 * n < len(ratio) or _mostly_near(ratio[:n], np.float32(1), _STEP):
         return np.float32(1)
     g = np.float32(median(ratio[:n]))
     return g if 1 / _LARGEST < g < _LARGEST else np.float32(1)
 
 
 @inlined
-def _mostly_steady(ratio: Floats) -> bool:
-    """Whether the median of ratio (N,) is within _STEP of 1."""
+def _mostly_near(values: Floats, middle: np.float32, step: np.float32) -> bool:
+    """Whether the median of values (N,) is within a step of the middle."""
     above = below = 0
-    for r in ratio:
-        above += r > np.float32(1) + _STEP
-        below += r < np.float32(1) - _STEP
-    return 2 * max(above, below) < len(ratio)
+    for value in values:
+        above += value > middle + step
+        below += value < middle - step
+    return 2 * max(above, below) < len(values)
 
 
 @kernel
@@ -92,16 +92,14 @@ def tint(chroma: Image, learnt: Levels, luma: Image, scene: Scene, black: np.flo
     h, w = chroma.shape
     stride = max(1, int(np.sqrt(h * w / _POINTS)))
     shift = np.empty((h // stride + 1) * (w // stride + 1))
-    n = above = below = 0
+    n = 0
     for y in range(0, h, stride):
         for x in range(0, w, stride):
             B = scene.luma[2 * y, 2 * x]
             if scene.covered_s[2 * y, 2 * x] == 0 and _LIT < B < _BRIGHT and luma[2 * y, 2 * x] <= _CLIPPED:
                 shift[n] = (np.float32(chroma[y, x]) - learnt[y, x]) / (B - black)
-                above += shift[n] > _TINT_STEP
-                below += shift[n] < -_TINT_STEP
                 n += 1
-    if 10 * n < len(shift) or 2 * max(above, below) < n:
+    if 10 * n < len(shift) or _mostly_near(shift[:n], np.float32(0), _TINT_STEP):
         return np.float32(0)
     t = np.float32(median(shift[:n]))
     return t if abs(t) < _LARGEST_TINT else np.float32(0)

@@ -34,6 +34,7 @@ class VeilByPlace:
         self._darkest = np.full((_ROWS, _COLUMNS), 255.0)
         self._seen_s = np.zeros((_ROWS, _COLUMNS))
         self._since_s = 0.0
+        self._last: tuple[Floats, np.float32, Levels] | None = None  # darkest and least of the last black, and it
 
     def learn(self, luma: Image, mask: Image, dt: float) -> None:
         """Take a picture (h, w) and where it shows traffic, dt [s] after the last one."""
@@ -49,6 +50,15 @@ class VeilByPlace:
 
     def black(self, least: np.float32, shape: tuple[int, int]) -> Levels:
         """(h, w) the luminance of black at each place: `least` where nothing is added or known."""
+        if self._last is not None:
+            darkest, base, black = self._last
+            if darkest is self._darkest and base == least and black.shape == shape:
+                return black
+        black = self._interpolated(least, shape)
+        self._last = self._darkest, least, black
+        return black
+
+    def _interpolated(self, least: np.float32, shape: tuple[int, int]) -> Levels:
         known = self._seen_s > _SEEN_S
         level = np.where(known, np.maximum(self._darkest - _DARK, least), least)
         if not (level > least).any():
