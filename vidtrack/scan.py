@@ -34,6 +34,7 @@ class Scan:
     run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form only within a run
     surveyed   (4,) left, top, right, bottom of the sensor's field of view; None: the tracker's bounds
     pixel      size of the sensor's pixel in units of z
+    look       (M, 3) mean luminance and chroma of the objects, grey levels; None: not known
     rim        by how much boxes reach beyond the targets on each side, in units of z
 
     Raises ScanError for wrong shapes, NaN or infinite numbers, covariances that are not symmetric positive
@@ -51,6 +52,7 @@ class Scan:
     run: Ints | None = None
     noise: Floats | None = None
     lasting: Floats | None = None
+    look: Floats | None = None
     surveyed: Floats | None = None
     pixel: float = 1.0
     rim: float = 0.0
@@ -91,6 +93,7 @@ class Scan:
             ("label", (count,), np.int64),
             ("run", (count,), np.int64),
             ("lasting", (count, dim, dim), float),
+            ("look", (count, 3), float),
         ):
             value = getattr(self, name)
             if value is None:

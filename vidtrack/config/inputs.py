@@ -26,7 +26,7 @@ _OWN = {
 
 _OF_PICTURES = (
     *("tracker.box_s", "tracker.confirm_s", "tracker.confirm_travel", "tracker.detection_probability"),
-    *("tracker.idle_s", "tracker.idle_travel", "tracker.restless"),
+    *("tracker.idle_s", "tracker.idle_travel", "tracker.restless", "tracker.look", "tracker.relieve"),
     *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s"),
     *("source.scale", "source.mask", "source.decoder", "output.video_crf", "output.jpeg_quality"),
 )

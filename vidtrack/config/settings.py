@@ -118,6 +118,10 @@ class TrackerSettings(Group):
     """share of a vehicle's predicted box that a shared blob must cover"""
     box_s: float = Field(0.3, gt=0)
     """s; time constant with which a track's box follows the blobs' boxes"""
+    look: bool = True
+    """mean luminance and colour of blobs count in the association"""
+    relieve: bool = True
+    """a track that drives out over the border, and comes in again before it was out, ends: that is another vehicle"""
 
     @field_validator("confirm_window")
     @classmethod

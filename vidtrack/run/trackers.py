@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vidtrack.associate.look import Look
 from vidtrack.associate.shape import Shape
 from vidtrack.associate.two_stage import SINGLE_STAGE, TwoStage
 from vidtrack.config.settings import DetectionSettings, Settings, TrackerSettings
@@ -59,7 +60,11 @@ def build_blob_tracker(
             idle_travel=settings.idle_travel,
         ),
         picture=Picture(
-            bounds, road=Road(*bounds, careful=settings.restless) if bounds else None, box_s=settings.box_s
+            bounds,
+            look=Look() if settings.look else None,
+            road=Road(*bounds, careful=settings.restless) if bounds else None,
+            box_s=settings.box_s,
+            relieve=settings.relieve,
         ),
         sharing=Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap) if merging else Exclusive(),
         detection_probability=settings.detection_probability,

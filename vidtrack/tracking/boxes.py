@@ -61,7 +61,8 @@ def around(x: Floats, box: Floats) -> Floats:
 def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, least: float, hits: Ints) -> None:
     """Move boxes (T, 4), in place, by a share towards the boxes seen (M, 4) that they have `taken` (T,); -1: none.
 
-    The share is that of a mean of all boxes of the track, after so many hits (T,), and not below `least`.
+    The share is that of a mean of all boxes of the track, after so many hits (T,), and not below `least`. Looks (T, 3)
+    move in the same way.
     at_once  (M,) boxes that are copied unchanged, as the first one of a track is
     """
     for t in range(len(box)):
@@ -70,7 +71,7 @@ def follow(box: Floats, seen: Floats, taken: Ints, at_once: Mask, least: float, 
             continue
         share = max(least, 1.0 / hits[t])
         jump = np.isnan(box[t, 0]) or at_once[j] or share == 1.0
-        for side in range(4):
+        for side in range(box.shape[1]):
             box[t, side] = seen[j, side] if jump else box[t, side] + share * (seen[j, side] - box[t, side])
 
 

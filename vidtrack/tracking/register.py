@@ -30,15 +30,19 @@ class Register:
     the picture has cut it since it began), entered (it began so, and came in), travelled (farthest it ever was from its
     start), rest (T, d) and rest_s (where and when it last moved on by REST of its size), missed (T, S) scans of each
     station without it since it was last seen, visible (T, S) probability that each station could see it, NaN while
-    nothing is known.
+    nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T, 4, 2) how far each reached in from
+    the sides of the picture that cut it, at most and at least since.
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
              "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "travelled", "rest",
-             "rest_s", "missed", "visible")  # fmt: skip
+             "rest_s", "missed", "visible", "look", "shown")  # fmt: skip
 
-    ADDED: ClassVar = {name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered")}
+    ADDED: ClassVar = {name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered")} | {
+        "look": lambda register: np.full((len(register), 3), np.nan),
+        "shown": lambda register: np.full((len(register), 4, 2), np.nan),
+    }
 
     LINKS = ("prior_x", "prior_P", "gain")
     _TABLES = (
@@ -74,6 +78,8 @@ class Register:
         self.rest_s = np.empty(0)
         self.missed = np.empty((0, stations), np.int64)
         self.visible = np.empty((0, stations))
+        self.look = np.empty((0, 3))
+        self.shown = np.empty((0, 4, 2))
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
 
     def __len__(self) -> int:

@@ -302,6 +302,7 @@ class Tracker:
         left = register.history & 1 == 0
         if np.count_nonzero(left):
             left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
+        left |= self.picture.relieved(register, self.bank)
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
         register.come_in(self.picture.cut(around(self.bank.x, register.box)))

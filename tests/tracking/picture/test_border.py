@@ -41,3 +41,43 @@ def test_cut_boxes_are_drawn_out_to_the_border_and_no_farther():
     np.testing.assert_array_equal(
         drawn, [[0.0, 20.0, 3.0, 2.0], [50.0, 0.0, 2.0, 3.0], [95.0, 75.0, 5.0, 5.0], [50.0, 40.0, 2.0, 2.0]]
     )
+
+
+def seen_over_time(left, side):
+    """Whether a box of 40 x 20 that moves along one axis to these places is taken for another one, at each of them."""
+    shown = np.full((1, 4, 2), np.nan)
+    found = []
+    for before, now in zip([left[0], *left], left, strict=False):
+        place = [now, 30.0, 40.0, 20.0] if side in (0, 2) else [30.0, now, 20.0, 40.0]
+        v = [now - before, 0.0] if side in (0, 2) else [0.0, now - before]
+        found.append(bool(PICTURE.relieved(np.array([place]), np.array([v]), shown)[0]))
+    return found
+
+
+OUT_AND_IN = {
+    0: [5, -5, -15, -25, -20, -10, 0],
+    1: [5, -5, -15, -25, -20, -10, 0],
+    2: [55, 65, 75, 85, 80, 70, 60],
+    3: [35, 45, 55, 65, 60, 50, 40],
+}
+
+
+def test_who_drove_out_over_a_side_and_comes_in_again_is_another_one():
+    for side, places in OUT_AND_IN.items():
+        assert seen_over_time(places, side) == [False] * 5 + [True] * 2
+
+
+def test_who_only_leaves_or_only_comes_in_is_not():
+    for side, places in OUT_AND_IN.items():
+        assert not any(seen_over_time(places[:4], side))
+        assert not any(seen_over_time(places[3:], side))
+
+
+def test_an_outline_that_flickers_at_the_border_is_not():
+    assert not any(seen_over_time([5, -5, -12, -6, -15, -20, -16, -25, -30], 0))
+    assert not any(seen_over_time([-30, -22, -26, -15, -18, -8, -12, 0], 0))
+
+
+def test_without_a_border_nobody_comes_in():
+    box, v, shown = BOXES[:1], np.ones((1, 2)), np.array([[[100.0, 0.0]] * 4])
+    assert not Border().relieved(box, v, shown).any()

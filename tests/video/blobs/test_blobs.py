@@ -68,6 +68,20 @@ def test_amplitude_is_the_mean_strength():
     assert find_blobs(Foreground(mask, strength, 1), EVERY).amplitude.tolist() == [3]
 
 
+def test_a_look_is_the_mean_luminance_and_chroma_of_the_region():
+    mask = painted((10, 10, 20, 8), (40, 30, 8, 12))
+    random = np.random.default_rng(0)
+    luma = random.integers(0, 255, mask.mask.shape, np.uint8)
+    cb, cr = random.integers(0, 255, (2, *(side // 2 for side in luma.shape)), np.uint8)
+    mask.planes = luma, cb, cr
+    blobs = find_blobs(mask, BlobSettings())
+    label = cv2.connectedComponents(mask.mask)[1]
+    whole = [luma, *(plane.repeat(2, axis=0).repeat(2, axis=1) for plane in (cb, cr))]
+    np.testing.assert_allclose(blobs.look, [[plane[label == i + 1].mean() for plane in whole] for i in range(2)])
+    mask.planes = luma, cb[:0], cr[:0]
+    np.testing.assert_array_equal(find_blobs(mask, BlobSettings()).look[:, 1:], 128.0)
+
+
 def test_specks_are_left_out_and_a_far_vehicle_is_not():
     blobs = find_blobs(painted((5, 5, 2, 2), (100, 50, 6, 5), shape=(240, 320)), BlobSettings())
     assert blobs.box.tolist() == [[100, 50, 6, 5]]

@@ -15,6 +15,10 @@ FAR = 6.0
 """erf of this is one in double precision."""
 REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
+RETURN = 0.25
+"""Share of the longer side; who comes in again by so much before having left is another one."""
+NEAR = 0.1
+"""Share of the longer side; so near the border a box may be cut by it."""
 SPECK = 1 / 30
 """Share of the picture's longer side; a smaller object must travel as far as one of this size to be confirmed. The
 leaves of a swaying tree are small, and a track that jumps from leaf to leaf seems to travel."""
@@ -64,6 +68,15 @@ class Border:
     def in_view(self, x: Floats, P: Floats) -> Floats:
         """(N,) probability that positions are within the border: states [x, vx, y, vy, ...] (N, n), P (N, n, n)."""
         return _in_view(x, P, self._edges)
+
+    def relieved(self, box: Floats, v: Floats, shown: Floats) -> Mask:
+        """(N,) boxes (N, 4) that moved out over a side by RETURN of their size, and now move in by as much.
+
+        v      (N, 2) velocities
+        shown  (N, 4, 2) how far each reached in from a side that cuts it, at most and at least since; NaN: not cut.
+               Updated
+        """
+        return _relieved(box, v, self._edges, shown)
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) extended to the border on the given sides (N, 4)."""
@@ -118,3 +131,27 @@ def _reaching(box: Floats, sides: Mask, edges: tuple[float, float, float, float]
                 far = max(far, edges[axis + 2])
             drawn[i, axis], drawn[i, axis + 2] = near, far - near
     return drawn
+
+
+@kernel
+def _relieved(box: Floats, v: Floats, edges: tuple[float, float, float, float], shown: Floats) -> Mask:
+    relieved = np.zeros(len(box), np.bool_)
+    if np.isinf(edges[2]):
+        return relieved
+    for i in range(len(box)):
+        size = max(box[i, 2], box[i, 3])
+        for side in range(4):
+            axis = side % 2
+            near = box[i, axis] - edges[axis] if side < 2 else edges[side] - box[i, axis] - box[i, axis + 2]
+            inward = v[i, axis] > 0 if side < 2 else v[i, axis] < 0
+            extent = near + box[i, axis + 2]
+            if near > NEAR * size:
+                shown[i, side] = np.nan
+                continue
+            gone = shown[i, side, 0] - shown[i, side, 1] > RETURN * size
+            if not (gone or extent <= shown[i, side, 0]):  # it comes in, or this is the first time
+                shown[i, side] = extent
+            elif not inward:
+                shown[i, side, 1] = min(shown[i, side, 1], extent)
+            relieved[i] |= inward and gone and extent - shown[i, side, 1] > RETURN * size
+    return relieved

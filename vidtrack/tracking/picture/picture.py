@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.associate.look import Look
 from vidtrack.associate.problem import Problem
 from vidtrack.associate.shape import Shape
 from vidtrack.errors import ConfigError
@@ -18,6 +19,9 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
 from vidtrack.tracks import Tracks
 
+LOOK_S = 1.0
+"""s; time constant with which the look of a track follows that of its measurement."""
+
 
 class View(NamedTuple):
     """Boxes of measurements and tracks in a scan.
@@ -28,6 +32,7 @@ class View(NamedTuple):
     hits       (T,) updates of the tracks so far
     border     of what was surveyed
     box_s      s; time constant with which the box of a track follows that of its measurement
+    looks, look  (M, 3) of the measurements and (T, 3) of the tracks, grey levels; None, NaN: not known
     """
 
     blobs: Floats
@@ -36,6 +41,8 @@ class View(NamedTuple):
     hits: Ints
     border: Border
     box_s: float
+    looks: Floats | None
+    look: Floats
 
 
 class Surroundings(Protocol):
@@ -63,6 +70,9 @@ class Surroundings(Protocol):
 
     def cut(self, box: Floats) -> Mask:
         """(N,) whether the border of what the scan surveyed cuts boxes (N, 4)."""
+
+    def relieved(self, register: Register, bank: Estimator) -> Mask:
+        """(T,) tracks that have left, and in whose place others come in."""
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is where the scan looks; elsewhere P_D is zero."""
@@ -104,6 +114,10 @@ class NoPicture:
         """(N,) none."""
         return np.zeros(len(box), bool)
 
+    def relieved(self, register: Register, bank: Estimator) -> Mask:
+        """(T,) none."""
+        return np.zeros(len(register), bool)
+
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) ones."""
         return np.ones(len(bank))
@@ -121,8 +135,10 @@ class Picture:
 
     bounds  (width, height) px; outside P_D is zero and tracks are deleted; None: as each scan says, else no border
     shape   how the size of boxes counts in the association; None: it does not
+    look    how luminance and chroma count in the association; None: they do not
     road    what traffic teaches about the scene, scan by scan; None: nothing
     box_s   time constant [s] with which a track's box follows its measurements' boxes
+    relieve whether a track that comes in again over the border before it was out is another object's, and ends
 
     Raises ConfigError for a time constant that is not above zero.
     """
@@ -134,15 +150,19 @@ class Picture:
         bounds: tuple[float, float] | None = None,
         *,
         shape: Shape | None = None,
+        look: Look | None = None,
         road: Road | None = None,
         box_s: float = 0.3,
+        relieve: bool = False,
     ) -> None:
         if not box_s > 0:
             raise ConfigError(f"box_s is {box_s}; it must be above zero")
         self.area = bounds[0] * bounds[1] if bounds else None
         self.shape = shape
+        self.look = look
         self.road = road
         self.box_s = box_s
+        self.relieve = relieve
         self.border = Border(*bounds) if bounds else Border()
 
     def rescale(self, register: Register, before: Floats, bank: Estimator) -> None:
@@ -156,26 +176,44 @@ class Picture:
         if scan.box is None:
             return None
         predicted = around(bank.x, register.box)
-        return View(absolute(scan.box, scan.z), scan.box, predicted, bank.hits, self.border, self.box_s)
+        boxes = absolute(scan.box, scan.z)
+        return View(boxes, scan.box, predicted, bank.hits, self.border, self.box_s, scan.look, register.look)
 
     def weigh(self, problem: Problem, view: View | None) -> Problem:
-        """The problem with the likelihood of sizes."""
-        if self.shape is None or view is None:
+        """The problem with the likelihood of sizes and looks."""
+        if view is None:
             return problem
-        return problem.having(self.shape.weigh(problem.pairs, view.predicted, view.blobs))
+        if self.shape is not None:
+            problem = problem.having(self.shape.weigh(problem.pairs, view.predicted, view.blobs))
+        if self.look is not None and view.looks is not None:
+            problem = problem.having(self.look.weigh(problem.pairs, view.look, view.looks))
+        return problem
 
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
-        """Move the boxes of tracks towards those that they have taken (T,); one that the border cuts is copied."""
+        """Move boxes and looks of tracks towards those they have taken (T,); a box that the border cuts is copied."""
         if view is None:
             return
         least = -float(np.expm1(-dt / self.box_s))
         follow(register.box, view.relative, taken, self.border.cut(view.blobs), least, bank.hits)
+        if self.look is not None and view.looks is not None:
+            least, never = -float(np.expm1(-dt / LOOK_S)), np.zeros(len(view.looks), bool)
+            follow(register.look, view.looks, taken, never, least, bank.hits)
         if bank.model.per_size:
             np.copyto(bank.scale, longer(register.box), where=taken >= 0)
 
     def cut(self, box: Floats) -> Mask:
         """(N,) boxes (N, 4) that the border of the last scan cuts."""
         return self.border.cut(box)
+
+    def relieved(self, register: Register, bank: Estimator) -> Mask:
+        """(T,) tracks that drove out over a side of the border, and come in over it before they were out.
+
+        That is another vehicle, which was one blob with the one that left.
+        """
+        if not self.relieve:
+            return np.zeros(len(register), bool)
+        box = around(bank.x, register.box)
+        return self.border.relieved(box, bank.x.take(bank.model.velocity, axis=1), register.shown)
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is within the border of the last scan."""

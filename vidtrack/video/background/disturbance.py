@@ -108,14 +108,15 @@ class Disturbance:
         known = self._camera.on_canvas(known, self._view.step)
         if self._settings.registration:
             self._scene = self._camera.follow(picture.luma, self._scene, known, time_s)
+        shown = picture
         if self._camera.lost_s > 0:
             self._changed_s = self._camera.lost_s
             self._change.skip(time_s)
             nothing = np.zeros_like(picture.luma)
             mask, weak, strength = nothing, nothing, np.zeros(picture.luma.shape, np.float32)
         elif self._camera.moves:
-            laid, span = lay(picture, self._camera.motion, self._scene)
-            mask, weak, strength = self._map(laid, known, dt, span)
+            shown, span = lay(picture, self._camera.motion, self._scene)
+            mask, weak, strength = self._map(shown, known, dt, span)
         else:
             mask, weak, strength = self._map(picture, known, dt)
         if not self._camera.trusted:
@@ -127,7 +128,8 @@ class Disturbance:
         elsewhere = anew and self._camera.lost_s > 0
         if anew:
             self._scene = self._start(picture, time_s)
-        return self._view.foreground(mask, strength, place, motion, weak, self._camera.warnings(), elsewhere)
+        warnings = self._camera.warnings()
+        return self._view.foreground(mask, strength, place, motion, weak, warnings, elsewhere, shown)
 
     def _rewind(self, time_s: float, picture: Picture) -> None:
         """Begin with this picture, the last of the preview, and the scene learnt from it."""

@@ -26,14 +26,15 @@ class OpenCV:
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; strength is 1 on it, as OpenCV gives none; `known` boxes change nothing here."""
-        y, u, v = self._view.reduce(frame)
+        planes = self._view.reduce(frame)
+        y, u, v = planes
         coloured = frame.u is not None
         picture = Frame(
             frame.index, frame.time_s, y, u if coloured else None, v if coloured else None, frame.full_range
         )
         found = self._model.apply(picture.bgr())
         mask = cv2.medianBlur(np.where(found > _SHADOW, np.uint8(255), np.uint8(0)), _WINDOW)
-        return self._view.foreground(np.asarray(mask, np.uint8), (mask > 0).astype(np.float32))
+        return self._view.foreground(np.asarray(mask, np.uint8), (mask > 0).astype(np.float32), planes=planes)
 
     def keep(self, mask: Image | None) -> None:
         """Find no foreground where a mask (h, w) is dark."""

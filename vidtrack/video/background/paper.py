@@ -27,13 +27,14 @@ class Paper:
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; strength is |D| / threshold; `known` boxes change nothing here."""
         s = self._settings
-        intensity = self._view.reduce(frame).luma.astype(float)
+        planes = self._view.reduce(frame)
+        intensity = planes.luma.astype(float)
         if not self._average.size:
             self._average = intensity
         D = intensity - self._average
         strength = (np.abs(D) if s.two_sided else np.maximum(D, 0)) / s.threshold
         self._average = (1 - s.weight) * self._average + s.weight * intensity
-        return self._view.foreground(np.where(strength > 1, np.uint8(255), np.uint8(0)), strength)
+        return self._view.foreground(np.where(strength > 1, np.uint8(255), np.uint8(0)), strength, planes=planes)
 
     def keep(self, mask: Image | None) -> None:
         """Find no foreground where a mask (h, w) is dark."""

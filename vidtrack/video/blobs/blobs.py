@@ -34,6 +34,7 @@ class Blobs:
     step       source pixels per processed pixel
     settings   measurement noise of the centroids
     surveyed   (4,) left, top, right, bottom of the area in view; None: not known
+    look       (B, 3) mean luminance and chroma; None: not known
     """
 
     centroid: Floats
@@ -44,6 +45,7 @@ class Blobs:
     step: int
     settings: BlobSettings
     surveyed: Floats | None = None
+    look: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.area)
@@ -55,7 +57,7 @@ class Blobs:
         box[:, :2] -= self.centroid
         return Scan(
             time_s, self.centroid, R, box=box, amplitude=self.amplitude, lasting=lasting,
-            surveyed=self.surveyed, pixel=self.step, rim=_RIM * self.step,
+            surveyed=self.surveyed, pixel=self.step, look=self.look, rim=_RIM * self.step,
         )  # fmt: skip
 
     def moved(self, place: Floats | None) -> Blobs:
@@ -90,6 +92,7 @@ def measured(regions: Regions, foreground: Foreground, settings: BlobSettings) -
         step=step,
         settings=settings,
         surveyed=foreground.surveyed,
+        look=None if foreground.planes is None else _looks(*regions, *foreground.planes),
     ).moved(foreground.place)
 
 
@@ -129,3 +132,22 @@ def _measure(
         box[i, 2], box[i, 3] = box[i, 2] - box[i, 0], box[i, 3] - box[i, 1]
         amplitude[i] /= n[i]
     return n, mean, cov, box, amplitude
+
+
+@kernel
+def _looks(
+    row: Runs, start: Runs, stop: Runs, label: Ints, blobs: int, luma: NDArray, cb: NDArray, cr: NDArray
+) -> Floats:
+    """(B, 3) mean luminance and chroma of each region; chroma is 128 where the picture has none."""
+    look, n, coloured = np.zeros((blobs, 3)), np.zeros(blobs), len(cb) > 0
+    for k in range(len(row)):
+        i, y = label[k], row[k]
+        n[i] += stop[k] - start[k]
+        for x in range(start[k], stop[k]):
+            look[i, 0] += luma[y, x]
+            look[i, 1] += cb[y // 2, x // 2] if coloured else 128
+            look[i, 2] += cr[y // 2, x // 2] if coloured else 128
+    for i in range(blobs):
+        for c in range(3):
+            look[i, c] /= n[i]
+    return look
