@@ -191,6 +191,15 @@ def test_blocks_from_different_starts_onto_one_chain_are_counted_together(sound)
     assert asterix.first_block(content, len(content)) == (3 if sound == 4 else None)
 
 
+@pytest.mark.parametrize("count", [4, 5])
+def test_blocks_of_records_longer_than_what_is_looked_at_are_found(count):
+    long = block(plot(0.0, 20000, 10.0, **{"250": [0] * 200}))
+    content = b"HTTP/1.1 200 OK\r\n" + long * count
+    assert len(long) > 1500
+    assert asterix.first_block(content, 1 << 16) == 17
+    assert asterix.first_block(content[:17] + long[:-1], 1 << 16) is None  # ends in its record
+
+
 @pytest.mark.parametrize("octet", [0x30, 0x3E, 0x15])
 def test_records_of_blocks_that_overlap_are_decoded_once(monkeypatch, octet):
     """Each octet begins a block of 5 to 16 thousand octets, and a record of a few or of all that follow."""

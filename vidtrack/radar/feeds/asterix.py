@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from math import pi
 
-from vidtrack.radar.feeds.layout import Damaged, Layout, layouts
+from vidtrack.radar.feeds.layout import Damaged, Layout, Truncated, layouts
 from vidtrack.radar.feeds.messages import NAN, Kind, Losses, Message
 
 NAUTICAL_MILE = 1852.0
@@ -23,8 +23,8 @@ _ENOUGH = 4
 """Blocks in a row that are looked at."""
 _CHECKED = 512
 """Octets of a block in which records are looked at to tell whether it is one."""
-_LONGEST, _NO_LENGTH = 1024, 1 << 16
-"""Octets of the longest record that is looked at, and more than any block has."""
+_SEEN, _NO_LENGTH = 1024, 1 << 16
+"""Octets of a record that are looked at, and more than any block has."""
 
 Place = dict[str, int]
 
@@ -65,15 +65,15 @@ def first_block(content: bytes, farthest: int) -> int | None:
 
 
 def _is_sound(content: bytes, at: int, decoder: Decoder, known: dict[tuple[int, int], int]) -> bool:
-    """Whether the records that begin in the first octets of a block are whole.
+    """Whether the records that begin in the first octets of a block are undamaged and end in it, as far as is seen.
 
-    known  the places after records, by category and place
+    known  the places after records, or after what is seen of them, by category and place
     """
     category, end = content[at], at + int.from_bytes(content[at + 1 : at + _HEAD], "big")
     place = at + _HEAD
     while place < min(end, at + _CHECKED):
         if (category, place) not in known:
-            known[category, place] = place + decoder.length(category, content[place : place + _LONGEST])
+            known[category, place] = place + decoder.length(category, content[place : place + _SEEN])
         place = known[category, place]
     return place <= end
 
@@ -116,11 +116,13 @@ class Decoder:
                 at = _timed(payload, at + size)
 
     def length(self, category: int, body: bytes) -> int:
-        """Octets of the first record; more than any block has if it is damaged."""
+        """Octets of the first record: one more than given if it goes on, more than any block has if it is damaged."""
         try:
             place, after = _layout(category, self._layouts[category], body, 0).places(body, 0)
             _READERS[category](body, place, NAN)
-        except (Damaged, IndexError):
+        except (Truncated, IndexError):
+            return len(body) + 1
+        except Damaged:
             return _NO_LENGTH
         return after
 

@@ -22,6 +22,10 @@ class Damaged(ValueError):  # noqa: N818
     """A record that breaks the rules of its category; what follows it in its block cannot be found."""
 
 
+class Truncated(Damaged):
+    """A record that goes on where the octets end, and is sound up to there."""
+
+
 class Layout:
     """The items of one kind of record, in the order of their bits in the field specification.
 
@@ -34,7 +38,7 @@ class Layout:
         self._plans: dict[bytes, list[tuple[str, Extent]]] = {}
 
     def places(self, body: bytes, at: int) -> tuple[dict[str, int], int]:
-        """Where each item of the record at `at` begins, and where the record ends. Raises Damaged."""
+        """Where each item of the record at `at` begins, and where the record ends. Raises Damaged, Truncated."""
         first = at
         try:
             while body[at] & 1:
@@ -45,8 +49,10 @@ class Layout:
                 places[name] = at
                 at = at + extent if isinstance(extent, int) else extent(body, at)
         except IndexError:
-            raise Damaged from None
-        if at > len(body) or not places:
+            raise Truncated from None
+        if at > len(body):
+            raise Truncated
+        if not places:
             raise Damaged
         return places, at
 
@@ -143,7 +149,7 @@ def _explicit(body: bytes, at: int) -> int:
 def _repeated(counter: int, size: int, body: bytes, at: int) -> int:
     """A counter and so many parts."""
     if at + counter > len(body):
-        raise Damaged
+        raise Truncated
     return at + counter + size * int.from_bytes(body[at : at + counter], "big")
 
 
