@@ -13,7 +13,7 @@ from scipy.special import gammainc, gammaincinv
 from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
-from vidtrack.compiled import inlined, kernel, specialised
+from vidtrack.compiled import inlined, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
 from vidtrack.scan import Scan
@@ -263,8 +263,7 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
                     for a in range(m):  # S = L L' and L^-1 v, row by row
                         v[a] = z[j, a] - zhat[t, a]
                         if wrapped:
-                            if wraps[a]:
-                                v[a] -= TURN * np.round(v[a] / TURN)
+                            v[a] -= TURN * wraps[a] * np.round(v[a] / TURN)
                         variance = cov[t, a, a] + R[j, a, a]
                         if euclidean:
                             distance += v[a] * v[a]
@@ -290,7 +289,8 @@ def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[In
                         value[0, n], value[1, n], value[2, n] = distance, whitened, 2.0 * np.log(det)
                         n += 1
         # The order in the grid depends on the cell size; results must not: two counting sorts.
-        begin, start, by_measurement = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64), np.empty(n, np.int64)
+        begin, start = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
+        by_measurement = np.empty(n, np.int64)
         for p in range(n):
             begin[measurement[p] + 1] += 1
             start[row[p] + 1] += 1
