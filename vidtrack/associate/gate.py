@@ -139,7 +139,9 @@ class Gate:
         own = np.zeros(len(zhat), np.int64) if run is None else run
         gated = _gated(zhat.shape[1], mode, angles)
         pair, of_pair, start = gated(zhat, cov, own, limit, scan.z, scan.R, runs)
-        return Pairs(*pair, *of_pair, limit, start)
+        row, measurement = pair
+        d2, nis, log_s, log_l, cost = of_pair
+        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from vidtrack.compiled import specialised
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats, Floats], Floats]
-Update = Callable[..., tuple[Floats, Floats]]
+Update = Callable[..., None]
 
 TURN = 2 * np.pi
 
@@ -100,7 +99,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
 
     The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m), zhat (T, m),
     z (M, m), R (M, m, m), and of the decision parent (K,), row (B,), measurement (B,), beta (B,), beta0 (K,),
-    inflation (K,) and spread; it returns x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
+    inflation (K,), spread and noise; it fills x (K, n) and P (K, n, n). A single weight of one is the Kalman update.
     Innovations of the components `angles` are wrapped to -pi..pi. `positions`: H selects the positions of a state
     [x, vx, y, vy, ...]; products with it are then the entries that it selects.
 
@@ -215,11 +214,4 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
 
     if positions:
         update.__name__ = "update_by_positions"
-    fill = specialised(update, m, n, *angles)
-
-    def updated(*prior_and_decision: Any) -> tuple[Floats, Floats]:
-        x1, P1 = np.empty((len(prior_and_decision[7]), n)), np.empty((len(prior_and_decision[7]), n, n))
-        fill(*prior_and_decision, x1, P1)
-        return x1, P1
-
-    return updated
+    return specialised(update, m, n, *angles)
