@@ -39,7 +39,7 @@ def test_two_vehicles_that_exchange_places_unseen_are_told_by_their_looks():
     for seen in (by_place, by_look, off):
         assert confirmed_ids(seen) == {1, 2}
     for seen, stays in ((by_place, True), (by_look, False), (off, True)):
-        above = min((1, 2), key=lambda track: lane_of(seen[20], track))  # noqa: B023
+        above = min((1, 2), key=lambda track: lane_of(seen[20], track))
         assert (lane_of(seen[-1], above) < 126) == stays
 
 
