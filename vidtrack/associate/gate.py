@@ -13,7 +13,7 @@ from scipy.special import gammainc, gammaincinv
 from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
-from vidtrack.compiled import inlined, specialised
+from vidtrack.compiled import inlined, kernel, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
 from vidtrack.scan import Scan
@@ -138,9 +138,8 @@ class Gate:
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
         gated = _gated(zhat.shape[1], mode, angles)
-        pair, of_pair, start = gated(zhat, cov, own, limit, scan.z, scan.R, runs)
-        row, measurement = pair
-        d2, nis, log_s, log_l, cost = of_pair
+        row, measurement, d2, nis, log_s, log_l, start = gated(zhat, cov, own, limit, scan.z, scan.R, runs)
+        cost = d2 if mode == EUCLIDEAN else d2 + log_s
         return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
 
 
@@ -208,114 +207,119 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 
 
 @lru_cache
-def _gated(m: int, mode: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Floats, Ints]]:
+def _gated(
+    m: int, mode: int, angles: tuple[int, ...]
+) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
     """The kernel that finds the pairs inside the gate; m, mode and angles are compile-time constants.
 
-    It returns (2, N) row and measurement, (5, N) d2, nis, log_s, log_l and cost, and start of the pairs. The
-    measurements of a row ascend.
+    It returns row, measurement, d2, nis, log_s, log_l and start of the pairs. The measurements of a row ascend.
     """
     wraps = tuple(a in angles for a in range(m))
-    wrapped, turns = any(wraps), 1 if any(a in angles for a in range(2)) else 0
-    full, decoupled, by_axis, euclidean = (mode == kind for kind in (FULL, DECOUPLED, BOX, EUCLIDEAN))
+    turns = 1 if any(a in angles for a in range(2)) else 0
 
     def gated(
         zhat: Floats, cov: Floats, own: Ints, limit: Floats, z: Floats, R: Floats, run: Ints
-    ) -> tuple[Ints, Floats, Ints]:
-        rows, count = len(zhat), len(z)
+    ) -> tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]:
+        rows = len(zhat)
         reach = _reach(cov, R, limit, mode)
         order, first, origin, cell, shape = cells(z, run, reach)
         runs = (len(first) - 1) // (shape[0] * shape[1])
-        sides = 2 * turns + 1
-        low, high = np.zeros((sides * rows, 2), np.int64), np.full((sides * rows, 2), -1)  # cells that a gate reaches
-        most = 0
-        for s in range(sides * rows):
-            t, turn = s // sides, s % sides - turns
-            if limit[t] == 0.0 or own[t] >= runs:
-                continue
-            outside = False
-            for a in range(2):
-                at = zhat[t, a] if a < m else 0.0
-                if wrapped and a < m:
-                    at += turn * TURN * wraps[a]
-                below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
-                above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
-                outside |= not (below < shape[a] and above >= 0)
-                low[s, a] = max(0.0, min(below, shape[a] - 1.0))
-                high[s, a] = max(0.0, min(above, shape[a] - 1.0))
-            if outside:
-                low[s, 1], high[s, 1] = 0, -1
-            for line in range(low[s, 1], high[s, 1] + 1):
-                base = (own[t] * shape[1] + line) * shape[0]
-                most += first[base + high[s, 0] + 1] - first[base + low[s, 0]]
-        row, measurement, value = np.empty(most, np.int64), np.empty(most, np.int64), np.empty((3, most))
+        size = 4 * rows + 16
+        row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
+        d2, nis, log_s = np.empty(size), np.empty(size), np.empty(size)
         n = 0
         L, v = np.empty((m, m)), np.empty(m)
-        seen = np.full(count if turns else 0, -1)
-        for s in range(sides * rows):
-            t = s // sides
-            for line in range(low[s, 1], high[s, 1] + 1):
-                base = (own[t] * shape[1] + line) * shape[0]
-                for at_point in range(first[base + low[s, 0]], first[base + high[s, 0] + 1]):
-                    j = order[at_point]
-                    if turns:  # a gate wider than a full turn finds a measurement from both sides
-                        if seen[j] == t:
-                            continue
-                        seen[j] = t
-                    distance, whitened, det = 0.0, 0.0, 1.0
-                    for a in range(m):  # S = L L' and L^-1 v, row by row
-                        v[a] = z[j, a] - zhat[t, a]
-                        if wrapped:
-                            v[a] -= TURN * wraps[a] * np.round(v[a] / TURN)
-                        variance = cov[t, a, a] + R[j, a, a]
-                        if euclidean:
-                            distance += v[a] * v[a]
-                        if decoupled:
-                            distance += v[a] * v[a] / variance
-                        if by_axis:
-                            distance = max(distance, v[a] * v[a] / variance)
-                        for b in range(a):
-                            entry = cov[t, a, b] + R[j, a, b]
-                            for c in range(b):
-                                entry -= L[a, c] * L[b, c]
-                            L[a, b] = entry / L[b, b]
-                            variance -= L[a, b] * L[a, b]
-                            v[a] -= L[a, b] * v[b]
-                        L[a, a] = np.sqrt(variance)
-                        v[a] /= L[a, a]
-                        whitened += v[a] * v[a]
-                        det *= L[a, a]
-                    if full:
-                        distance = whitened
-                    if distance <= limit[t]:
-                        row[n], measurement[n] = t, j
-                        value[0, n], value[1, n], value[2, n] = distance, whitened, 2.0 * np.log(det)
-                        n += 1
-        # The order in the grid depends on the cell size; results must not: two counting sorts.
-        begin, start = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
-        by_measurement = np.empty(n, np.int64)
-        for p in range(n):
-            begin[measurement[p] + 1] += 1
-            start[row[p] + 1] += 1
-        for j in range(count):
-            begin[j + 1] += begin[j]
+        low, high = np.empty(2, np.int64), np.empty(2, np.int64)
+        seen = np.full(len(z) if turns else 0, -1)
         for t in range(rows):
-            start[t + 1] += start[t]
-        for p in range(n):
-            j = measurement[p]
-            by_measurement[begin[j]] = p
-            begin[j] += 1
-        pair, of_pair = np.empty((2, n), np.int64), np.empty((5, n))
-        begin = start.copy()
-        for k in range(n):
-            p = by_measurement[k]
-            t = row[p]
-            at_pair = begin[t]
-            begin[t] += 1
-            pair[0, at_pair], pair[1, at_pair] = t, measurement[p]
-            d2, nis, log_s = value[0, p], value[1, p], value[2, p]
-            of_pair[0, at_pair], of_pair[1, at_pair], of_pair[2, at_pair] = d2, nis, log_s
-            of_pair[3, at_pair] = -0.5 * (nis + log_s + m * np.log(TURN))
-            of_pair[4, at_pair] = d2 if euclidean else d2 + log_s
-        return pair, of_pair, start
+            if limit[t] == 0.0 or own[t] >= runs:
+                continue
+            for turn in range(-turns, turns + 1):
+                outside = False
+                for a in range(2):
+                    at = zhat[t, a] + turn * TURN * wraps[a] if a < m else 0.0
+                    below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
+                    above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
+                    outside |= not (below < shape[a] and above >= 0)
+                    low[a] = max(0.0, min(below, shape[a] - 1.0))
+                    high[a] = max(0.0, min(above, shape[a] - 1.0))
+                if outside:
+                    continue
+                for line in range(low[1], high[1] + 1):
+                    base = (own[t] * shape[1] + line) * shape[0]
+                    for at_point in range(first[base + low[0]], first[base + high[0] + 1]):
+                        j = order[at_point]
+                        if turns:  # a gate wider than a full turn finds a measurement from both sides
+                            if seen[j] == t:
+                                continue
+                            seen[j] = t
+                        distance, whitened, det = 0.0, 0.0, 1.0
+                        for a in range(m):  # S = L L' and L^-1 v, row by row
+                            v[a] = z[j, a] - zhat[t, a]
+                            if wraps[a]:
+                                v[a] -= TURN * np.round(v[a] / TURN)
+                            variance = cov[t, a, a] + R[j, a, a]
+                            if mode == EUCLIDEAN:
+                                distance += v[a] * v[a]
+                            elif mode == DECOUPLED:
+                                distance += v[a] * v[a] / variance
+                            elif mode == BOX:
+                                distance = max(distance, v[a] * v[a] / variance)
+                            for b in range(a):
+                                entry = cov[t, a, b] + R[j, a, b]
+                                for c in range(b):
+                                    entry -= L[a, c] * L[b, c]
+                                L[a, b] = entry / L[b, b]
+                                variance -= L[a, b] * L[a, b]
+                                v[a] -= L[a, b] * v[b]
+                            L[a, a] = np.sqrt(variance)
+                            v[a] /= L[a, a]
+                            whitened += v[a] * v[a]
+                            det *= L[a, a]
+                        if mode == FULL:
+                            distance = whitened
+                        if not distance <= limit[t]:
+                            continue
+                        if n == size:
+                            size *= 2
+                            row, measurement = _grown(row, size), _grown(measurement, size)
+                            d2, nis, log_s = _grown(d2, size), _grown(nis, size), _grown(log_s, size)
+                        row[n], measurement[n], d2[n] = t, j, distance
+                        nis[n], log_s[n] = whitened, 2.0 * np.log(det)
+                        n += 1
+        # the order in the grid depends on the cell size; results must not
+        place = _ascending(row[:n], measurement[:n], rows, len(z))
+        nis, log_s = nis[place], log_s[place]
+        log_l = -0.5 * (nis + log_s + m * np.log(TURN))
+        return row[:n], measurement[place], d2[place], nis, log_s, log_l, starts(row[:n], rows)
 
     return specialised(gated, m, mode, *angles)
+
+
+@inlined
+def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
+    """(P,) order by row, then measurement, of pairs that are sorted by row; two counting sorts."""
+    first, begin = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
+    for p in range(len(row)):
+        first[measurement[p] + 1] += 1
+        begin[row[p] + 1] += 1
+    for counts in (first, begin):
+        for c in range(1, len(counts)):
+            counts[c] += counts[c - 1]
+    by_measurement, order = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
+    for p in range(len(row)):
+        by_measurement[first[measurement[p]]] = p
+        first[measurement[p]] += 1
+    for pair in by_measurement:
+        order[begin[row[pair]]] = pair
+        begin[row[pair]] += 1
+    return order
+
+
+@kernel
+def _grown(array: np.ndarray, size: int) -> np.ndarray:
+    """A copy with room for `size` elements."""
+    wider = np.empty(size, array.dtype)
+    for i in range(len(array)):
+        wider[i] = array[i]
+    return wider

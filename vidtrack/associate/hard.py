@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from vidtrack.arrays.rows import each, every, starts
+from vidtrack.arrays.rows import every, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.assignment import assign
 from vidtrack.associate.clusters import clusters
@@ -74,9 +74,7 @@ class GNN:
         """(T,) measurement of each track, -1 for none; only these rows (T,) may take one, and only free ones (M,)."""
         pairs = problem.pairs
         cardinal = self.convention == "maximum-cardinality"
-        taken = np.empty(len(rows), np.int64)
-        _assign(pairs.row, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, rows, free, cardinal, taken)
-        return taken
+        return _assigned(pairs.row, pairs.measurement, pairs.d2, pairs.cost, pairs.limit, rows, free, cardinal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,9 +112,18 @@ HARD = (NN, GNN, GreedyGNN)
 
 def one_hot(taken: Ints) -> Decision:
     """Decision of a hard rule: taken (T,) measurement of each track, -1 for none."""
-    took = taken >= 0
-    row = took.nonzero()[0]
-    return Decision(np.arange(len(taken)), row, taken.take(row), each(1.0, len(row)), (~took).astype(float))
+    return Decision(*_one_hot(taken))
+
+
+@kernel
+def _one_hot(taken: Ints) -> tuple[Ints, Ints, Ints, Floats, Floats]:
+    row, measurement, beta0 = np.empty_like(taken), np.empty_like(taken), np.ones(len(taken))
+    n = 0
+    for t in range(len(taken)):
+        if taken[t] >= 0:
+            row[n], measurement[n], beta0[t] = t, taken[t], 0.0
+            n += 1
+    return np.arange(len(taken)), row[:n], measurement[:n], np.ones(n), beta0
 
 
 @kernel
@@ -142,10 +149,9 @@ def _first_come(order: Ints, row: Ints, measurement: Ints, rows: int, measuremen
 
 
 @kernel
-def _assign(
-    row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, rows: Mask, free: Mask, cardinal: bool,
-    taken: Ints,
-) -> None:  # fmt: skip
+def _assigned(
+    row: Ints, measurement: Ints, d2: Floats, cost: Floats, limit: Floats, rows: Mask, free: Mask, cardinal: bool
+) -> Ints:
     """(T,) the assignment of least cost; `cardinal`: with as few unassigned rows as possible."""
     n, most = 0, len(row)
     taker, choice, near, price = np.empty_like(row), np.empty_like(row), np.empty(most), np.empty(most)
@@ -158,9 +164,7 @@ def _assign(
         miss = np.full(len(limit), _never(price, len(limit)))
     else:
         miss = _edge(taker, choice, near, price, limit, len(free))
-    column = assign(starts(taker, len(limit)), choice, price, miss, len(free))
-    for t in range(len(taken)):
-        taken[t] = column[t]
+    return assign(starts(taker, len(limit)), choice, price, miss, len(free))
 
 
 @inlined

@@ -102,9 +102,7 @@ class Problem:
 
     @cached_property
     def _logs(self) -> tuple[Floats, Floats]:
-        missed, ratio = np.empty(self.rows), np.empty(len(self.pairs))
-        logs(self.detection, self.inside, self.clutter, self.pairs.row, self.pairs.log_l, missed, ratio)
-        return missed, ratio
+        return logs(self.detection, self.inside, self.clutter, self.pairs.row, self.pairs.log_l)
 
     def only(self, mask: Mask) -> Problem:
         """The problem with the pairs of a mask (N,)."""
@@ -140,11 +138,9 @@ class Problem:
 
 
 @kernel
-def logs(
-    detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: Floats, missed: Floats, ratio: Floats
-) -> None:
+def logs(detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: Floats) -> tuple[Floats, Floats]:
     """(T,) log_missed and (N,) log_ratio from the factors (T,); VANISHING for ln 0."""
-    density, most = np.empty(len(inside)), 0.0
+    missed, density, ratio, most = np.empty(len(inside)), np.empty(len(inside)), np.empty(len(row)), 0.0
     for k in range(len(log_l)):
         most = max(most, abs(log_l[k]))
     least = -VANISHING - 4 * most
@@ -153,3 +149,4 @@ def logs(
         density[t] = math.log(detection[t]) - max(math.log(clutter[t]), least)
     for k in range(len(row)):
         ratio[k] = density[row[k]] + log_l[k]
+    return missed, ratio

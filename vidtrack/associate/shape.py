@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.rows import every
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.gate import Pairs, quantile
 from vidtrack.compiled import kernel
@@ -42,10 +41,9 @@ class Shape:
         overlap enough.
         """
         most = pairs.limit + quantile(self.probability, 2)
-        log_l, cost, stays = pairs.log_l.copy(), pairs.cost.copy(), every(len(pairs))
-        _compare(
-            pairs.row, pairs.measurement, pairs.d2, most, predicted, boxes, self.sigma, self.overlap,
-            log_l, cost, stays,
+        log_l, cost, stays = _compare(
+            pairs.row, pairs.measurement, pairs.d2, pairs.log_l, pairs.cost, most,
+            predicted, boxes, self.sigma, self.overlap,
         )  # fmt: skip
         weighed = Pairs(
             pairs.row, pairs.measurement, pairs.d2, pairs.nis, pairs.log_s, log_l, cost, pairs.limit, pairs.start
@@ -55,13 +53,14 @@ class Shape:
 
 @kernel
 def _compare(
-    row: Ints, measurement: Ints, d2: Floats, most: Floats, predicted: Floats, boxes: Floats,
-    sigma: float, overlap: float, log_l: Floats, cost: Floats, stays: Mask,
-) -> None:  # fmt: skip
-    """Add the size distances to the pairs' log_l and cost (N,), and note which of them stay (N,).
+    row: Ints, measurement: Ints, d2: Floats, log_l: Floats, cost: Floats, most: Floats,
+    predicted: Floats, boxes: Floats, sigma: float, overlap: float,
+) -> tuple[Floats, Floats, Mask]:  # fmt: skip
+    """(N,) the pairs' log_l and cost with their size distances, and which of them stay.
 
     A track without a box admits any size; a box of size zero is never admitted.
     """
+    log_l, cost, stays = log_l.copy(), cost.copy(), np.ones(len(row), np.bool_)
     for k in range(len(row)):
         mine, theirs = predicted[row[k]], boxes[measurement[k]]
         if np.isnan(mine[0]):
@@ -76,3 +75,4 @@ def _compare(
         stays[k] = common >= overlap * union and d2[k] + size2 <= most[row[k]]
         log_l[k] -= 0.5 * size2
         cost[k] += size2
+    return log_l, cost, stays

@@ -88,13 +88,11 @@ class KalmanBank:
         known = decision.inflation is not None and scan.noise is not None
         inflation = decision.inflation if known else np.zeros(rows)
         positions = H is POSITION.H(self.x, self.model.position)
-        x, P = np.empty((rows, self.x.shape[1])), np.empty((rows, *self.P.shape[1:]))
-        mixture_update(*H.shape[1:], sensor.angles, positions=positions)(
+        self.x, self.P = mixture_update(*H.shape[1:], sensor.angles, positions=positions)(
             self.x, self.P, H, excess, zhat, scan.z, scan.R,
             decision.parent, decision.row, decision.measurement, decision.beta, decision.beta0,
-            inflation, decision.spread, scan.noise if known else _no_excess(m)[0], x, P,
+            inflation, decision.spread, scan.noise if known else _no_excess(m)[0],
         )  # fmt: skip
-        self.x, self.P = x, P
         self.hits = self.hits.take(decision.parent) + (decision.beta0 < 0.5)
         self.scale = self.scale.take(decision.parent)
 

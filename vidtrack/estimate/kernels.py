@@ -17,7 +17,7 @@ from vidtrack.compiled import specialised
 
 Propagation = Callable[[Floats, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 Projection = Callable[[Floats, Floats, Floats], Floats]
-Update = Callable[..., None]
+Update = Callable[..., tuple[Floats, Floats]]
 
 TURN = 2 * np.pi
 
@@ -29,8 +29,8 @@ def propagation(n: int) -> Propagation:
     F and its Jacobian J (1, n, n) for all rows or (T, n, n), the same array for linear motion; Q (T, n, n).
     """
 
-    def propagate(x: Floats, P: Floats, F: Floats, J: Floats, Q: Floats, x1: Floats, P1: Floats) -> None:
-        JP = np.empty((n, n))
+    def propagate(x: Floats, P: Floats, F: Floats, J: Floats, Q: Floats) -> tuple[Floats, Floats]:
+        x1, P1, JP = np.empty_like(x), np.empty_like(P), np.empty((n, n))
         for t in range(len(x)):
             f = min(t, len(F) - 1)
             for i in range(n):
@@ -50,23 +50,17 @@ def propagation(n: int) -> Propagation:
                         total += JP[i, k] * J[f, j, k]
                     P1[t, i, j] = total
                     P1[t, j, i] = total
-
-    fill = specialised(propagate, n)
-
-    def propagated(x: Floats, P: Floats, F: Floats, J: Floats, Q: Floats) -> tuple[Floats, Floats]:
-        x1, P1 = np.empty(x.shape), np.empty(P.shape)
-        fill(x, P, F, J, Q, x1, P1)
         return x1, P1
 
-    return propagated
+    return specialised(propagate, n)
 
 
 @lru_cache
 def projection(m: int, n: int) -> Projection:
     """H P H' + excess (T, m, m) for all rows; H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m)."""
 
-    def project(P: Floats, H: Floats, excess: Floats, out: Floats) -> None:
-        HP = np.empty((m, n))
+    def project(P: Floats, H: Floats, excess: Floats) -> Floats:
+        out, HP = np.empty((len(P), m, m)), np.empty((m, n))
         for t in range(len(P)):
             h, s = min(t, len(H) - 1), min(t, len(excess) - 1)
             for a in range(m):
@@ -82,15 +76,9 @@ def projection(m: int, n: int) -> Projection:
                         total += HP[a, k] * H[h, b, k]
                     out[t, a, b] = total + excess[s, a, b]
                     out[t, b, a] = total + excess[s, b, a]
-
-    fill = specialised(project, m, n)
-
-    def projected(P: Floats, H: Floats, excess: Floats) -> Floats:
-        out = np.empty((len(P), m, m))
-        fill(P, H, excess, out)
         return out
 
-    return projected
+    return specialised(project, m, n)
 
 
 @lru_cache
@@ -99,7 +87,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
 
     The kernel takes x (T, n), P (T, n, n), H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m), zhat (T, m),
     z (M, m), R (M, m, m), and of the decision parent (K,), row (B,), measurement (B,), beta (B,), beta0 (K,),
-    inflation (K,), spread and noise; it fills x (K, n) and P (K, n, n). A single weight of one is the Kalman update.
+    inflation (K,) and spread; it returns x (K, n) and P (K, n, n). A single weight of one is the Kalman update itself.
     Innovations of the components `angles` are wrapped to -pi..pi. `positions`: H selects the positions of a state
     [x, vx, y, vy, ...]; products with it are then the entries that it selects.
 
@@ -113,10 +101,11 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
     def update(
         x: Floats, P: Floats, H: Floats, excess: Floats, zhat: Floats, z: Floats, R: Floats,
         parent: Ints, row: Ints, measurement: Ints, beta: Floats, beta0: Floats,
-        inflation: Floats, spread: bool, noise: Floats, x1: Floats, P1: Floats,
-    ) -> None:  # fmt: skip
+        inflation: Floats, spread: bool, noise: Floats,
+    ) -> tuple[Floats, Floats]:  # fmt: skip
         rows = len(parent)
         start = starts(row, rows)
+        x1, P1 = np.empty((rows, n)), np.empty((rows, n, n))
         K, L, A, AH = np.empty((n, m)), np.empty((m, m)), np.empty((n, n)), np.empty((n, m))
         shift, mean, v = np.empty(n), np.empty(n), np.empty(m)
         for k in range(rows):
@@ -211,6 +200,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
                 if mixed:
                     for c in range(n):
                         P1[k, i, c] -= mean[i] * mean[c]
+        return x1, P1
 
     if positions:
         update.__name__ = "update_by_positions"

@@ -37,26 +37,24 @@ def box_scan(t: float, box: ArrayLike, score: ArrayLike | None = None, jitter: f
     return Scan(t, boxes[:, :2] + size / 2, R, box=np.hstack([-size / 2, size]), score=scores)
 
 
+@kernel
 def absolute(box: Floats, xy: Floats) -> Floats:
     """(N, 4) boxes in the picture, from boxes relative to points (N, d)."""
-    placed, axes = box.copy(), min(2, xy.shape[1])
-    placed[:, :axes] += xy[:, :axes]
-    return placed
-
-
-def around(x: Floats, box: Floats) -> Floats:
-    """(T, 4) boxes in the picture, from boxes relative to the positions of states [x, vx, y, vy, ...] (T, n)."""
     placed = box.copy()
-    _place(x, placed)
+    for i in range(len(box)):
+        for axis in range(min(2, xy.shape[1])):
+            placed[i, axis] += xy[i, axis]
     return placed
 
 
 @kernel
-def _place(x: Floats, box: Floats) -> None:
-    """Add the positions of states (T, n) to the corners of boxes (T, 4), in place."""
+def around(x: Floats, box: Floats) -> Floats:
+    """(T, 4) boxes in the picture, from boxes relative to the positions of states [x, vx, y, vy, ...] (T, n)."""
+    placed = box.copy()
     for t in range(len(box)):
         for axis in range(min(2, x.shape[1] // 2)):
-            box[t, axis] += x[t, 2 * axis]
+            placed[t, axis] += x[t, 2 * axis]
+    return placed
 
 
 @kernel

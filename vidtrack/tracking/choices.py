@@ -29,12 +29,10 @@ def evidence(problem: Problem, decision: Decision, taken: Ints) -> tuple[Floats,
     that choice; the choice used is the measurement `taken` (T,), or the miss where that is -1.
     """
     pairs = problem.pairs
-    ratio, nis = np.empty(len(taken)), np.empty(len(taken))
-    _of_taken(
+    return _of_taken(
         taken, pairs.row, pairs.measurement, pairs.nis, pairs.log_l, problem.detection, problem.inside, problem.clutter,
-        decision.row, decision.measurement, decision.beta, decision.beta0, ratio, nis,
+        decision.row, decision.measurement, decision.beta, decision.beta0,
     )  # fmt: skip
-    return ratio, nis
 
 
 @kernel
@@ -50,13 +48,14 @@ def _heaviest(row: Ints, measurement: Ints, beta: Floats, beta0: Floats) -> Ints
 def _of_taken(
     taken: Ints, row: Ints, measurement: Ints, pair_nis: Floats, log_l: Floats,
     detection: Floats, inside: Floats, clutter: Floats,
-    chooser: Ints, choice: Ints, beta: Floats, beta0: Floats, ratio: Floats, nis: Floats,
-) -> None:  # fmt: skip
+    chooser: Ints, choice: Ints, beta: Floats, beta0: Floats,
+) -> tuple[Floats, Floats]:  # fmt: skip
     """(T,) log-likelihood ratio and NIS of the measurement taken by each row; pairs and weights in row order."""
-    log_ratio, share = np.empty(len(row)), np.empty(len(taken))
-    logs(detection, inside, clutter, row, log_l, ratio, log_ratio)
+    ratio, log_ratio = logs(detection, inside, clutter, row, log_l)
+    share, nis = np.ones(len(taken)), np.full(len(taken), np.nan)
     for t in range(len(taken)):
-        share[t], nis[t] = beta0[t] if taken[t] < 0 else 1.0, np.nan
+        if taken[t] < 0:
+            share[t] = beta0[t]
     for k in range(len(row)):
         if measurement[k] == taken[row[k]]:
             ratio[row[k]], nis[row[k]] = log_ratio[k], pair_nis[k]
@@ -65,6 +64,7 @@ def _of_taken(
             share[chooser[b]] = beta[b]
     for t in range(len(taken)):
         ratio[t] -= math.log(share[t])
+    return ratio, nis
 
 
 def choices(ids: Ints, pairs: Pairs, decision: Decision, taken: Ints) -> Choices:

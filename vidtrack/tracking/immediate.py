@@ -125,20 +125,16 @@ class Immediate:
         """Nothing is remembered of a row."""
 
 
+@kernel
 def _given(taken: Ints, shared: Ints, free: Mask, unresolved: Ints) -> tuple[Ints, Mask]:
     """(T,) `taken` without the rows that share (T,); (M,) those of the free measurements that are still free."""
-    kept, left = np.empty(len(taken), np.int64), free.copy()
-    _give(taken, shared, unresolved, kept, left)
-    return kept, left
-
-
-@kernel
-def _give(taken: Ints, shared: Ints, unresolved: Ints, kept: Ints, left: Mask) -> None:
+    kept, left = np.empty_like(taken), free.copy()
     for t in range(len(taken)):
         kept[t] = -1 if shared[t] >= 0 else taken[t]
         for j in (kept[t], unresolved[t]):
             if j >= 0:
                 left[j] = False
+    return kept, left
 
 
 @kernel

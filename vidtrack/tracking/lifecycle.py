@@ -95,26 +95,22 @@ class LifeCycle:
 
     def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
         """(T,) tentative rows with enough hits, age and travel (T,); size (T,) of the objects."""
-        often = grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
-        if np.count_nonzero(often):
-            _keep_frequent(often, register.history, self.confirm_window, self.confirm_hits)
-        return often
+        return _often(
+            register.history, self.confirm_window, self.confirm_hits,
+            register.status, register.born_s, travel, t, _full(self.confirm_s), self.confirm_travel * size,
+        )  # fmt: skip
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) tentative rows with more misses in their window than M-of-N allows."""
         allowed = self.confirm_window - self.confirm_hits
-        hopeless = np.empty(len(register), bool)
-        _hopeless(register.history, register.status, self.confirm_window, allowed, hopeless)
-        return hopeless
+        return _hopeless(register.history, register.status, self.confirm_window, allowed)
 
     def idle(self, register: Register, t: float) -> Mask:
         """(T,) rows that never travelled and no longer move: errors of the scene, not vehicles."""
         if self.idle_s is None:
             return np.zeros(len(register), bool)
         near, long = self.idle_travel, float(self.idle_s)
-        idle = np.empty(len(register), bool)
-        _idle(register.entered, register.travelled, register.box, register.rest_s, t, near, long, idle)
-        return idle
+        return _idle(register.entered, register.travelled, register.box, register.rest_s, t, near, long)
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""
@@ -123,8 +119,12 @@ class LifeCycle:
 
 def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
     """(T,) tentative rows that are old enough and whose travel (T,) is at least `least` (T,)."""
-    old = age_s * (1 - 1e-9)  # in spite of rounding
-    return (register.status == TENTATIVE) & (t - register.born_s >= old) & (travel >= least)
+    return _grown(register.status, register.born_s, travel, t, _full(age_s), least)
+
+
+def _full(age_s: float) -> float:
+    """An age that counts as this one, in spite of rounding."""
+    return age_s * (1 - 1e-9)
 
 
 def unseen(
@@ -134,12 +134,10 @@ def unseen(
     the last `scans` scans; None: no limit. The number of scans counts for tentative rows only if `tentative`.
     """
     alone = inf if coast_s is None else float(coast_s)
-    missing = np.empty(len(register), bool)
-    _unseen(
+    return _unseen(
         register.status, register.updated_s, register.history, t, alone, max(float(hidden_s), alone),
-        scans or 0, tentative, missing,
+        scans or 0, tentative,
     )  # fmt: skip
-    return missing
 
 
 def refuse_immortal(coast_s: float | None, coast_scans: int | None) -> None:
@@ -167,40 +165,57 @@ def scans_to_false_deletion(misses: int, detection: float) -> float:
 
 
 @kernel
-def _unseen(
-    status: np.ndarray, updated_s: Floats, history: Ints, now: float, alone: float, hidden: float,
-    scans: int, tentative: bool, missing: Mask,
-) -> None:  # fmt: skip
-    """scans: 0 for no limit."""
+def _grown(status: np.ndarray, born_s: Floats, travel: Floats, now: float, old: float, least: Floats) -> Mask:
+    grown = np.zeros(len(status), np.bool_)
     for t in range(len(status)):
-        missed = scans > 0 and history[t] & ((1 << scans) - 1) == 0
-        counts = tentative or status[t] != TENTATIVE
-        missing[t] = now - updated_s[t] > (hidden if status[t] == MERGED else alone) or (missed and counts)
+        grown[t] = status[t] == TENTATIVE and now - born_s[t] >= old and travel[t] >= least[t]
+    return grown
 
 
 @kernel
-def _idle(
-    entered: Mask, travelled: Floats, box: Floats, rest_s: Floats, now: float, near: float, long: float, idle: Mask
-) -> None:
+def _unseen(
+    status: np.ndarray, updated_s: Floats, history: Ints, now: float, alone: float, hidden: float,
+    scans: int, tentative: bool,
+) -> Mask:  # fmt: skip
+    """scans: 0 for no limit."""
+    unseen = np.zeros(len(status), np.bool_)
+    for t in range(len(status)):
+        missed = scans > 0 and history[t] & ((1 << scans) - 1) == 0
+        counts = tentative or status[t] != TENTATIVE
+        unseen[t] = now - updated_s[t] > (hidden if status[t] == MERGED else alone) or (missed and counts)
+    return unseen
+
+
+@kernel
+def _idle(entered: Mask, travelled: Floats, box: Floats, rest_s: Floats, now: float, near: float, long: float) -> Mask:
     """(T,) rows that rest for `long` seconds and travelled less than `near` of their sizes, entered ones half of it."""
+    idle = np.zeros(len(rest_s), np.bool_)
     for t in range(len(rest_s)):
         least = 0.5 * near if entered[t] else near
         stayed = travelled[t] < least * max(box[t, 2], box[t, 3])
         idle[t] = stayed and now - rest_s[t] > long
+    return idle
 
 
 @kernel
-def _keep_frequent(rows: Mask, history: Ints, window: int, hits: int) -> None:
-    """Leave those of the rows (T,) that have so many hits within the window."""
+def _often(
+    history: Ints, window: int, hits: int,
+    status: np.ndarray, born_s: Floats, travel: Floats, now: float, old: float, least: Floats,
+) -> Mask:  # fmt: skip
+    """(T,) grown rows with so many hits within the window."""
+    often = _grown(status, born_s, travel, now, old, least)
     for t in range(len(history)):
-        rows[t] = rows[t] and _counts(history[t], window)[0] >= hits
+        often[t] = often[t] and _counts(history[t], window)[0] >= hits
+    return often
 
 
 @kernel
-def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int, hopeless: Mask) -> None:
+def _hopeless(history: Ints, status: np.ndarray, window: int, allowed: int) -> Mask:
     """(T,) tentative rows with more misses within the window than are allowed."""
+    hopeless = np.zeros(len(history), np.bool_)
     for t in range(len(history)):
         hopeless[t] = status[t] == TENTATIVE and _counts(history[t], window)[1] > allowed
+    return hopeless
 
 
 @inlined

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 import numpy as np
 from scipy.special import expit
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import inlined, kernel
+from vidtrack.compiled import kernel
 from vidtrack.tracks import COASTING, CONFIRMED, MERGED, TENTATIVE
 
 BELIEF = 20.0
@@ -101,9 +100,7 @@ class Register:
 
     def travel(self, xy: Floats) -> Floats:
         """(T,) distances of positions (T, d) from where the rows began."""
-        distance = np.empty(len(xy))
-        _measure(xy, self.start, distance)
-        return distance
+        return _distance(xy, self.start)
 
     def move(self, xy: Floats, t: float) -> None:
         """Note where the rows are at t: xy (T, d)."""
@@ -251,24 +248,22 @@ def _settle(status: np.ndarray, history: Ints, merged: Ints) -> None:
 
 @kernel
 def _move(xy: Floats, start: Floats, travelled: Floats, box: Floats, rest: Floats, rest_s: Floats, t: float) -> None:
+    farthest, moved = _distance(xy, start), _distance(xy, rest)
     for i in range(len(xy)):
-        travelled[i] = max(travelled[i], _distance(xy, start, i))
-        if _distance(xy, rest, i) > REST * max(box[i, 2], box[i, 3]):
+        travelled[i] = max(travelled[i], farthest[i])
+        if moved[i] > REST * max(box[i, 2], box[i, 3]):
             rest_s[i] = t
             for axis in range(xy.shape[1]):
                 rest[i, axis] = xy[i, axis]
 
 
 @kernel
-def _measure(a: Floats, b: Floats, distance: Floats) -> None:
-    for i in range(len(a)):
-        distance[i] = _distance(a, b, i)
-
-
-@inlined
-def _distance(a: Floats, b: Floats, i: int) -> float:
-    """Distance between the points i of a and b (T, d)."""
-    total = 0.0
-    for axis in range(a.shape[1]):
-        total += (a[i, axis] - b[i, axis]) ** 2
-    return math.sqrt(total)
+def _distance(a: Floats, b: Floats) -> Floats:
+    """(T,) distances between points a and b (T, d)."""
+    distance = np.empty(len(a))
+    for t in range(len(a)):
+        total = 0.0
+        for axis in range(a.shape[1]):
+            total += (a[t, axis] - b[t, axis]) ** 2
+        distance[t] = np.sqrt(total)
+    return distance

@@ -345,8 +345,8 @@ class Tracker:
         ids = None if self.number is None else self.number(scan, born)
         cut = self.picture.cut(absolute(box, position))
         ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids, cut)
-        both = zip(ids.tolist(), born.tolist(), strict=True)
-        events += [Event(scan.t, track, "birth", f"measurement {j} belongs to no track") for track, j in both]
+        for track, j in zip(ids.tolist(), born.tolist(), strict=True):
+            events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
 
     def _confirm(self, t: float, events: list[Event]) -> None:
         """Confirm the tentative tracks that qualify, and set the status of all others by what was seen of them."""

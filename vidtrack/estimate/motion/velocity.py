@@ -63,9 +63,7 @@ class ConstantVelocity(Columns):
         else:
             time = self.hold_s * (dt**3 / 3), self.hold_s * (dt**2 / 2), self.hold_s * dt
         cross = self.accel if self.cross is None else self.cross
-        Q = np.empty(P.shape)
-        _accelerations(x, P, hits, scale, self.accel, cross, time, self.warmup, self.heading, Q)
-        return Q
+        return _accelerations(x, P, hits, scale, self.accel, cross, time, self.warmup, self.heading)
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
         """State and covariance of new rows from one located measurement each.
@@ -88,14 +86,15 @@ def _moved_on(dim: int, dt: float) -> Floats:
 @kernel
 def _accelerations(
     x: Floats, P: Floats, hits: Ints, scale: Floats, accel: float, cross: float, time: tuple[float, float, float],
-    warmup: int, heading: float, Q: Floats,
-) -> None:  # fmt: skip
-    """Fill Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2.
+    warmup: int, heading: float,
+) -> Floats:  # fmt: skip
+    """Q (T, n, n): A times the time integrals of position^2, position velocity and velocity^2.
 
     A row's heading is known after `warmup` updates, while its speed exceeds `heading` standard deviations.
     """
     rows, n = x.shape
     dim = n // 2
+    Q = np.empty((rows, n, n))
     for t in range(rows):
         speed2, variance = 0.0, 0.0
         for a in range(dim):
@@ -113,3 +112,4 @@ def _accelerations(
                 Q[t, 2 * a, 2 * b + 1] = A * time[1]
                 Q[t, 2 * a + 1, 2 * b] = A * time[1]
                 Q[t, 2 * a + 1, 2 * b + 1] = A * time[2]
+    return Q

@@ -16,15 +16,15 @@ ONE_SIDED = 4.0
 @kernel
 def claims(
     predicted: Floats, taken: Ints, confirmed: Mask, whole: Mask, blobs: Floats, order: Ints,
-    cover: float, growth: float, edge: float, pixel: float, shared: Ints, hides: Mask,
-) -> None:  # fmt: skip
+    cover: float, growth: float, edge: float, pixel: float,
+) -> tuple[Ints, Mask]:  # fmt: skip
     """(T,) the blob whose edges update each track, -1: none; (M,) blobs that may hide a vehicle without a track.
 
     predicted (T, 4) boxes, taken (T,) measurement of each track or -1, confirmed (T,), whole (T,) tracks whose box is
     reliable and inside the picture, blobs (M, 4) boxes, whose edges are uncertain by a pixel, order (M,) of their left
     edges.
     """
-    _share(predicted, taken, confirmed, blobs, order, cover, shared)
+    shared = _blob_of(predicted, taken, confirmed, blobs, order, cover)
     explained = np.zeros(len(blobs))
     for t in range(len(shared)):
         own = shared[t] < 0 and taken[t] >= 0
@@ -32,19 +32,18 @@ def claims(
             shared[t] = taken[t]
         if shared[t] >= 0:
             explained[shared[t]] += predicted[t, 2] * predicted[t, 3]
+    hides = np.ones(len(blobs), np.bool_)
     for j in range(len(blobs)):
         hides[j] = not explained[j] >= 0.5 * blobs[j, 2] * blobs[j, 3]
+    return shared, hides
 
 
 @inlined
-def _share(
-    predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, order: Ints, cover: float, shared: Ints
-) -> None:
+def _blob_of(predicted: Floats, taken: Ints, confirmed: Mask, blobs: Floats, order: Ints, cover: float) -> Ints:
     """(T,) the blob each track shares with others, or lies on without being assigned it; -1 for all others."""
-    claims = np.zeros(len(blobs), np.int64)
+    shared, claims = np.full(len(predicted), -1), np.zeros(len(blobs), np.int64)
     orphans, boxes, n = np.empty(len(predicted), np.int64), np.empty_like(predicted), 0
     for t in range(len(predicted)):
-        shared[t] = -1
         if confirmed[t] and taken[t] < 0:
             orphans[n] = t
             for side in range(4):
@@ -60,6 +59,7 @@ def _share(
     for t in range(len(predicted)):  # with nearest neighbour several tracks may take a blob
         if confirmed[t] and taken[t] >= 0 and claims[taken[t]] > 1:
             shared[t] = taken[t]
+    return shared
 
 
 @inlined

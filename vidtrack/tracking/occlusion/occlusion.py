@@ -84,12 +84,10 @@ class Occlusion:
         if view is None:
             return ALONE.claim(view, taken, confirmed, count)
         reliable = (view.hits > SETTLED) & ~view.border.cut(view.predicted)
-        shared, hides = np.empty(len(taken), np.int64), np.empty(count, bool)
-        claims(
-            view.predicted, taken, confirmed, reliable, view.blobs, view.blobs[:, 0].argsort(kind="stable"),
-            self.cover, self.growth, self.edge, view.border.pixel, shared, hides,
+        return claims(
+            view.predicted, taken, confirmed, reliable, view.blobs,
+            view.blobs[:, 0].argsort(kind="stable"), self.cover, self.growth, self.edge, view.border.pixel,
         )  # fmt: skip
-        return shared, hides
 
     def catch(self, view: View | None, taken: Ints, shared: Ints, free: Mask) -> tuple[Ints, Mask]:
         """`shared` (T,) and `free` (M,) after tracks that got nothing took the free blob that each overlaps most.

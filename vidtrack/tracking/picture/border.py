@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
-from vidtrack.compiled import inlined, kernel
+from vidtrack.compiled import kernel
 from vidtrack.scan import Scan
 
 FAR = 6.0
@@ -59,21 +59,15 @@ class Border:
 
     def sides(self, box: Floats) -> Mask:
         """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border cuts."""
-        sides = np.empty((len(box), 4), bool)
-        _sides(box, self._edges, self._reach, sides)
-        return sides
+        return _sides(box, self._edges, self._reach)
 
     def cut(self, box: Floats) -> Mask:
         """(N,) boxes that are cut somewhere: their extent changes faster than any vehicle's."""
-        cut = np.empty(len(box), bool)
-        _cut(box, self._edges, self._reach, cut)
-        return cut
+        return _cut(box, self._edges, self._reach)
 
     def in_view(self, x: Floats, P: Floats) -> Floats:
         """(N,) probability that positions are within the border: states [x, vx, y, vy, ...] (N, n), P (N, n, n)."""
-        inside = np.empty(len(x))
-        _in_view(x, P, self._edges, inside)
-        return inside
+        return _in_view(x, P, self._edges)
 
     def relieved(self, box: Floats, v: Floats, shown: Floats) -> Mask:
         """(N,) boxes (N, 4) that moved out over a side by RETURN of their size, and now move in by as much.
@@ -89,45 +83,40 @@ class Border:
         return _reaching(box, sides, self._edges)
 
 
-@inlined
-def _crossed(
-    box: Floats, i: int, axis: int, edges: tuple[float, float, float, float], reach: float
-) -> tuple[bool, bool]:
-    """Whether the border cuts the near side of a box (left, top) and the far one; none that is infinitely far does."""
-    bounded = not np.isinf(edges[2])
-    near, far = box[i, axis] < edges[axis] + reach, box[i, axis] + box[i, axis + 2] > edges[axis + 2] - reach
-    return bounded and near, bounded and far
-
-
 @kernel
-def _sides(box: Floats, edges: tuple[float, float, float, float], reach: float, sides: Mask) -> None:
+def _sides(box: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
+    sides = np.zeros((len(box), 4), np.bool_)
+    if np.isinf(edges[2]):
+        return sides
     for i in range(len(box)):
         for axis in range(2):
-            sides[i, axis], sides[i, axis + 2] = _crossed(box, i, axis, edges, reach)
+            sides[i, axis] = box[i, axis] < edges[axis] + reach
+            sides[i, axis + 2] = box[i, axis] + box[i, axis + 2] > edges[axis + 2] - reach
+    return sides
 
 
 @kernel
-def _cut(box: Floats, edges: tuple[float, float, float, float], reach: float, cut: Mask) -> None:
-    for i in range(len(box)):
-        cut[i] = False
-        for axis in range(2):
-            near, far = _crossed(box, i, axis, edges, reach)
-            cut[i] = cut[i] or near or far
-
-
-@kernel
-def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float], inside: Floats) -> None:
+def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float]) -> Floats:
     """(N,) product of both axes' normal probabilities between the edges; a pixel is a unit square around its place."""
+    inside = np.ones(len(x))
+    if np.isinf(edges[2]):
+        return inside
     for i in range(len(x)):
-        inside[i] = 1.0
-        if np.isinf(edges[2]):
-            continue
         for axis in range(2):
             sigma, at = math.sqrt(2 * P[i, 2 * axis, 2 * axis]), x[i, 2 * axis] + 0.5
             below, above = (edges[axis] - at) / sigma, (edges[axis + 2] - at) / sigma
             if below < -FAR and above > FAR:
                 continue
             inside[i] *= (math.erfc(-above) - math.erfc(-below)) / 2
+    return inside
+
+
+@kernel
+def _cut(box: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
+    cut, sides = np.zeros(len(box), np.bool_), _sides(box, edges, reach)
+    for i in range(len(box)):
+        cut[i] = sides[i].any()
+    return cut
 
 
 @kernel

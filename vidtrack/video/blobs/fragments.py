@@ -76,20 +76,19 @@ def together(
     """
     vehicle = np.empty(len(box), np.int64)
     for i in range(len(box)):
-        vehicle[i] = _only_vehicle(box, i, predicted, overlap)
+        vehicle[i] = _only_vehicle(box[i], predicted, overlap)
     one, other, apart = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]  # pieces of one vehicle
     for i in range(len(box)):
         for j in range(i):
-            union = _union(box, i, j)
-            if _both_vehicles(i, j, box, area, typical, union):
+            if _both_vehicles(i, j, box, area, typical):
                 continue
-            distance = _gap(box, i, j)
+            distance = _gap(box[i], box[j])
             same = vehicle[i] >= 0 and vehicle[i] == vehicle[j]
             two = vehicle[i] >= 0 and vehicle[j] >= 0 and vehicle[i] != vehicle[j]
             if (
                 (same and distance <= gap * max(predicted[vehicle[i], 2], predicted[vehicle[i], 3]))
-                or (pieces and _whole(box, i, j, typical, union, distance))
-                or (pieces and link[i] == link[j] and not two and _fit(box, i, j, typical, union))
+                or (pieces and _whole(box[i], box[j], typical[i]))
+                or (pieces and link[i] == link[j] and not two and _fit(box[i], box[j], typical[i]))
             ):
                 one.append(i)
                 other.append(j)
@@ -121,7 +120,7 @@ def _nearest_first(apart: list[float]) -> Ints:
     return order
 
 
-@inlined
+@kernel
 def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical: Floats) -> bool:
     """Whether the regions of groups a and b can be one vehicle: no two of them are vehicles, or all fit into one."""
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
@@ -129,50 +128,53 @@ def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical
         if group[i] == a or group[i] == b:
             left, right = min(left, box[i, 0]), max(right, box[i, 0] + box[i, 2])
             top, bottom = min(top, box[i, 1]), max(bottom, box[i, 1] + box[i, 3])
-    whole = (right - left) * (bottom - top)
+    union = (right - left) * (bottom - top)
     for i in range(len(box)):
         if group[i] != a:
             continue
         for j in range(len(box)):
-            if group[j] == b and _both_vehicles(i, j, box, area, typical, _union(box, i, j)):
-                return not np.isnan(typical[i, 0]) and whole <= _WHOLE * typical[i, 0] * typical[i, 1]
+            if group[j] == b and _both_vehicles(i, j, box, area, typical):
+                return not np.isnan(typical[i, 0]) and union <= _WHOLE * typical[i, 0] * typical[i, 1]
     return True
 
 
 @inlined
-def _whole(box: Floats, i: int, j: int, typical: Floats, union: float, gap: float) -> bool:
-    """Whether a small box and a near one, of a common box `union` px^2 large, are together no larger than a vehicle."""
-    usual = typical[i, 0] * typical[i, 1]  # NaN, which nothing is below, where it is unknown
-    small = min(box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]) < _SMALL * usual
-    return small and union <= _WHOLE * usual and gap <= _NEAR * max(typical[i, 0], typical[i, 1])
+def _whole(a: Floats, b: Floats, typical: Floats) -> bool:
+    """Whether a small box and a near one together are no larger than a vehicle of typical (2,) width and height."""
+    if np.isnan(typical[0]):
+        return False
+    usual = typical[0] * typical[1]
+    small = min(a[2] * a[3], b[2] * b[3]) < _SMALL * usual
+    return small and _union(a, b) <= _WHOLE * usual and _gap(a, b) <= _NEAR * max(typical[0], typical[1])
 
 
 @inlined
-def _fit(box: Floats, i: int, j: int, typical: Floats, union: float) -> bool:
-    """Whether two linked boxes, of a common box `union` px^2 large, are together no larger than a vehicle."""
-    if np.isnan(typical[i, 0]):
-        one, other = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
+def _fit(a: Floats, b: Floats, typical: Floats) -> bool:
+    """Whether two linked boxes together are no larger than a vehicle of typical (2,) width and height."""
+    if np.isnan(typical[0]):
+        one, other = a[2] * a[3], b[2] * b[3]
         return min(one, other) < _LESSER * max(one, other)
-    return union <= _WHOLE * typical[i, 0] * typical[i, 1]
+    return _union(a, b) <= _WHOLE * typical[0] * typical[1]
 
 
 @inlined
-def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats, union: float) -> bool:
-    """Whether two regions, of a common box `union` px^2 large, are each like a vehicle."""
+def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -> bool:
+    """Whether two regions are each like a vehicle."""
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
     if not np.isnan(typical[i, 0]):
         usual = typical[i, 0] * typical[i, 1]
         return min(a, b) >= _LIKE * usual
+    union = _union(box[i], box[j])
     filled = area[i] > _LIKE_FILL * a and area[j] > _LIKE_FILL * b
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
 
 
 @inlined
-def _only_vehicle(box: Floats, i: int, predicted: Floats, most: float) -> int:
-    """Index of the predicted box that contains most of box i; -1 for none, or if others overlap it too."""
+def _only_vehicle(box: Floats, predicted: Floats, most: float) -> int:
+    """Index of the predicted box that contains most of this box (4,); -1 for none, or if others overlap it too."""
     vehicle, sharers = -1, 0
     for k in range(len(predicted)):
-        share = _share_inside(box, i, predicted, k)
+        share = _share_inside(box, predicted[k])
         sharers += share > 1 - most
         if share >= most and vehicle < 0:
             vehicle = k
@@ -180,29 +182,25 @@ def _only_vehicle(box: Floats, i: int, predicted: Floats, most: float) -> int:
 
 
 @inlined
-def _share_inside(box: Floats, i: int, other: Floats, k: int) -> float:
-    """Share of the area of box i inside the other box k, enlarged by _SPREAD."""
+def _share_inside(box: Floats, other: Floats) -> float:
+    """Share of a box's area inside the other box, enlarged by _SPREAD."""
     common = 1.0
     for axis in range(2):
-        size = _SPREAD * other[k, axis + 2]
-        low = other[k, axis] - (size - other[k, axis + 2]) / 2
-        common *= max(min(box[i, axis] + box[i, axis + 2], low + size) - max(box[i, axis], low), 0.0)
-    return common / (box[i, 2] * box[i, 3])
+        size = _SPREAD * other[axis + 2]
+        low = other[axis] - (size - other[axis + 2]) / 2
+        common *= max(min(box[axis] + box[axis + 2], low + size) - max(box[axis], low), 0.0)
+    return common / (box[2] * box[3])
 
 
 @inlined
-def _union(box: Floats, i: int, j: int) -> float:
+def _union(a: Floats, b: Floats) -> float:
     """Area of the bounding box of both."""
-    wide = max(box[i, 0] + box[i, 2], box[j, 0] + box[j, 2]) - min(box[i, 0], box[j, 0])
-    return wide * (max(box[i, 1] + box[i, 3], box[j, 1] + box[j, 3]) - min(box[i, 1], box[j, 1]))
+    wide = max(a[0] + a[2], b[0] + b[2]) - min(a[0], b[0])
+    return wide * (max(a[1] + a[3], b[1] + b[3]) - min(a[1], b[1]))
 
 
 @inlined
-def _gap(box: Floats, i: int, j: int) -> float:
+def _gap(a: Floats, b: Floats) -> float:
     """Distance between two boxes along the axis that separates them more; negative where they overlap."""
-    distance = -np.inf
-    for axis in range(2):
-        after = box[i, axis] - (box[j, axis] + box[j, axis + 2])
-        before = box[j, axis] - (box[i, axis] + box[i, axis + 2])
-        distance = max(distance, max(after, before))
-    return distance
+    across = max(a[0] - (b[0] + b[2]), b[0] - (a[0] + a[2]))
+    return max(across, max(a[1] - (b[1] + b[3]), b[1] - (a[1] + a[3])))
