@@ -30,8 +30,8 @@ class Register:
     the picture has cut it since it began), entered (it began so, and came in), travelled (farthest it ever was from its
     start), rest (T, d) and rest_s (where and when it last moved on by REST of its size), missed (T, S) scans of each
     station without it since it was last seen, visible (T, S) probability that each station could see it, NaN while
-    nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T, 4, 2) how far each reached in from
-    the sides of the picture that cut it, at most and at least since.
+    nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T, 4, 2) where the inner
+    edge of each was inside the sides of the picture that cut it, at most and at least since.
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 

@@ -302,21 +302,22 @@ class Tracker:
         left = register.history & 1 == 0
         if np.count_nonzero(left):
             left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
-        left |= self.picture.relieved(register, self.bank)
+        relieved = self.picture.relieved(register, self.bank)
         hopeless = self.life.hopeless(register)
         register.move(self._xy(), t)
         register.come_in(self.picture.cut(around(self.bank.x, register.box)))
         idle = self.life.idle(register, t)
         parts = self.sharing.parts(register, t)
-        going = hopeless | left | parts | idle
+        going = hopeless | left | relieved | parts | idle
         shared = found.shared
         if np.count_nonzero(going):
             shared = shared[~going]
             for gone, why in (
                 (hopeless & ~left, self.life.ends),
                 (left, "left the picture"),
-                (idle & ~left & ~hopeless, "never travelled and stands still"),
-                (parts & ~left, "part of the vehicle that it never left"),
+                (relieved & ~left & ~hopeless, "another vehicle comes in where it left"),
+                (idle & ~left & ~relieved & ~hopeless, "never travelled and stands still"),
+                (parts & ~left & ~relieved, "part of the vehicle that it never left"),
             ):
                 if np.count_nonzero(gone):
                     events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))

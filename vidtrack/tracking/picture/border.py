@@ -17,6 +17,8 @@ REACH = 2.0
 """Pixels of the sensor; a box this close to the border is cut by it."""
 RETURN = 0.25
 """Share of the longer side; who comes in again by so much before having left is another one."""
+COMES = 0.25
+"""Sizes a second; who is slower may stand."""
 NEAR = 0.1
 """Share of the longer side; so near the border a box may be cut by it."""
 SPECK = 1 / 30
@@ -69,14 +71,15 @@ class Border:
         """(N,) probability that positions are within the border: states [x, vx, y, vy, ...] (N, n), P (N, n, n)."""
         return _in_view(x, P, self._edges)
 
-    def relieved(self, box: Floats, v: Floats, shown: Floats) -> Mask:
+    def relieved(self, box: Floats, v: Floats, alone: Mask, shown: Floats) -> Mask:
         """(N,) boxes (N, 4) that moved out over a side by RETURN of their size, and now move in by as much.
 
         v      (N, 2) velocities
-        shown  (N, 4, 2) how far each reached in from a side that cuts it, at most and at least since; NaN: not cut.
-               Updated
+        alone  (N,) whether each was seen, on a blob of its own; others stay as they are
+        shown  (N, 4, 2) where the inner edge of each was inside a side that cuts it, along the normal that points in: at
+               most, and at least since. NaN: not cut. Updated
         """
-        return _relieved(box, v, self._edges, shown)
+        return _relieved(box, v, alone, self._edges, shown)
 
     def reaching(self, box: Floats, sides: Mask) -> Floats:
         """Boxes (N, 4) extended to the border on the given sides (N, 4)."""
@@ -134,24 +137,26 @@ def _reaching(box: Floats, sides: Mask, edges: tuple[float, float, float, float]
 
 
 @kernel
-def _relieved(box: Floats, v: Floats, edges: tuple[float, float, float, float], shown: Floats) -> Mask:
+def _relieved(box: Floats, v: Floats, alone: Mask, edges: tuple[float, float, float, float], shown: Floats) -> Mask:
     relieved = np.zeros(len(box), np.bool_)
     if np.isinf(edges[2]):
         return relieved
     for i in range(len(box)):
-        size = max(box[i, 2], box[i, 3])
+        if not alone[i]:
+            continue
         for side in range(4):
-            axis = side % 2
-            near = box[i, axis] - edges[axis] if side < 2 else edges[side] - box[i, axis] - box[i, axis + 2]
-            inward = v[i, axis] > 0 if side < 2 else v[i, axis] < 0
-            extent = near + box[i, axis + 2]
-            if near > NEAR * size:
+            axis, inward = side % 2, 1.0 if side < 2 else -1.0
+            near, far = inward * box[i, axis], inward * (box[i, axis] + box[i, axis + 2])
+            inner, outer, border = max(near, far), min(near, far), inward * edges[side]
+            if outer - border > NEAR * max(box[i, 2], box[i, 3]):
                 shown[i, side] = np.nan
                 continue
+            size = np.fmax(max(box[i, 2], box[i, 3]), shown[i, side, 0] - border)  # also what has left
             gone = shown[i, side, 0] - shown[i, side, 1] > RETURN * size
-            if not (gone or extent <= shown[i, side, 0]):  # it comes in, or this is the first time
-                shown[i, side] = extent
-            elif not inward:
-                shown[i, side, 1] = min(shown[i, side, 1], extent)
-            relieved[i] |= inward and gone and extent - shown[i, side, 1] > RETURN * size
+            speed = inward * v[i, axis]
+            if not (gone or inner <= shown[i, side, 0]):  # it comes in, or this is the first time
+                shown[i, side] = inner
+            elif speed <= 0:
+                shown[i, side, 1] = min(shown[i, side, 1], inner)
+            relieved[i] |= gone and speed > COMES * size and inner - shown[i, side, 1] > RETURN * size
     return relieved

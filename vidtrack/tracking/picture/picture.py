@@ -213,7 +213,8 @@ class Picture:
         if not self.relieve:
             return np.zeros(len(register), bool)
         box = around(bank.x, register.box)
-        return self.border.relieved(box, bank.x.take(bank.model.velocity, axis=1), register.shown)
+        alone = (register.history & 1 == 1) & (register.merged < 0)
+        return self.border.relieved(box, bank.x.take(bank.model.velocity, axis=1), alone, register.shown)
 
     def in_view(self, bank: Estimator) -> Floats:
         """(T,) probability that each track is within the border of the last scan."""
