@@ -84,7 +84,7 @@ def test_an_outline_that_flickers_at_the_border_is_not():
 
 @given(st.integers(0, 2**32 - 1), st.floats(0, 2))
 def test_who_stands_at_the_border_stays(seed, jitter_px):
-    """The inner edge of a vehicle of 40 px, of which 20 px are seen, shakes; so does its velocity, less than it drives."""
+    """The inner edge of a vehicle of 40 px, of which 20 px are seen, shakes, and so does its velocity."""
     random = np.random.default_rng(seed)
     shown = np.full((1, 4, 2), np.nan)
     for k in range(300):

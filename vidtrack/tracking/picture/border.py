@@ -76,8 +76,8 @@ class Border:
 
         v      (N, 2) velocities
         alone  (N,) whether each was seen, on a blob of its own; others stay as they are
-        shown  (N, 4, 2) where the inner edge of each was inside a side that cuts it, along the normal that points in: at
-               most, and at least since. NaN: not cut. Updated
+        shown  (N, 4, 2) where the inner edge of each was inside a side that cuts it, along the normal that points in:
+               at most, and at least since. NaN: not cut. Updated
         """
         return _relieved(box, v, alone, self._edges, shown)
 
