@@ -13,6 +13,7 @@ from vidtrack.doctor.advice import judge
 from vidtrack.doctor.examine import examine
 from vidtrack.formats import read
 from vidtrack.run.files import run_file
+from vidtrack.run.warm import warm
 from vidtrack.score import evaluate
 from vidtrack.simulate import simulate
 from vidtrack.simulate.video_write import write_truth
@@ -55,6 +56,12 @@ def write(path, pictures, fps=FPS, stamps_ms=None):
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return str(path)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled():
+    """Kernels are compiled before the doctor looks: its patience goes by the clock."""
+    warm()
 
 
 def advice_on(source, *assignments, seconds=SECONDS):
