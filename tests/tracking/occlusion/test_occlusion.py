@@ -173,7 +173,7 @@ def test_a_lone_members_edges_are_those_of_its_blob():
 
 def catch(tracks, blobs, idle, free):
     """The blob that each track (T,) continues on, and which of the free blobs (M,) still are."""
-    view = View(blobs, blobs, tracks, np.full(len(tracks), 9), Border(), 0.3)
+    view = View(blobs, blobs, tracks, np.full(len(tracks), 9), Border(), 0.3, None, np.full((len(tracks), 3), np.nan))
     taken = np.where(idle, -1, len(blobs))
     shared, still = Occlusion().catch(view, taken, np.full(len(tracks), -1), free.copy())
     return shared.tolist(), still.tolist()
