@@ -45,7 +45,7 @@ class Tracks:
     nis            (T,) normalised innovation squared of this update; NaN for none
     position, velocity   columns of x, one per axis
     run            (T,) Monte Carlo run
-    entered        (T,) whether the border of the picture cut the track at first, and no longer does: it came in
+    entered        (T,) whether the track came in over the border of the picture, or is coming in
     events         births, confirmations, merges, splits and deletions of this scan
     choices        reasons of the association; None unless the tracker has `explain`
     prior_x, prior_P, gain   (T, n), (T, n, n), (T, n, n) for smoothing, else None: the prediction for this scan, and

@@ -110,7 +110,7 @@ class LifeCycle:
         if self.idle_s is None:
             return np.zeros(len(register), bool)
         near, long = self.idle_travel, float(self.idle_s)
-        return _idle(register.entered, register.travelled, register.box, register.rest_s, t, near, long)
+        return _idle(register.came_in, register.travelled, register.box, register.rest_s, t, near, long)
 
     def lost(self, register: Register, t: float) -> Mask:
         """(T,) rows without evidence for too long; by misses only those that are confirmed."""

@@ -27,8 +27,9 @@ class Register:
     its measurement, -1 alone) and merged_since_s, exchange (probability that the target is another's, since they were
     not resolved), score (log-odds that it is a target), best (highest score since it was confirmed, before that the
     first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its own), outside (the border of
-    the picture has cut it since it began), entered (it began so, and came in), travelled (farthest it ever was from its
-    start), rest (T, d) and rest_s (where and when it last moved on by REST of its size), missed (T, S) scans of each
+    the picture has cut it since it began), entered (it began so, and came in), inward (T, 2) axes along which it comes
+    in, beside (it began beside a vehicle), towed (T, d) where it would be if it went with the vehicles it was beside,
+    travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by REST of its size), missed (T, S) scans of each
     station without it since it was last seen, visible (T, S) probability that each station could see it, NaN while
     nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T, 4, 2) where the inner
     edge of each was inside the sides of the picture that cut it, at most and at least since.
@@ -36,10 +37,12 @@ class Register:
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
-             "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "travelled", "rest",
-             "rest_s", "missed", "visible", "look", "shown")  # fmt: skip
+             "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "inward", "beside",
+             "towed", "travelled", "rest", "rest_s", "missed", "visible", "look", "shown")  # fmt: skip
 
-    ADDED: ClassVar = {name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered")} | {
+    ADDED: ClassVar = {name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered", "beside")} | {
+        "inward": lambda register: np.zeros((len(register), 2), bool),
+        "towed": lambda register: register.start.copy(),
         "look": lambda register: np.full((len(register), 3), np.nan),
         "shown": lambda register: np.full((len(register), 4, 2), np.nan),
     }
@@ -73,6 +76,9 @@ class Register:
         self.alone_s = np.empty(0)
         self.outside = np.empty(0, bool)
         self.entered = np.empty(0, bool)
+        self.inward = np.empty((0, 2), bool)
+        self.beside = np.empty(0, bool)
+        self.towed = np.empty((0, dim))
         self.travelled = np.empty(0)
         self.rest = np.empty((0, dim))
         self.rest_s = np.empty(0)
@@ -98,18 +104,37 @@ class Register:
         """(T,) probability that each row is a target."""
         return expit(self.score)
 
+    @property
+    def came_in(self) -> Mask:
+        """(T,) rows that came in over the border of the picture, or are coming in."""
+        return self.entered | self.inward.any(axis=1)
+
     def travel(self, xy: Floats) -> Floats:
         """(T,) distances of positions (T, d) from where the rows began."""
-        return _distance(xy, self.start)
+        return _distance(xy, self.start, self.inward)
+
+    def travel_apart(self, xy: Floats) -> Floats:
+        """(T,) distances of positions (T, d) from where the rows would be if they had gone with vehicles."""
+        return _distance(xy, self.towed, self.inward)
 
     def move(self, xy: Floats, t: float) -> None:
         """Note where the rows are at t: xy (T, d)."""
-        _move(xy, self.start, self.travelled, self.box, self.rest, self.rest_s, t)
+        _move(xy, self.start, self.inward, self.travelled, self.box, self.rest, self.rest_s, t)
 
-    def come_in(self, cut: Mask) -> None:
-        """Note which rows the border of the picture cuts (T,)."""
+    def come_in(self, xy: Floats, sides: Mask) -> None:
+        """Note which sides (T, 4) of the rows at xy (T, d) the border of the picture cuts.
+
+        What is seen of a vehicle that comes in grows, so that its middle moves half as far as the vehicle: along these
+        axes distances count twice. Once it is in, its start is moved so that they stay what they were.
+        """
+        cut = sides.any(axis=1)
         self.entered |= self.outside & ~cut
         self.outside &= cut
+        _come_in(xy, sides, self.inward, self.start, self.towed, self.rest)
+
+    def tow(self, rows: Ints, by: Floats) -> None:
+        """Move on where rows (K,) would be if they went with vehicles, that moved by (K, d)."""
+        self.towed[rows] += by
 
     def record_hits(self, hit: Mask, sure: Mask, looked: Mask, station: int, t: float, dt: float) -> None:
         """Note which rows (T,) the scan of a station at t shows, dt seconds after the last, and which of them for sure.
@@ -140,10 +165,11 @@ class Register:
         run: Ints,
         label: Ints | None = None,
         ids: Ints | None = None,
-        outside: Mask | None = None,
+        sides: Mask | None = None,
     ) -> Ints:
-        """Register new tentative tracks; returns their ids, the next ones unless given."""
+        """Register new tentative tracks, cut by sides (B, 4); returns their ids, the next ones unless given."""
         count = len(position)
+        sides = np.zeros((count, 4), bool) if sides is None else sides
         ids = np.arange(self.next_id, self.next_id + count) if ids is None else ids
         self.next_id = max(self.next_id + count, 1 + int(ids.max(initial=0)))
         new = {
@@ -161,8 +187,11 @@ class Register:
             "run": run,
             "label": -1 if label is None else label,
             "alone_s": 0.0,
-            "outside": False if outside is None else outside,
+            "outside": sides.any(axis=1),
             "entered": False,
+            "inward": inward(sides),
+            "beside": False,
+            "towed": position,
             "travelled": 0.0,
             "rest": position,
             "rest_s": t,
@@ -246,9 +275,31 @@ def _settle(status: np.ndarray, history: Ints, merged: Ints) -> None:
             status[i] = MERGED
 
 
+def inward(sides: Mask) -> Mask:
+    """(T, 2) axes along which boxes cut by sides (T, 4) may come in.
+
+    Not over the top: there far vehicles come into view whole.
+    """
+    return np.column_stack([sides[:, 0] | sides[:, 2], sides[:, 3]])
+
+
 @kernel
-def _move(xy: Floats, start: Floats, travelled: Floats, box: Floats, rest: Floats, rest_s: Floats, t: float) -> None:
-    farthest, moved = _distance(xy, start), _distance(xy, rest)
+def _come_in(xy: Floats, sides: Mask, inward: Mask, start: Floats, towed: Floats, rest: Floats) -> None:
+    for i in range(len(xy)):
+        for axis in range(2):
+            cut = sides[i, axis + 2] or (axis == 0 and sides[i, 0])
+            if inward[i, axis] and not cut:
+                inward[i, axis] = False
+                start[i, axis] -= xy[i, axis] - start[i, axis]
+                towed[i, axis] -= xy[i, axis] - towed[i, axis]
+                rest[i, axis] -= xy[i, axis] - rest[i, axis]
+
+
+@kernel
+def _move(
+    xy: Floats, start: Floats, inward: Mask, travelled: Floats, box: Floats, rest: Floats, rest_s: Floats, t: float
+) -> None:
+    farthest, moved = _distance(xy, start, inward), _distance(xy, rest, inward)
     for i in range(len(xy)):
         travelled[i] = max(travelled[i], farthest[i])
         if moved[i] > REST * max(box[i, 2], box[i, 3]):
@@ -258,12 +309,13 @@ def _move(xy: Floats, start: Floats, travelled: Floats, box: Floats, rest: Float
 
 
 @kernel
-def _distance(a: Floats, b: Floats) -> Floats:
-    """(T,) distances between points a and b (T, d)."""
+def _distance(a: Floats, b: Floats, twice: Mask) -> Floats:
+    """(T,) distances between points a and b (T, d); axes that count twice (T, 2)."""
     distance = np.empty(len(a))
     for t in range(len(a)):
         total = 0.0
         for axis in range(a.shape[1]):
-            total += (a[t, axis] - b[t, axis]) ** 2
+            apart = a[t, axis] - b[t, axis]
+            total += (2 * apart if axis < 2 and twice[t, axis] else apart) ** 2
         distance[t] = np.sqrt(total)
     return distance

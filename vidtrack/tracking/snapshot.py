@@ -36,6 +36,6 @@ def snapshot(
         velocity=model.velocity,
         run=register.run.copy(),
         exchange=register.exchange.copy(),
-        entered=register.entered.copy(),
+        entered=register.came_in,
         **more,
     )

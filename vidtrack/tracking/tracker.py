@@ -304,8 +304,9 @@ class Tracker:
             left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
         relieved = self.picture.relieved(register, self.bank)
         hopeless = self.life.hopeless(register)
-        register.move(self._xy(), t)
-        register.come_in(self.picture.cut(around(self.bank.x, register.box)))
+        xy = self._xy()
+        register.move(xy, t)
+        register.come_in(xy, self.picture.sides(around(self.bank.x, register.box)))
         idle = self.life.idle(register, t)
         parts = self.sharing.parts(register, t)
         going = hopeless | left | relieved | parts | idle
@@ -344,8 +345,8 @@ class Tracker:
         run = np.zeros(len(born), np.int64) if scan.run is None else scan.run[born]
         label = None if scan.label is None else scan.label[born]
         ids = None if self.number is None else self.number(scan, born)
-        cut = self.picture.cut(absolute(box, position))
-        ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids, cut)
+        sides = self.picture.sides(absolute(box, position))
+        ids = self.register.append(scan.t, position, box, self.life.birth, run, label, ids, sides)
         for track, j in zip(ids.tolist(), born.tolist(), strict=True):
             events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
 

@@ -68,8 +68,8 @@ class Surroundings(Protocol):
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
         """Move the boxes of tracks towards those of the measurements that they have taken (T,)."""
 
-    def cut(self, box: Floats) -> Mask:
-        """(N,) whether the border of what the scan surveyed cuts boxes (N, 4)."""
+    def sides(self, box: Floats) -> Mask:
+        """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border of what the scan surveyed cuts."""
 
     def relieved(self, register: Register, bank: Estimator) -> Mask:
         """(T,) tracks that have left, and in whose place others come in."""
@@ -110,9 +110,9 @@ class NoPicture:
     def follow(self, view: View | None, taken: Ints, register: Register, bank: Estimator, dt: float) -> None:
         """Nothing has a box."""
 
-    def cut(self, box: Floats) -> Mask:
-        """(N,) none."""
-        return np.zeros(len(box), bool)
+    def sides(self, box: Floats) -> Mask:
+        """(N, 4) none."""
+        return np.zeros((len(box), 4), bool)
 
     def relieved(self, register: Register, bank: Estimator) -> Mask:
         """(T,) none."""
@@ -201,9 +201,9 @@ class Picture:
         if bank.model.per_size:
             np.copyto(bank.scale, longer(register.box), where=taken >= 0)
 
-    def cut(self, box: Floats) -> Mask:
-        """(N,) boxes (N, 4) that the border of the last scan cuts."""
-        return self.border.cut(box)
+    def sides(self, box: Floats) -> Mask:
+        """(N, 4) which sides of boxes (N, 4) the border of the last scan cuts."""
+        return self.border.sides(box)
 
     def relieved(self, register: Register, bank: Estimator) -> Mask:
         """(T,) tracks that drove out over a side of the border, and come in over it before they were out.
