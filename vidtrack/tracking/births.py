@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import area, best_cover, widened
 
 FRAGMENT, NEAR, SMALL = 0.6, 0.5, 0.3
-"""A leftover blob starts no track where a tracked vehicle, widened by NEAR of its longer side, covers FRAGMENT of
-it, if the blob is smaller than SMALL of the vehicle: it is a piece of it, or of its shadow."""
+"""A leftover blob smaller than SMALL of a tracked vehicle, of which the vehicle covers FRAGMENT, is a piece of it and
+starts no track. One that only the vehicle widened by NEAR of its longer side covers so is beside it: it may be a piece
+or the vehicle's shadow, but also a smaller vehicle, which then must travel apart from it."""
 
 
 def distinct(scan: Scan, free: Mask) -> Mask:
@@ -33,9 +34,12 @@ def distinct(scan: Scan, free: Mask) -> Mask:
     return first
 
 
-def pieces(blobs: Floats, vehicles: Floats) -> Mask:
-    """(M,) blobs (M, 4) that are pieces of vehicles (V, 4) already tracked."""
-    vehicle, share = best_cover(blobs, widened(vehicles, NEAR))
+def pieces(blobs: Floats, vehicles: Floats, near: float = 0.0) -> Ints:
+    """(M,) which of the tracked vehicles (V, 4) each of the blobs (M, 4) may be a piece of; -1: of none.
+
+    near  a margin of the vehicles, as a share of their longer sides
+    """
+    vehicle, share = best_cover(blobs, widened(vehicles, near))
     piece = (vehicle >= 0) & (share >= FRAGMENT)
     piece[piece] = area(blobs[piece]) < SMALL * area(vehicles[vehicle[piece]])
-    return piece
+    return np.where(piece, vehicle, -1)

@@ -146,7 +146,7 @@ class Tracker:
         found = self._associate(problem, view, dt, events)
         outcome = self._update(found, scan, view, dt, since)
         kept = self._delete(found, scan.t, events)
-        born = self._register(found, scan, view, events)
+        born = self._register(found, scan, view, dt, events)
         return self._tracks(scan.t, outcome.after(kept, born), events)
 
     def predict(self, t: float) -> Tracks:
@@ -326,14 +326,16 @@ class Tracker:
         self.sharing.merge(shared, register, t, events)
         return ~going
 
-    def _register(self, found: Association, scan: Scan, view: View | None, events: list[Event]) -> Ints:
+    def _register(
+        self, found: Association, scan: Scan, view: View | None, dt: float, events: list[Event]
+    ) -> Ints:
         """Start tentative tracks from free measurements (B,), which are returned, and confirm those that qualify."""
         born = found.free.nonzero()[0]
         if len(born):
             born = self.sharing.newcomers(born, view, self.register, self.bank)
         if len(born):
             self._start(born, scan, events)
-        self._confirm(scan.t, events)
+        self._confirm(scan.t, dt, events)
         return born
 
     def _start(self, born: Ints, scan: Scan, events: list[Event]) -> None:
@@ -350,13 +352,13 @@ class Tracker:
         for track, j in zip(ids.tolist(), born.tolist(), strict=True):
             events.append(Event(scan.t, track, "birth", f"measurement {j} belongs to no track"))
 
-    def _confirm(self, t: float, events: list[Event]) -> None:
+    def _confirm(self, t: float, dt: float, events: list[Event]) -> None:
         """Confirm the tentative tracks that qualify, and set the status of all others by what was seen of them."""
         register = self.register
         self.timing.settle(register, t, events)
         if np.count_nonzero(register.status == TENTATIVE):
-            xy = self._xy()
-            ready = self.life.confirmed(register, t, register.travel(xy), self.picture.size(register.box, xy))
+            travel = self.sharing.travel(register, self.bank, self.road, dt)
+            ready = self.life.confirmed(register, t, travel, self.picture.size(register.box, self._xy()))
             ready = self.timing.confirm(ready, register)
             if np.count_nonzero(ready):
                 events.extend(Event.each(t, register.id[ready], "confirmed", self.life.confirms))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vidtrack.arrays.types import Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
 from vidtrack.errors import ConfigError
@@ -22,12 +22,13 @@ from vidtrack.estimate.noise import as_if_new, middle_variance
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
-from vidtrack.tracking.births import pieces
-from vidtrack.tracking.boxes import absolute, around, overlapping
+from vidtrack.tracking.births import NEAR, SMALL, pieces
+from vidtrack.tracking.boxes import absolute, area, around, overlapping
 from vidtrack.tracking.occlusion.claims import claims
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.sharing import Exclusive
 from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
 from vidtrack.tracks import TENTATIVE
 
@@ -179,4 +180,29 @@ class Occlusion:
         if view is None:
             return born
         known = around(bank.x, register.box)[register.status != TENTATIVE]
-        return born[~pieces(view.blobs[born], known)]
+        return born[pieces(view.blobs[born], known) < 0]
+
+    def travel(self, register: Register, bank: Estimator, road: Road | None, dt: float) -> Floats:
+        """(T,) how far each row travelled by itself since it began; dt seconds after the last scan.
+
+        A row that is small beside a vehicle may be a piece of it, or of its shadow. It counts what it travelled apart
+        from the vehicle too, by half if it began there, and nothing while it is small for a vehicle at its place.
+        """
+        xy = bank.x.take(bank.model.position, axis=1)
+        travel = register.travel(xy)
+        rows = (register.status == TENTATIVE).nonzero()[0]
+        if not len(rows):
+            return travel
+        known = (register.status != TENTATIVE).nonzero()[0]
+        box = around(bank.x, register.box)
+        vehicle = pieces(box[rows], box[known], NEAR)
+        small = rows[vehicle >= 0]
+        if len(small):
+            vehicle = known[vehicle[vehicle >= 0]]
+            moved = dt * bank.x[vehicle].take(bank.model.velocity, axis=1)
+            register.tow(small, moved * (1.0 + register.inward[vehicle]) / (1.0 + register.inward[small]))
+            register.beside[small] |= register.history[small] == 1
+        apart = np.where(register.beside, 0.5, 1.0) * register.travel_apart(xy)
+        if len(small) and road:
+            apart[small[area(box[small]) < SMALL * road.sizes.area(box[small])]] = -np.inf
+        return np.where(register.status == TENTATIVE, np.minimum(travel, apart), travel)

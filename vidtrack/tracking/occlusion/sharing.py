@@ -8,12 +8,13 @@ from typing import Protocol
 import numpy as np
 
 from vidtrack.arrays.rows import every, no_index
-from vidtrack.arrays.types import Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Event
 from vidtrack.estimate.bank import Estimator
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
 
 
@@ -50,6 +51,9 @@ class Sharing(Protocol):
     def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
         """Those of the free measurements born (B,) that are no pieces of known targets."""
 
+    def travel(self, register: Register, bank: Estimator, road: Road | None, dt: float) -> Floats:
+        """(T,) how far each row travelled by itself since it began; dt seconds after the last scan."""
+
 
 @dataclass(frozen=True, slots=True)
 class Exclusive:
@@ -82,3 +86,7 @@ class Exclusive:
     def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
         """All of them."""
         return born
+
+    def travel(self, register: Register, bank: Estimator, road: Road | None, dt: float) -> Floats:
+        """(T,) distances from where the rows began."""
+        return register.travel(bank.x.take(bank.model.position, axis=1))

@@ -53,6 +53,10 @@ class SizeField:
             return np.full((len(box), 2), np.nan)
         return _fitted(_places(box, self._extent), self._fit, self._floor)
 
+    def area(self, box: Floats) -> Floats:
+        """(N,) area typical of vehicles at the place of boxes (N, 4); NaN if unknown."""
+        return np.prod(self.typical(box), axis=1)
+
     def learn(self, tracks: Tracks, whole: Mask) -> None:
         """Take samples of tracks (T,) that are alone, `whole` (T,) and have driven; refit once a second."""
         rows, self._id, self._xy = _sampled(

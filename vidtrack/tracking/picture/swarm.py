@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.tracking.births import NEAR, pieces
 from vidtrack.tracking.boxes import longer
-from vidtrack.tracks import Tracks
+from vidtrack.tracks import TENTATIVE, Tracks
 
 _SWARM_PER_S = 30.0  # its births in the whole picture, more than traffic has anywhere
 _FEW_PER_S = 1.0  # births of one size (a bin); sizes with fewer are not the swarm's
@@ -52,14 +53,16 @@ class Swarm:
         return float(_LEAST_PX * 2 ** (end / _STEPS)) if rate[:end].sum() > _SWARM_PER_S else 0.0
 
     def learn(self, tracks: Tracks) -> None:
-        """Count the tracks that began in this scan."""
+        """Count the tracks that began in this scan, other than beside known vehicles."""
         dt = max(tracks.t - self._time_s, 0.0)
         kept = math.exp(-dt / _FORGET_S)
         self.births *= kept
         self._watched_s = kept * self._watched_s + dt
         self._time_s = tracks.t
-        new = tracks.age_s <= 0
-        if np.count_nonzero(new):
+        new = (tracks.age_s <= 0).nonzero()[0]
+        if len(new):
+            new = new[pieces(tracks.box[new], tracks.box[tracks.status != TENTATIVE], NEAR) < 0]
+        if len(new):
             bins = _STEPS * np.log2(np.maximum(longer(tracks.box[new]), _LEAST_PX) / _LEAST_PX)
             share = min(1.0, _AT_ONCE / len(bins))
             np.add.at(self.births, np.minimum(bins.astype(np.int64), _BINS - 1), share)

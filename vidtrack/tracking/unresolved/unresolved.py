@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vidtrack.arrays.types import Ints, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.problem import Problem
 from vidtrack.decision import Decision, Event
 from vidtrack.estimate.bank import Estimator, Mixture
@@ -26,6 +26,7 @@ from vidtrack.estimate.sensor import POSITION_VELOCITY
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.picture.picture import View
+from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.register import Register
 from vidtrack.tracking.unresolved.branches import Doubts
 from vidtrack.tracking.unresolved.cell import PolarCell
@@ -160,6 +161,10 @@ class Unresolved:
     def newcomers(self, born: Ints, view: View | None, register: Register, bank: Estimator) -> Ints:
         """All of them."""
         return born
+
+    def travel(self, register: Register, bank: Estimator, road: Road | None, dt: float) -> Floats:
+        """(T,) distances from where the rows began."""
+        return register.travel(bank.x.take(bank.model.position, axis=1))
 
     def _part(self, found: Association, register: Register) -> None:
         """Part the pairs of which a track has a measurement without the other; say how probable an exchange is."""
