@@ -29,10 +29,10 @@ class Register:
     first), run, label (class last seen, -1 unknown), alone_s (time seen on a blob of its own), outside (the border of
     the picture has cut it since it began), entered (it began so, and came in), inward (T, 2) axes along which it comes
     in, beside (it began beside a vehicle), towed (T, d) where it would be if it went with the vehicles it was beside,
-    travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by REST of its size), missed (T, S) scans of each
-    station without it since it was last seen, visible (T, S) probability that each station could see it, NaN while
-    nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T, 4, 2) where the inner
-    edge of each was inside the sides of the picture that cut it, at most and at least since.
+    travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by REST of
+    its size), missed (T, S) scans of each station without it since it was last seen, visible (T, S) probability that
+    each station could see it, NaN while nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T,
+    4, 2) where the inner edge of each was inside the sides of the picture that cut it, at most and at least since.
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
@@ -40,7 +40,9 @@ class Register:
              "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "inward", "beside",
              "towed", "travelled", "rest", "rest_s", "missed", "visible", "look", "shown")  # fmt: skip
 
-    ADDED: ClassVar = {name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered", "beside")} | {
+    ADDED: ClassVar = {
+        name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered", "beside")
+    } | {
         "inward": lambda register: np.zeros((len(register), 2), bool),
         "towed": lambda register: register.start.copy(),
         "look": lambda register: np.full((len(register), 3), np.nan),

@@ -326,9 +326,7 @@ class Tracker:
         self.sharing.merge(shared, register, t, events)
         return ~going
 
-    def _register(
-        self, found: Association, scan: Scan, view: View | None, dt: float, events: list[Event]
-    ) -> Ints:
+    def _register(self, found: Association, scan: Scan, view: View | None, dt: float, events: list[Event]) -> Ints:
         """Start tentative tracks from free measurements (B,), which are returned, and confirm those that qualify."""
         born = found.free.nonzero()[0]
         if len(born):

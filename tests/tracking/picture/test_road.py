@@ -11,7 +11,7 @@ from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.picture.sizes import SizeField
 from vidtrack.tracking.picture.swarm import Swarm
-from vidtrack.tracks import TENTATIVE
+from vidtrack.tracks import CONFIRMED, TENTATIVE
 
 WIDTH, HEIGHT = 320, 240
 
@@ -170,6 +170,18 @@ def test_nearly_all_of_a_swarm_is_within_its_size_and_vehicles_are_not(shape, pe
         if k > 5 * 25:
             assert swarm.size < 90
             assert np.mean(np.array(born) <= swarm.size) > 0.8
+
+
+def test_births_beside_a_vehicle_are_no_swarm():
+    """Pieces of a lorry come and go around it."""
+    for known, there in (([], True), ([[0.0, 60.0, 120.0, 60.0]], False)):
+        swarm = Swarm()
+        for k in range(12 * 25):
+            pieces = [[10.0 * i, 125.0, 8.0, 4.0] for i in range(8)]
+            ages = np.array([0.0] * 8 + [5.0] * len(known))
+            status = np.array([TENTATIVE] * 8 + [CONFIRMED] * len(known))
+            swarm.learn(tracks_of(k / 25, pieces + known, status=status, age_s=ages))
+        assert (swarm.size > 0) == there
 
 
 def test_dense_traffic_is_no_swarm():
