@@ -1,13 +1,14 @@
 """The development clips changed in known ways, vidtrack beside two scripts: hit/missed/false of each.
 
     VIDTRACK_DATA=... python tools/benchmark_video_variants.py --clips DIR [--peers-in DIR] [--of CLIP ...]
-        [--variants NAME ...] [--set KEY=VALUE ...] [--events]
+        [--variants NAME ...] [--draws N [--first-draw K]] [--set KEY=VALUE ...] [--events]
 
 Every 2nd and 3rd frame, half size, mirrored, backward, every picture twice, flickering light, no colour, too much
 light, noise, rain, haze, dusk, snow, glare, clouds, a wandering white balance, night, coarse encoding, and a camera
 that sways by 0.5, 1 and 3 px (at 640 px of width). A rule that helps a
-clip and hurts its variants was fitted to the clip. The clips are made once, in --clips; --peers-in and --set are
-those of benchmark_video.py.
+clip and hurts its variants was fitted to the clip. With --draws each clip is changed N times by chance instead:
+another part of the picture, begin, size, light, rate, noise, encoding, and mount at once. The clips are made once, in
+--clips; --peers-in and --set are those of benchmark_video.py.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import argparse
 from benchmark_video import add_options, data_folder, event_rows, print_head
 from video_clips import DEVELOPMENT, with_events
 from video_trackers import contenders
-from video_variants import VARIANTS, derive
+from video_variants import VARIANTS, derive, drawn
 
 
 def main() -> None:
@@ -26,12 +27,16 @@ def main() -> None:
     add_options(parser)
     parser.add_argument("--of", nargs="+", choices=DEVELOPMENT, default=DEVELOPMENT, metavar="CLIP")
     parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS), metavar="NAME")
+    parser.add_argument("--draws", type=int, default=0, metavar="N", help="chance combinations of each clip instead")
+    parser.add_argument("--first-draw", type=int, default=0, metavar="K", help="number of the first one (default 0)")
     options = parser.parse_args()
     data = data_folder(parser)
     rivals = contenders(options.assignments, options.peers_in)
     print_head(rivals)
     clips = [with_events(name, data) for name in options.of]
-    derived = [derive(clip, name, options.clips) for name in options.variants for clip in clips]
+    derived = [derive(clip, name, options.clips) for name in options.variants for clip in clips if not options.draws]
+    for seed in range(options.first_draw, options.first_draw + options.draws):
+        derived += [derive(clip, f"draw-{seed}", options.clips, drawn(clip, seed)) for clip in clips]
     event_rows(derived, rivals, [clip.name for clip in derived] if options.events else ())
 
 

@@ -1,7 +1,8 @@
 """Development clips changed in known ways, with their truth: a guard against rules that only fit the clips as they are.
 
 A variant keeps what is counted: frames, lines and directions of the truth are carried over. Written as FFV1, without
-loss.
+loss. A drawn variant (`drawn`) is a chance combination of changes: another part of the picture, begin, size, light,
+rate, sensor, encoding, mount.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ Picture = NDArray[np.uint8]
 SMALLEST_TOLERANCE = 4.0  # frames
 DROPS = 8e-4  # a picture and pixel
 SWAY_SHARE = 0.9  # of the picture that a swaying camera sees
+SETTLE_S = 1.0  # a vehicle that crosses this soon after the first picture may be counted or not
+ROOM = 0.12  # of the picture's sides, between a counting line and the edge of a part that is drawn
+WHOLE = (0.0, 0.0, 1.0, 1.0)
 OTHER_SIDE = {"left": "right", "right": "left"}
 OTHER_WAY = OTHER_SIDE | {"up": "down", "down": "up"}
 
@@ -32,7 +36,9 @@ class Variant:
     """How a clip is changed.
 
     every     only every n-th frame
-    half      half the size
+    scale     size of the picture as a share
+    start_s   s; what comes before is left out
+    part      left, top, right, bottom of the part that is seen, as shares of the picture
     mirror    left and right exchanged
     backward  from the last frame to the first
     doubled   every second frame is the one before it once more, as of a camera that sends more than it sees
@@ -43,7 +49,9 @@ class Variant:
     """
 
     every: int = 1
-    half: bool = False
+    scale: float = 1.0
+    start_s: float = 0.0
+    part: tuple[float, float, float, float] = WHOLE
     mirror: bool = False
     backward: bool = False
     doubled: bool = False
@@ -153,7 +161,7 @@ def _noisy(light: NDArray, sigma: NDArray, rng: Generator) -> Picture:
 VARIANTS = {
     "every-2nd": Variant(every=2),
     "every-3rd": Variant(every=3),
-    "half": Variant(half=True),
+    "half": Variant(scale=0.5),
     "mirror": Variant(mirror=True),
     "backward": Variant(backward=True),
     "doubled": Variant(doubled=True),
@@ -176,16 +184,37 @@ VARIANTS = {
 }
 
 
-def derive(clip: Clip, name: str, folder: Path) -> Clip:
+def drawn(clip: Clip, seed: int) -> Variant:
+    """A chance combination of changes; the part of the picture that is seen holds the counted lines."""
+    rng = np.random.default_rng(seed)
+    ends = np.concatenate([_ends(text) for text in clip.lines]) / _stream(clip.video)[0]
+    low, high = np.clip(ends.min(axis=0) - ROOM, 0, 0.3), np.clip(ends.max(axis=0) + ROOM, 0.7, 1)
+    left, top, right, bottom = [*(low * rng.uniform(0, 1, 2)), *(1 - (1 - high) * rng.uniform(0, 1, 2))]
+    gamma, gain, veil, sigma = rng.uniform(0.6, 1.6), rng.uniform(0.7, 1.2), rng.uniform(0, 50), rng.uniform(0, 5)
+
+    def view(picture: Picture, time_s: float, rng: Generator) -> Picture:
+        light = gain * 255 * (picture / np.float32(255)) ** gamma
+        return _noisy(light * (1 - veil / 255) + veil, np.full((1, 1, 1), sigma), rng)
+
+    return Variant(
+        every=int(rng.choice([1, 1, 2])),
+        scale=float(rng.uniform(0.6, 1.2)),
+        start_s=float(rng.uniform(0, 5)),
+        part=(left, top, right, bottom),
+        mirror=bool(rng.integers(2)),
+        view=view,
+        coarse=int(rng.integers(26, 36)) if rng.integers(2) else None,
+        sway=float(rng.uniform(0.3, 2)) if rng.integers(3) == 0 else None,
+    )
+
+
+def derive(clip: Clip, name: str, folder: Path, variant: Variant | None = None) -> Clip:
     """The variant `name` of a clip with crossings, made in `folder` where it is not there yet."""
-    variant = VARIANTS[name]
+    variant = variant or VARIANTS[name]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{clip.name}-{name}.mkv"
-    with av.open(str(clip.video)) as container:
-        stream = container.streams.video[0]
-        size, rate = (stream.width, stream.height), stream.average_rate
-        assert rate is not None  # all clips with crossings have one
-        count = sum(1 for _ in container.decode(video=0)) if variant.backward else 0
+    size, rate = _stream(clip.video)
+    count = sum(1 for _ in _decoded(clip.video)) if variant.backward else 0
     if not path.is_file():
         part = path.with_name(f"part-{path.name}")
         pictures = _pictures(clip.video, variant, float(rate))
@@ -196,27 +225,41 @@ def derive(clip: Clip, name: str, folder: Path) -> Clip:
         _write(part, pictures, rate / variant.every)
         part.rename(path)
     lines = tuple(_line(text, variant, size) for text in clip.lines)
-    events = tuple(_event(event, variant, count) for event in clip.events)
-    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=events)
+    events = tuple(_event(event, variant, count, rate) for event in clip.events)
+    return replace(
+        clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=tuple(e for e in events if e.frame >= 0)
+    )
+
+
+def _stream(video: Path) -> tuple[tuple[int, int], Fraction]:
+    """Width and height [px], and frames/s."""
+    with av.open(str(video)) as container:
+        stream = container.streams.video[0]
+        rate = stream.average_rate
+        assert rate is not None  # all clips with crossings have one
+        return (stream.width, stream.height), rate
 
 
 def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
     rng = np.random.default_rng(0)
-    decoded = list(_decoded(video))
+    decoded = list(_decoded(video))[round(variant.start_s * rate) :]
     if variant.backward:
         decoded.reverse()
     if variant.doubled:
         decoded = [decoded[k - k % 2] for k in range(len(decoded))]
-    width = decoded[0].shape[1]
+    left, top, right, bottom = _pixels(variant, (decoded[0].shape[1], decoded[0].shape[0]))
+    width = right - left
+    size = _even(variant.scale * width), _even(variant.scale * (bottom - top))
     shifts = np.zeros((len(decoded), 2))
     if variant.sway is not None:
         shifts = variant.sway * width / 640 * _sway(len(decoded), rng)
     for k in range(0, len(decoded), variant.every):
-        changed, shift = np.asarray(decoded[k], np.uint8), shifts[k]
+        changed, shift = np.asarray(decoded[k], np.uint8)[top:bottom, left:right], shifts[k]
         if variant.mirror:
             changed = changed[:, ::-1]
-        if variant.half:
-            changed = np.asarray(cv2.resize(changed, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+        if variant.scale != 1:
+            smooth = cv2.INTER_AREA if variant.scale < 1 else cv2.INTER_CUBIC
+            changed = np.asarray(cv2.resize(changed, size, interpolation=smooth), np.uint8)
         if variant.sway is not None:
             changed = _window(changed, shift)
         if variant.light is not None:
@@ -259,26 +302,42 @@ def _corner(width: int, height: int) -> NDArray:
     return (np.array([width, height]) - _crop(width, height)) / 2
 
 
+def _ends(line: str) -> NDArray:
+    """(2, 2) ends of a line NAME:x1,y1,x2,y2."""
+    return np.array([float(number) for number in line.rpartition(":")[2].split(",")]).reshape(2, 2)
+
+
+def _even(length: float) -> int:
+    return 2 * round(length / 2)
+
+
+def _pixels(variant: Variant, size: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom of the part that is seen, of a picture of this size [px]."""
+    left, top, right, bottom = (_even(share * length) for share, length in zip(variant.part, 2 * size, strict=True))
+    return left, top, right, bottom
+
+
 def _line(text: str, variant: Variant, size: tuple[int, int]) -> str:
     """The line where the variant has it."""
-    name, _, numbers = text.rpartition(":")
-    ends = np.array([float(number) for number in numbers.split(",")]).reshape(2, 2)
+    left, top, right, bottom = _pixels(variant, size)
+    ends = _ends(text) - (left, top)
     if variant.mirror:
-        ends[:, 0] = size[0] - ends[:, 0]
-    if variant.half:
-        ends /= 2
+        ends[:, 0] = right - left - ends[:, 0]
+    ends *= variant.scale
     if variant.sway is not None:
-        ends -= _corner(*size)
-    return f"{name}:{','.join(f'{value:g}' for value in ends.ravel())}"
+        ends -= _corner(_even(variant.scale * (right - left)), _even(variant.scale * (bottom - top)))
+    return f"{text.rpartition(':')[0]}:{','.join(f'{value:g}' for value in ends.ravel())}"
 
 
-def _event(event: Event, variant: Variant, count: int) -> Event:
-    """The crossing as the variant of a clip of `count` frames has it."""
+def _event(event: Event, variant: Variant, count: int, rate: Fraction) -> Event:
+    """The crossing as the variant of a clip of `count` frames has it; its frame is negative before the first."""
     if variant.backward:
         return replace(event, frame=count - 1 - event.frame, direction=OTHER_WAY[event.direction])
     direction = OTHER_SIDE.get(event.direction, event.direction) if variant.mirror else event.direction
     tolerance = event.tolerance if variant.every == 1 else max(event.tolerance / variant.every, SMALLEST_TOLERANCE)
-    return replace(event, frame=event.frame / variant.every, direction=direction, tolerance=tolerance)
+    frame = event.frame - round(variant.start_s * float(rate))
+    certain = event.certain and (variant.start_s == 0 or frame >= SETTLE_S * rate)
+    return replace(event, frame=frame / variant.every, direction=direction, tolerance=tolerance, certain=certain)
 
 
 def _write(

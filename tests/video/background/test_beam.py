@@ -6,7 +6,8 @@ import pytest
 from vidtrack.config.video import DetectorSettings
 from vidtrack.video.background import create
 from vidtrack.video.background.beam import is_dark, mark_beams, shows_lamps
-from vidtrack.video.background.scene import BEAM
+from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.scene import BEAM, start
 from vidtrack.video.frame import Frame
 
 H, W, BLACK = 120, 240, np.float32(16)
@@ -29,9 +30,12 @@ def lit(scene, bend=0.0):
     return BLACK + light * (scene - BLACK)
 
 
-def hits(picture, scene):
+def hits(picture, scene, red=None):
+    """Hits where picture and scene (H, W) differ; `red` (H/2, W/2) is the chroma of the picture, grey without it."""
+    grey = np.full((H // 2, W // 2), 128, np.uint8)
     hit = (np.abs(picture - scene) > 5).astype(np.uint8)
-    mark_beams(np.round(picture).astype(np.uint8), scene, BLACK, hit)
+    seen = Picture(np.round(picture).astype(np.uint8), grey, grey if red is None else red)
+    mark_beams(seen, start(Picture(scene, grey, grey)), BLACK, hit)
     return hit
 
 
@@ -52,6 +56,32 @@ def test_a_body_of_any_brightness_ends_at_an_edge(level):
     scene = road()
     picture = scene.copy()
     picture[CAR] = BLACK + level
+    assert not (hits(picture, scene) == BEAM).any()
+
+
+def test_a_coloured_body_in_a_beam_is_no_beam_and_the_light_of_halogen_lamps_is_one():
+    scene = road()
+    picture = lit(scene)
+    light = (picture - BLACK).reshape(H // 2, 2, W // 2, 2).mean(axis=(1, 3))  # chroma is that of four pixels
+    halogen = np.where(light > 25, 128 + 0.13 * light, 128).astype(np.uint8)
+    white = hits(picture, scene) == BEAM
+    assert white.sum() > 500
+    assert (hits(picture, scene, halogen)[white] == BEAM).mean() > 0.95
+
+    body = np.s_[22:38, 58:72]  # paint as bright as the light on the road around it: no edge tells it
+    red = halogen.copy()
+    red[11:19, 29:36] = 128 + 40
+    hit = hits(picture, scene, red)
+    assert (hit[body] != BEAM).all()
+    assert (hit == BEAM).sum() > 300
+
+
+def test_a_smooth_body_with_a_gap_in_its_edge_is_no_beam():
+    scene = np.full((H, W), BLACK + 20, np.float32)
+    picture = scene.copy()
+    picture[30:80, 60:140] = BLACK + 32
+    picture[78:82, 100:106] = [[BLACK + level] for level in (29, 27, 25, 23)]  # mud, over which the paint fades
+    assert (hits(picture, scene) == 1).sum() > 3500
     assert not (hits(picture, scene) == BEAM).any()
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.compiled import inlined, kernel
-from vidtrack.video.background.scene import BEAM, Levels
+from vidtrack.video.background.picture import Picture
+from vidtrack.video.background.scene import BEAM, Levels, Scene
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import OBJECTS, SIDES, connect, find_runs
 
@@ -14,7 +15,9 @@ _LAMP = 100.0  # grey levels above black; a brighter pixel of a dark scene is a 
 _EVERY = 4  # px; so many are looked at, across and down
 _LIFT = np.float32(6)  # grey levels; added to both luminances, for the noise of dark pixels
 _SOFT = np.float32(0.2)  # change of the logarithm of the factor over two pixels; at edges of bodies it is larger
-_OPEN = 4  # least number of pixels over which a beam fades into the scene
+_TINT = np.float32(6)  # grey levels by which the colour may differ from the scene's
+_HUE = np.float32(0.2)  # the same as a share of the light: 0.13 is that of a halogen lamp by daylight
+_OPEN, _SHARE = 4, 0.1  # pixels, and share of its rim, over which a beam fades into the scene, at least
 
 
 def is_dark(scene: Levels, black: np.float32) -> bool:
@@ -40,16 +43,16 @@ def _mostly_below(scene: Levels, limit: np.float32) -> bool:
 
 
 @kernel
-def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> None:
+def mark_beams(picture: Picture, scene: Scene, black: np.float32, hit: Image) -> None:
     """Set hit (h, w) uint8 from 1 to BEAM where lamps light the scene.
 
-    There the luminance is more than the scene's, the factor log((Y - black) / (B - black)) changes slowly, and this
-    region is open to pixels with hit 0: a beam fades, but a body ends at an edge.
+    There the luminance is more than the scene's, the factor log((Y - black) / (B - black)) changes slowly, the colour
+    is nearly the scene's, and a part of the rim is open to pixels with hit 0: a beam fades, a body ends at an edge.
     """
     h, w = hit.shape
-    factor = np.log(
-        np.maximum(luma.astype(np.float32) - black, np.float32(0)) + _LIFT
-    ) - np.log(np.maximum(scene - black, np.float32(0)) + _LIFT)  # fmt: skip
+    coloured = len(picture.cb) > 0
+    light = np.maximum(picture.luma.astype(np.float32) - black, np.float32(0))
+    factor = np.log(light + _LIFT) - np.log(np.maximum(scene.luma - black, np.float32(0)) + _LIFT)
     soft = np.zeros(hit.shape, np.uint8)
     row, start, stop = find_runs(hit, OBJECTS)
     for k in range(len(row)):
@@ -63,19 +66,28 @@ def mark_beams(luma: Image, scene: Levels, black: np.float32, hit: Image) -> Non
             along = _blur(factor[down, left], factor[down, x], factor[down, right]) - _blur(
                 factor[up, left], factor[up, x], factor[up, right]
             )
-            soft[y, x] = hit[y, x] == 1 and factor[y, x] > 0 and max(abs(across), abs(along)) < _SOFT
+            white = not coloured or _colour(picture, scene, y // 2, x // 2) < max(_TINT, _HUE * light[y, x])
+            soft[y, x] = hit[y, x] == 1 and factor[y, x] > 0 and max(abs(across), abs(along)) < _SOFT and white
     row, start, stop = find_runs(soft, OBJECTS)
     label, count = connect(row, start, stop, SIDES)
-    fading = np.zeros(count, np.int64)
+    fading, rim = np.zeros(count, np.int64), np.zeros(count, np.int64)
     for k in range(len(row)):
         y = row[k]
         up, down = max(y - 1, 0), min(y + 1, h - 1)
         for x in range(start[k], stop[k]):
             left, right = max(x - 1, 0), min(x + 1, w - 1)
+            rim[label[k]] += not (soft[up, x] and soft[down, x] and soft[y, left] and soft[y, right])
             fading[label[k]] += hit[up, x] == 0 or hit[down, x] == 0 or hit[y, left] == 0 or hit[y, right] == 0
     for k in range(len(row)):
-        if fading[label[k]] >= _OPEN:
+        if fading[label[k]] >= max(_OPEN, _SHARE * rim[label[k]]):
             hit[row[k], start[k] : stop[k]] = BEAM
+
+
+@inlined
+def _colour(picture: Picture, scene: Scene, y: int, x: int) -> np.float32:
+    """Deviation [grey levels] of the colour from the scene's."""
+    blue, red = np.float32(picture.cb[y, x]) - scene.cb[y, x], np.float32(picture.cr[y, x]) - scene.cr[y, x]
+    return max(abs(blue), abs(red))
 
 
 @inlined

@@ -244,7 +244,7 @@ class Disturbance:
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
         if s.beams and self._dark and shows_lamps(seen.luma, black):
-            mark_beams(seen.luma, scene.luma, black, weak)
+            mark_beams(seen, scene, black, weak)
         strong(weak, hit)
         if s.shadow and s.amid:
             reclaim(hit)
