@@ -21,20 +21,20 @@ def drive(k, x, v, y=100.0, size=(40.0, 20.0)):
     return [x + v * k / FPS - size[0] / 2, y - size[1] / 2, *size]
 
 
-def steps(count, boxes_of):
+def steps(count, boxes_of, model=MODEL):
     """Steps of a tracker that gives up after 0.3 s, fed with boxes_of(k) and errors of a pixel."""
     rng = np.random.default_rng(3)
-    tracker = vt.Tracker(MODEL, life=vt.LifeCycle(confirm_hits=1, confirm_window=1, coast_s=0.3, coast_scans=None))
+    tracker = vt.Tracker(model, life=vt.LifeCycle(confirm_hits=1, confirm_window=1, coast_s=0.3, coast_scans=None))
     for k in range(count):
         boxes = np.array(boxes_of(k), float).reshape(-1, 4) + np.array([1.0, 1.0, 0, 0]) * rng.normal(size=4)
         scan = vt.box_scan(k / FPS, boxes)
         yield Step(k, scan.t, scan, tracker.step(scan), None, None, {})
 
 
-def linked(made, longest_s=3.0):
+def linked(made, longest_s=3.0, model=MODEL):
     """The steps that come out, and how late each was."""
     kept, late = Kept(), []
-    sink = Linked(kept, motion=MODEL, longest_s=longest_s)
+    sink = Linked(kept, motion=model, longest_s=longest_s)
     for step in made:
         sink.step(step)
         late.append(step.index - (kept.steps[-1].index if kept.steps else -1))
@@ -70,6 +70,21 @@ def test_a_gap_is_bridged_under_the_first_id():
     sigma = [float(tracks.xy_cov[0, 0, 0]) for tracks in gap]
     assert np.argmax(sigma) not in (0, len(gap) - 1), "least is known in the middle"
     assert all(np.linalg.eigvalsh(tracks.P[0])[0] > 0 for tracks in gap)
+
+
+@pytest.mark.parametrize(("jump", "one"), [(0.0, True), (12.0, True), (60.0, False)])
+def test_a_link_spans_a_jump_of_a_part_of_the_size_and_no_more(jump, one):
+    """A slow vehicle, 40 px long, whose filter is sure of it; the detector goes on with another part of it."""
+
+    def boxes_of(k):
+        slow = [] if 40 <= k < 46 else [drive(k, 50 + jump * (k >= 46), 4)]
+        return [*slow, drive(k, 1800, -20, y=1000)]
+
+    sure = vt.ConstantVelocity(accel=0.02, speed=1.0, hold_s=0.5, per_size=True)
+    made = list(steps(100, boxes_of, sure))
+    assert len(ids(made)) == 3
+    found, _ = linked(made, model=sure)
+    assert len(ids(found)) == (2 if one else 3)
 
 
 def test_other_rows_and_the_order_of_steps_stay():

@@ -26,6 +26,9 @@ SIZE_SIGMA = 0.2
 """Standard deviation of the logarithm of a width or height across a gap."""
 ODDS = 5.0
 """Least likelihood ratio of one object against a new object that begins there by chance."""
+JUMP, RARE = 0.25, 0.05
+"""Standard deviation of a jump, in longer sides of the box, and how often tracks that break do so because of one: the
+detector goes on with another part of the vehicle, frames are missing, or something knocked the camera."""
 SETTLED = 6
 """Measurements after which a new track's velocity is known; its state is then retrodicted to its beginning."""
 
@@ -116,7 +119,8 @@ class Ends:
     def links(self, longest_s: float) -> tuple[Ints, Ints]:
         """Rows (L,) of tracks that end, and rows (L,) of their continuations at most longest_s [s] later.
 
-        The one-to-one assignment of largest summed log-likelihood ratio: one object, against a new one by chance.
+        The one-to-one assignment of largest summed log-likelihood ratio: one object, which drove on or jumped, against
+        a new one by chance.
         """
         before, after, gap = _within(self.time[self.last], self.time[self.first], longest_s)
         ratio = np.log(self.head_box[after, 2:] / self.tail_box[before, 2:]) / SIZE_SIGMA
@@ -126,9 +130,11 @@ class Ends:
             k = np.flatnonzero(gap == dt)
             x, P = self._moved(self.tail_x[before[k]], self.tail_P[before[k]], dt, self.tail_box[before[k]])
             v, S = self.head_x[after[k]] - x, self.head_P[after[k]] + P
-            nis = np.einsum("ki,ki->k", v, np.linalg.solve(S, v[:, :, None])[:, :, 0])
-            d2[k] += nis
-            cost[k] += nis + np.linalg.slogdet(S)[1] + v.shape[1] * np.log(2 * np.pi)
+            nis, steady = _agreement(v, S)
+            nis_moved, jumped = _agreement(v, S + self._jump(before[k]))
+            jumped -= 2 * np.log(RARE)
+            d2[k] += np.where(jumped < steady, nis_moved, nis)
+            cost[k] += np.minimum(jumped, steady)
         limit = quantile(PROBABILITY, self.tail_x.shape[1] + ratio.shape[1])
         cost += 2 * np.log(ODDS)
         fits = (d2 <= limit) & (cost < 0)
@@ -151,6 +157,12 @@ class Ends:
         alike = ((size - size.mean(axis=0)) ** 2 / variance).sum(axis=1) + np.log(variance).sum()
         rate = len(self.id) / (self.extent * np.ptp(self.time))
         return np.asarray(2 * np.log(gap * rate) - len(velocity) * np.log(2 * np.pi * speed2) - alike[after])
+
+    def _jump(self, before: Ints) -> Floats:
+        """(K, n, n) covariance of a jump of the tracks that end, rows `before` (K,): their velocities are new."""
+        size = longer(self.tail_box[before])
+        spread = (JUMP * size)[:, None, None] ** 2 * np.eye(len(self.motion.position))
+        return self.motion.birth(self.tail_x[before][:, list(self.motion.position)], spread, size)[1]
 
     def _moved(self, x: Floats, P: Floats, dt: float, box: Floats) -> tuple[Floats, Floats]:
         """States x (K, n), P (K, n, n) of objects with these boxes, predicted by dt [s], which may be negative."""
@@ -194,6 +206,12 @@ class Ends:
             box=absolute(box, x[:, list(self.motion.position)]), age_s=row.age_s + ahead,
             measurement=np.array([-1]), nis=np.array([np.nan]),
         )  # fmt: skip
+
+
+def _agreement(v: Floats, S: Floats) -> tuple[Floats, Floats]:
+    """(K,) v' S^-1 v, and -2 ln N(v; 0, S), of differences v (K, n) with covariances S (K, n, n)."""
+    nis = np.einsum("ki,ki->k", v, np.linalg.solve(S, v[:, :, None])[:, :, 0])
+    return nis, nis + np.linalg.slogdet(S)[1] + v.shape[1] * np.log(2 * np.pi)
 
 
 def _within(ends: Floats, begins: Floats, longest_s: float) -> tuple[Ints, Ints, Floats]:
