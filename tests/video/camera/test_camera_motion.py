@@ -97,6 +97,20 @@ def test_a_known_motion_is_found_to_a_tenth_of_a_pixel_behind_a_vehicle_that_cov
     assert error(foreground, motion) < 0.1
 
 
+@pytest.mark.parametrize("jump", [10.0, 14.0, 20.0])
+def test_a_shake_past_a_stripe_of_a_crossing_is_not_taken_for_one_to_the_next_stripe(jump):
+    world, found = World(), detector()
+    rough = cv2.GaussianBlur(world.rng.normal(0, 20, world.ground.shape), (0, 0), 1.5)
+    world.ground = 100 + rough
+    world.ground[MARGIN + 20 : MARGIN + 160] += np.where(np.arange(world.ground.shape[1]) % 16 < 8, 90, 0)
+    house = cv2.resize(world.rng.uniform(60, 210, (6, 10)), (50, 30))
+    world.ground[MARGIN + 60 : MARGIN + 90, MARGIN + 90 : MARGIN + 140] = house
+    k = settle(found, world)
+    for n, x in enumerate((2, -2, 2, 0, jump, jump + 2, jump)):
+        motion = affine.shift(float(x), 0.0)
+        assert error(found.apply(world.frame(k + n, motion), NONE_KNOWN), motion) < 0.1
+
+
 def test_a_camera_that_stands_is_left_alone():
     world, found = World(), detector()
     still = detector(registration=False)
