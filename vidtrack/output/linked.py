@@ -28,7 +28,7 @@ ODDS = 5.0
 """Least likelihood ratio of one object against a new object that begins there by chance."""
 JUMP, RARE = 0.25, 0.05
 """Standard deviation of a jump, in longer sides of the box, and how often tracks that break do so because of one: the
-detector goes on with another part of the vehicle, frames are missing, or something knocked the camera."""
+detector goes on with another part of the vehicle, or frames are missing."""
 SETTLED = 6
 """Measurements after which a new track's velocity is known; its state is then retrodicted to its beginning."""
 
@@ -131,9 +131,9 @@ class Ends:
             x, P = self._moved(self.tail_x[before[k]], self.tail_P[before[k]], dt, self.tail_box[before[k]])
             v, S = self.head_x[after[k]] - x, self.head_P[after[k]] + P
             nis, steady = _agreement(v, S)
-            nis_moved, jumped = _agreement(v, S + self._jump(before[k]))
+            nis_jumped, jumped = _agreement(v, S + self._jump(before[k]))
             jumped -= 2 * np.log(RARE)
-            d2[k] += np.where(jumped < steady, nis_moved, nis)
+            d2[k] += np.where(jumped < steady, nis_jumped, nis)
             cost[k] += np.minimum(jumped, steady)
         limit = quantile(PROBABILITY, self.tail_x.shape[1] + ratio.shape[1])
         cost += 2 * np.log(ODDS)
