@@ -66,8 +66,9 @@ def mark_beams(picture: Picture, scene: Scene, black: np.float32, hit: Image) ->
             along = _blur(factor[down, left], factor[down, x], factor[down, right]) - _blur(
                 factor[up, left], factor[up, x], factor[up, right]
             )
-            white = not coloured or _colour(picture, scene, y // 2, x // 2) < max(_TINT, _HUE * light[y, x])
-            soft[y, x] = hit[y, x] == 1 and factor[y, x] > 0 and max(abs(across), abs(along)) < _SOFT and white
+            if hit[y, x] == 1 and factor[y, x] > 0 and max(abs(across), abs(along)) < _SOFT:
+                limit = max(_TINT, _HUE * light[y, x])
+                soft[y, x] = not coloured or _colour(picture, scene, y // 2, x // 2) < limit
     row, start, stop = find_runs(soft, OBJECTS)
     label, count = connect(row, start, stop, SIDES)
     fading, rim = np.zeros(count, np.int64), np.zeros(count, np.int64)
