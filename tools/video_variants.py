@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from zlib import crc32
 
 import av
 import cv2
@@ -25,6 +26,7 @@ SMALLEST_TOLERANCE = 4.0  # frames
 DROPS = 8e-4  # a picture and pixel
 SWAY_SHARE = 0.9  # of the picture that a swaying camera sees
 SETTLE_S = 1.0  # a vehicle that crosses this soon after the first picture may be counted or not
+START_SHARE = 0.25  # of a clip's length that is left out, at most
 ROOM = 0.12  # of the picture's sides, between a counting line and the edge of a part that is drawn
 WHOLE = (0.0, 0.0, 1.0, 1.0)
 OTHER_SIDE = {"left": "right", "right": "left"}
@@ -185,9 +187,10 @@ VARIANTS = {
 
 
 def drawn(clip: Clip, seed: int) -> Variant:
-    """A chance combination of changes; the part of the picture that is seen holds the counted lines."""
-    rng = np.random.default_rng(seed)
-    ends = np.concatenate([_ends(text) for text in clip.lines]) / _stream(clip.video)[0]
+    """A chance combination of changes, another one for each clip; the part that is seen holds the counted lines."""
+    rng = np.random.default_rng([seed, crc32(clip.name.encode())])
+    size, _, length_s = _stream(clip.video)
+    ends = np.concatenate([_ends(text) for text in clip.lines]) / size
     low, high = np.clip(ends.min(axis=0) - ROOM, 0, 0.3), np.clip(ends.max(axis=0) + ROOM, 0.7, 1)
     left, top, right, bottom = [*(low * rng.uniform(0, 1, 2)), *(1 - (1 - high) * rng.uniform(0, 1, 2))]
     gamma, gain, veil, sigma = rng.uniform(0.6, 1.6), rng.uniform(0.7, 1.2), rng.uniform(0, 50), rng.uniform(0, 5)
@@ -199,7 +202,7 @@ def drawn(clip: Clip, seed: int) -> Variant:
     return Variant(
         every=int(rng.choice([1, 1, 2])),
         scale=float(rng.uniform(0.6, 1.2)),
-        start_s=float(rng.uniform(0, 5)),
+        start_s=float(rng.uniform(0, min(5, START_SHARE * length_s))),
         part=(left, top, right, bottom),
         mirror=bool(rng.integers(2)),
         view=view,
@@ -213,7 +216,7 @@ def derive(clip: Clip, name: str, folder: Path, variant: Variant | None = None) 
     variant = variant or VARIANTS[name]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{clip.name}-{name}.mkv"
-    size, rate = _stream(clip.video)
+    size, rate, _ = _stream(clip.video)
     count = sum(1 for _ in _decoded(clip.video)) if variant.backward else 0
     if not path.is_file():
         part = path.with_name(f"part-{path.name}")
@@ -226,18 +229,18 @@ def derive(clip: Clip, name: str, folder: Path, variant: Variant | None = None) 
         part.rename(path)
     lines = tuple(_line(text, variant, size) for text in clip.lines)
     events = tuple(_event(event, variant, count, rate) for event in clip.events)
-    return replace(
-        clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=tuple(e for e in events if e.frame >= 0)
-    )
+    seen = tuple(event for event in events if event.frame >= -event.tolerance)
+    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=seen)
 
 
-def _stream(video: Path) -> tuple[tuple[int, int], Fraction]:
-    """Width and height [px], and frames/s."""
+def _stream(video: Path) -> tuple[tuple[int, int], Fraction, float]:
+    """Width and height [px], frames/s, and length [s]."""
     with av.open(str(video)) as container:
         stream = container.streams.video[0]
-        rate = stream.average_rate
-        assert rate is not None  # all clips with crossings have one
-        return (stream.width, stream.height), rate
+        rate, length = stream.average_rate, container.duration
+        assert rate is not None  # all clips with crossings have both
+        assert length is not None
+        return (stream.width, stream.height), rate, length / av.time_base
 
 
 def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
@@ -252,7 +255,7 @@ def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
     size = _even(variant.scale * width), _even(variant.scale * (bottom - top))
     shifts = np.zeros((len(decoded), 2))
     if variant.sway is not None:
-        shifts = variant.sway * width / 640 * _sway(len(decoded), rng)
+        shifts = variant.sway * size[0] / 640 * _sway(len(decoded), rng)
     for k in range(0, len(decoded), variant.every):
         changed, shift = np.asarray(decoded[k], np.uint8)[top:bottom, left:right], shifts[k]
         if variant.mirror:
@@ -308,7 +311,7 @@ def _ends(line: str) -> NDArray:
 
 
 def _even(length: float) -> int:
-    return 2 * round(length / 2)
+    return 2 * int(length / 2)
 
 
 def _pixels(variant: Variant, size: tuple[int, int]) -> tuple[int, int, int, int]:
