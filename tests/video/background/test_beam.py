@@ -86,23 +86,24 @@ def test_a_smooth_body_with_a_gap_in_its_edge_is_no_beam():
 
 
 def test_only_a_dark_scene_is_lit_by_lamps():
-    dark, day = road(20), road(90)
+    dark, dusk, day = road(20), road(40), road(90)
     lamp = dark.copy()
     lamp[40, 60] = 200
     assert is_dark(dark, BLACK)
+    assert not is_dark(dusk, BLACK)
     assert not is_dark(day, BLACK)
     assert shows_lamps(lamp.astype(np.uint8), BLACK)
     assert not shows_lamps(dark.astype(np.uint8), BLACK)
 
 
-def played(beams, stands_s):
+def played(beams, stands_s, level=20.0):
     """Share of foreground on a noisy road while a beam stands there for stands_s, and for two seconds after."""
     rng = np.random.default_rng(1)
     detector = create(DetectorSettings.model_validate({"disturbance": {"beams": beams}}))
     found = []
     for k in range(int((3 + stands_s + 2) * RATE)):
         on = 3 <= k / RATE < 3 + stands_s
-        clean = lit(road()) if on else road()
+        clean = lit(road(level)) if on else road(level)
         clean[56:64, 84:87] = 220  # lamps, seen all the time
         y = np.clip(np.round(clean + rng.normal(0, 1.5, clean.shape)), 0, 255).astype(np.uint8)
         frame = Frame(k, k / RATE, y)
@@ -115,3 +116,7 @@ def test_a_beam_that_waits_is_no_foreground_and_leaves_no_mark():
     assert share[:off].max() < 0.001
     assert share[off + RATE // 2 :].max() < 0.001
     assert played(False, 8)[:RATE].min() > 0.015
+
+
+def test_what_rises_softly_over_the_road_at_dusk_is_a_grey_roof_and_no_beam():
+    assert played(True, 1, level=40.0)[:RATE].min() > 0.015

@@ -10,7 +10,7 @@ from vidtrack.video.background.scene import BEAM, Levels, Scene
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import OBJECTS, SIDES, connect, find_runs
 
-_DARK = 45.0  # grey levels above black of half the scene; by day lamps do not light it
+_DARK = 35.0  # grey levels above black of half the scene; at dusk, at 40, a grey roof rises as softly as a beam
 _LAMP = 100.0  # grey levels above black; a brighter pixel of a dark scene is a lamp
 _EVERY = 4  # px; so many are looked at, across and down
 _LIFT = np.float32(6)  # grey levels; added to both luminances, for the noise of dark pixels
