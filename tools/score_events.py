@@ -79,10 +79,8 @@ def read_counts(path: Path) -> list[Event]:
 
 
 def judge(counts: Iterable[Event], truth: Iterable[Event]) -> Judged:
-    """Counts against the truth. Raises ValueError for counts of lines without truth."""
+    """Counts against the truth; those of a line that nobody crosses are false."""
     counts, truth = list(counts), list(truth)
-    if strange := {event.line for event in counts} - {event.line for event in truth}:
-        raise ValueError(f"no truth for lines {', '.join(sorted(strange))}")
     cost = np.array([[_cost(seen, true) for seen in counts] for true in truth]).reshape(len(truth), len(counts))
     pairs = [(i, j) for i, j in zip(*linear_sum_assignment(cost), strict=True) if cost[i, j] < NEVER]
     found, used = {i for i, _ in pairs}, {j for _, j in pairs}
@@ -106,6 +104,8 @@ def main() -> None:
     parser.add_argument("truth", type=Path, help="crossings found by eye")
     options = parser.parse_args()
     counts, truth = read_counts(options.counts), read_truth(options.truth)
+    if strange := {event.line for event in counts} - {event.line for event in truth}:
+        parser.error(f"no truth for lines {', '.join(sorted(strange))}")
     total = Judged()
     for line in sorted({event.line for event in truth}):
         scored = judge([e for e in counts if e.line == line], [e for e in truth if e.line == line])
