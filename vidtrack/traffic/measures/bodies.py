@@ -13,6 +13,9 @@ _PLACE_M, _LENGTH_M, _SPEED_M_S = 1.0, 1.5, 3.0
 """m, m, m/s; standard deviations from which on a rectangle is not known: half the width of a car, a third of its
 length, and the speed of a bicycle. Beyond them most of what comes close on the simulated roads does not."""
 
+T, X, Y, EX, EY, LENGTH, WIDTH = range(7)
+"""Columns of tables of rectangles, for kernels: time [s], middle [m], heading, sides [m]"""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bodies:
@@ -66,6 +69,10 @@ class Bodies:
         """Both, these first."""
         names = [column.name for column in fields(self)]
         return Bodies(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
+
+    def rectangles(self) -> Floats:
+        """(N, 7) columns T... in one table: what a kernel needs of a row lies side by side."""
+        return np.column_stack([self.t, self.xy, self.ahead, self.sides])
 
     def half(self, n: Floats) -> Floats:
         """(N,) how far the rectangles reach from their middles along n (N, 2), times its length."""
