@@ -18,12 +18,15 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.traffic.measures.bodies import Bodies, Encounters, touching_place
+from vidtrack.traffic.measures.bodies import EX, EY, LENGTH, WIDTH, Bodies, Encounters, T, X, Y, touching_place
 
 TTC_S = 1.5
 """s; a longer time to collision is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
 _SURE = 2.0
 """Standard deviations by which a closing speed must differ from 0: else vehicles that stand would collide"""
+
+VX, VY, SPEED_SIGMA = range(WIDTH + 1, WIDTH + 4)
+"""Columns after those of rectangles"""
 
 
 def closing(bodies: Bodies) -> Encounters:
@@ -32,18 +35,16 @@ def closing(bodies: Bodies) -> Encounters:
     Moments at which two rectangles overlap give none: vehicles do not, so it is their error. The vehicle ahead in the
     direction of both together is `first`.
     """
-    order, reach = _in_order(bodies.t, bodies.xy), np.hypot(bodies.sides[:, 0], bodies.sides[:, 1]) / 2
+    order = _in_order(bodies.t, bodies.xy)
+    state = np.column_stack([bodies.rectangles(), bodies.v, bodies.speed_sigma])[order]
     size = max(len(bodies), 64)
     who, found = np.empty((size, 2), np.int64), np.empty((size, 3))
     row, count = 0, 0
     while row < len(bodies):
-        row, count = _look(
-            row, count, order, bodies.t, bodies.xy, bodies.v, bodies.ahead, bodies.sides, reach, bodies.speed_sigma,
-            who, found,
-        )  # fmt: skip
+        row, count = _look(row, count, state, who, found)
         if row < len(bodies):
             who, found = np.vstack([who, np.empty_like(who)]), np.vstack([found, np.empty_like(found)])
-    return _least(bodies, who[:count], found[:count])
+    return _least(bodies, order[who[:count]], found[:count])
 
 
 def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
@@ -76,58 +77,58 @@ def _in_order(t: Floats, xy: Floats) -> Ints:
 
 
 @kernel
-def _look(
-    row: int, count: int, order: Ints, t: Floats, xy: Floats, v: Floats, ahead: Floats, sides: Floats, reach: Floats,
-    sigma: Floats, who: Ints, found: Floats,
-) -> tuple[int, int]:  # fmt: skip
-    """Look at rows in `order` (of time, then of x) with those after them at the same moment, until all are done or
-    the pairs need more room; the next row and pair.
+def _look(row: int, count: int, state: Floats, who: Ints, found: Floats) -> tuple[int, int]:
+    """Look at rows with those after them at the same moment, until all are done or the pairs need more room; the next
+    row and pair.
 
-    reach   (N,) of the circles around the rectangles
+    state   (N, 10) rectangles in order of time, then of x, with velocities and the standard deviations of speeds
     who, found   the pairs: (M, 2) rows; (M, 3) time to collision and the normal along which they touch
     """
     fastest, longest = 0.0, 0.0
-    for i in range(len(order)):
-        fastest = max(fastest, v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+    reach = np.empty(len(state))  # of the circles around the rectangles
+    for i in range(len(state)):
+        reach[i] = np.sqrt(state[i, LENGTH] ** 2 + state[i, WIDTH] ** 2) / 2
+        fastest = max(fastest, state[i, VX] ** 2 + state[i, VY] ** 2)
         longest = max(longest, reach[i])
     fastest = np.sqrt(fastest)
-    for first in range(row, len(order)):
-        i, begun = order[first], count
-        speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-        widest = TTC_S * (speed + fastest) + reach[i] + longest
-        for later in range(first + 1, len(order)):
-            j = order[later]
-            if t[j] != t[i] or xy[j, 0] - xy[i, 0] > widest:
+    for i in range(row, len(state)):
+        begun = count
+        t, x, y, vx, vy = state[i, T], state[i, X], state[i, Y], state[i, VX], state[i, VY]
+        widest = TTC_S * (np.sqrt(vx * vx + vy * vy) + fastest) + reach[i] + longest
+        for j in range(i + 1, len(state)):
+            dx = state[j, X] - x
+            if state[j, T] != t or dx > widest:
                 break
-            dx, dy, wx, wy = xy[j, 0] - xy[i, 0], xy[j, 1] - xy[i, 1], v[j, 0] - v[i, 0], v[j, 1] - v[i, 1]
+            dy, wx, wy = state[j, Y] - y, state[j, VX] - vx, state[j, VY] - vy
             far, nearing, w2 = dx * dx + dy * dy, -dx * wx - dy * wy, wx * wx + wy * wy
             near = (reach[i] + reach[j]) ** 2
             if far > near and (nearing <= 0 or (far - near) * w2 > nearing * nearing):
                 continue  # the circles around them never meet
-            ttc, nx, ny = _touch(dx, dy, wx, wy, ahead[i], ahead[j], sides[i], sides[j])
-            if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(sigma[i], sigma[j]):
+            if nearing > TTC_S * w2 and far - 2 * TTC_S * nearing + TTC_S**2 * w2 > near:
+                continue  # they near each other still after TTC_S, and have not met
+            ttc, nx, ny = _touch(dx, dy, wx, wy, state[i], state[j])
+            if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(state[i, SPEED_SIGMA], state[j, SPEED_SIGMA]):
                 continue
             if count == len(who):
-                return first, begun
+                return i, begun
             who[count, 0], who[count, 1] = i, j
             found[count, 0], found[count, 1], found[count, 2] = ttc, nx, ny
             count += 1
-    return len(order), count
+    return len(state), count
 
 
 @kernel
-def _touch(
-    dx: float, dy: float, wx: float, wy: float, ahead_i: Floats, ahead_j: Floats, sides_i: Floats, sides_j: Floats
-) -> tuple[float, float, float]:
+def _touch(dx: float, dy: float, wx: float, wy: float, one: Floats, other: Floats) -> tuple[float, float, float]:
     """Time until two rectangles touch, inf if they never do or overlap already, and the normal along which they do."""
     begin, end, nx, ny = -np.inf, np.inf, 0.0, 0.0
     apart = False
     for side in range(4):
-        e = ahead_i if side < 2 else ahead_j
-        x, y = (e[0], e[1]) if side % 2 == 0 else (-e[1], e[0])
+        e = one if side < 2 else other
+        x, y = (e[EX], e[EY]) if side % 2 == 0 else (-e[EY], e[EX])
         half = 0.0
-        for other, sides in ((ahead_i, sides_i), (ahead_j, sides_j)):
-            half += abs(other[0] * x + other[1] * y) * sides[0] / 2 + abs(other[0] * y - other[1] * x) * sides[1] / 2
+        for its in (one, other):
+            along, across = abs(its[EX] * x + its[EY] * y), abs(its[EX] * y - its[EY] * x)
+            half += along * its[LENGTH] / 2 + across * its[WIDTH] / 2
         d, rate = dx * x + dy * y, wx * x + wy * y
         apart |= abs(d) > half
         if rate == 0:

@@ -67,7 +67,7 @@ def _met(track: Ints, rectangle: Floats) -> tuple[Ints, Ints]:
     begin, first = _legs_begin(track)
     leg = _legs(begin, rectangle)
     life = np.column_stack([reduced.reduceat(leg[:, column], first[:-1]) for column, reduced in _HULL])
-    rows = np.empty((max(len(life), 64), 2), np.int64)
+    rows = np.empty((8 * len(life) + 64, 2), np.int64)
     order = np.argsort(life[:, BEGIN], kind="stable")
     row, count = 0, 0
     while row < len(order):

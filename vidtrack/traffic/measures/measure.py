@@ -69,6 +69,7 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     lives = stretches.lives()
     passed, ways = passing.passed(), passing.ways(len(lives.track))
     del stretches, passing  # which are large
+    pa.default_memory_pool().release_unused()  # what the tables were read into
     return _Figures(day, site, gates, ground, reader, passed, ways, lives, staying, meeting, vehicles).measures()
 
 

@@ -118,7 +118,7 @@ class Stretches:
     def _make_room(self, tracks: int, rows: int) -> None:
         """For tracks (K), and for as many stretches as these rows can begin."""
         if tracks > len(self._current):
-            more = max(tracks, 2 * len(self._current)) - len(self._current)
+            more = max(tracks, 5 * len(self._current) // 4) - len(self._current)  # half a KB each: not twice as many
             self._state = np.concatenate([self._state, np.full((more * _STATES, 9), np.nan)])
             self._since = np.concatenate([self._since, np.full((more, self._since.shape[1]), np.nan)])
             self._current = np.concatenate([self._current, np.full(more, -1)])
