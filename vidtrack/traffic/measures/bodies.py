@@ -13,8 +13,10 @@ _PLACE_M, _LENGTH_M, _SPEED_M_S = 1.0, 1.5, 3.0
 """m, m, m/s; standard deviations from which on a rectangle is not known: half the width of a car, a third of its
 length, and the speed of a bicycle. Beyond them most of what comes close on the simulated roads does not."""
 
-T, X, Y, EX, EY, LENGTH, WIDTH = range(7)
-"""Columns of tables of rectangles, for kernels: time [s], middle [m], heading, sides [m]"""
+T, X, Y, EX, EY, LENGTH, WIDTH, VX, VY, LENGTH_SIGMA, SPEED_SIGMA, XX, YY, XY = range(14)
+"""Columns of rectangles: time [s], middle [m], unit vector along the length, sides [m], velocity [m/s]; standard
+deviations of the length [m], the width is off by the same share, and of the speed [m/s], taken to be as large across as
+along; variances of the middle in x and in y, and their covariance [m2]"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,26 +24,12 @@ class Bodies:
     """N rectangles in order of time.
 
     track   (N,) numbers
-    t       (N,) s
-    xy      (N, 2) m; middles
-    v       (N, 2) m/s
-    ahead   (N, 2) unit vectors along the length
-    sides   (N, 2) m; length and width
-    length_sigma  (N,) m; the width is off by the same share
-    speed_sigma   (N,) m/s; of the velocity, taken to be as large across as along
-    spread  (N, 3) m2; variances of the middle in x and in y, and their covariance
+    table   (N, 14) columns T...: what a kernel needs of a row lies side by side
     merged  (N,) it shares a blob with others
     """
 
     track: Ints
-    t: Floats
-    xy: Floats
-    v: Floats
-    ahead: Floats
-    sides: Floats
-    length_sigma: Floats
-    speed_sigma: Floats
-    spread: Floats
+    table: Floats
     merged: Mask
 
     @classmethod
@@ -49,41 +37,63 @@ class Bodies:
         """The rows that the picture shows, with a place, a heading and a length that are known well enough."""
         sure = rows.seen & np.isfinite(rows.length + rows.width + rows.xy[:, 0] + rows.v[:, 0] + rows.spread[:, 0])
         with np.errstate(invalid="ignore"):
-            sure &= rows.spread[:, :2].sum(axis=1) / 2 < _PLACE_M**2
+            sure &= (rows.spread[:, 0] + rows.spread[:, 1]) / 2 < _PLACE_M**2
             sure &= (rows.length_sigma < _LENGTH_M) & (rows.speed_sigma < _SPEED_M_S)
-        known = np.flatnonzero(sure)
-        return cls(
-            *(rows.track[known], rows.t[known], rows.xy[known], rows.v[known], rows.ahead[known]),
-            np.column_stack([rows.length[known], rows.width[known]]),
-            *(rows.length_sigma[known], rows.speed_sigma[known], rows.spread[known], rows.merged[known]),
+        sides = rows.length, rows.width
+        table = np.column_stack(
+            [rows.t, rows.xy, rows.ahead, *sides, rows.v, rows.length_sigma, rows.speed_sigma, rows.spread]
         )
+        every = cls(rows.track, table, rows.merged)
+        return every if sure.all() else every.only(np.flatnonzero(sure))
 
     def __len__(self) -> int:
-        return len(self.t)
+        return len(self.track)
+
+    @property
+    def t(self) -> Floats:
+        """(N,) s."""
+        return self.table[:, T]
+
+    @property
+    def xy(self) -> Floats:
+        """(N, 2) m; middles."""
+        return self.table[:, X : Y + 1]
+
+    @property
+    def ahead(self) -> Floats:
+        """(N, 2) unit vectors along the length."""
+        return self.table[:, EX : EY + 1]
+
+    @property
+    def v(self) -> Floats:
+        """(N, 2) m/s."""
+        return self.table[:, VX : VY + 1]
 
     def only(self, chosen: Mask | Ints | slice) -> Bodies:
         """The rectangles of a mask, of indices or of a slice."""
-        return Bodies(*(getattr(self, column.name)[chosen] for column in fields(self)))
+        return Bodies(self.track[chosen], self.table[chosen], self.merged[chosen])
 
     def and_also(self, other: Bodies) -> Bodies:
         """Both, these first."""
         names = [column.name for column in fields(self)]
         return Bodies(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
 
-    def rectangles(self) -> Floats:
-        """(N, 7) columns T... in one table: what a kernel needs of a row lies side by side."""
-        return np.column_stack([self.t, self.xy, self.ahead, self.sides])
+    def after(self, seconds: Floats) -> Bodies:
+        """Where they are so much later (N,) if they drive straight on."""
+        table = self.table.copy()
+        table[:, X : Y + 1] += seconds[:, None] * self.v
+        return Bodies(self.track, table, self.merged)
 
     def half(self, n: Floats) -> Floats:
         """(N,) how far the rectangles reach from their middles along n (N, 2), times its length."""
         along, across = np.abs(_dot(self.ahead, n)), np.abs(_cross(self.ahead, n))
-        return np.asarray((self.sides[:, 0] * along + self.sides[:, 1] * across) / 2)
+        return np.asarray((self.table[:, LENGTH] * along + self.table[:, WIDTH] * across) / 2)
 
     def variance(self, n: Floats) -> Floats:
         """(N,) of how far they reach along n (N, 2): by the error of the middle and by that of the sides."""
-        xx, yy, xy = self.spread.T
+        xx, yy, xy = self.table[:, XX:].T
         middle = n[:, 0] ** 2 * xx + n[:, 1] ** 2 * yy + 2 * n[:, 0] * n[:, 1] * xy
-        return np.asarray(middle + (self.half(n) * self.length_sigma / self.sides[:, 0]) ** 2)
+        return np.asarray(middle + (self.half(n) * self.table[:, LENGTH_SIGMA] / self.table[:, LENGTH]) ** 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,21 +12,30 @@ if none of the others has ended by then. Its variance is that of n d - h(n) + t 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import kernel
-from vidtrack.traffic.measures.bodies import EX, EY, LENGTH, WIDTH, Bodies, Encounters, T, X, Y, touching_place
+from vidtrack.traffic.measures.bodies import (
+    EX,
+    EY,
+    LENGTH,
+    SPEED_SIGMA,
+    VX,
+    VY,
+    WIDTH,
+    Bodies,
+    Encounters,
+    T,
+    X,
+    Y,
+    touching_place,
+)
 
 TTC_S = 1.5
 """s; a longer time to collision is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
 _SURE = 2.0
 """Standard deviations by which a closing speed must differ from 0: else vehicles that stand would collide"""
-
-VX, VY, SPEED_SIGMA = range(WIDTH + 1, WIDTH + 4)
-"""Columns after those of rectangles"""
 
 
 def closing(bodies: Bodies) -> Encounters:
@@ -35,16 +44,15 @@ def closing(bodies: Bodies) -> Encounters:
     Moments at which two rectangles overlap give none: vehicles do not, so it is their error. The vehicle ahead in the
     direction of both together is `first`.
     """
-    order = _in_order(bodies.t, bodies.xy)
-    state = np.column_stack([bodies.rectangles(), bodies.v, bodies.speed_sigma])[order]
+    order = _in_order(bodies.table)
     size = max(len(bodies), 64)
     who, found = np.empty((size, 2), np.int64), np.empty((size, 3))
     row, count = 0, 0
     while row < len(bodies):
-        row, count = _look(row, count, state, who, found)
+        row, count = _look(row, count, order, bodies.table, who, found)
         if row < len(bodies):
             who, found = np.vstack([who, np.empty_like(who)]), np.vstack([found, np.empty_like(found)])
-    return _least(bodies, order[who[:count]], found[:count])
+    return _least(bodies, who[:count], found[:count])
 
 
 def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
@@ -57,19 +65,18 @@ def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
     who[behind] = who[behind, ::-1]
     a, b, normal = bodies.only(who[:, 0]), bodies.only(who[:, 1]), np.column_stack(n)
     rate = np.sum((b.v - a.v) * normal, axis=1)
-    drift = (ttc * np.hypot(a.speed_sigma, b.speed_sigma)) ** 2
+    drift = (ttc * np.hypot(a.table[:, SPEED_SIGMA], b.table[:, SPEED_SIGMA])) ** 2
     sigma = np.sqrt(a.variance(normal) + b.variance(normal) + drift) / np.abs(rate)
-    then_a, then_b = (replace(one, xy=one.xy + ttc[:, None] * one.v) for one in (a, b))
-    return Encounters.at(a, b, ttc, sigma, ttc, a.t, touching_place(then_a, then_b, normal))
+    return Encounters.at(a, b, ttc, sigma, ttc, a.t, touching_place(a.after(ttc), b.after(ttc), normal))
 
 
 @kernel
-def _in_order(t: Floats, xy: Floats) -> Ints:
+def _in_order(table: Floats) -> Ints:
     """(N,) rows in order of time, and those of one moment in order of x: few, so each is put where it belongs."""
-    order = np.empty(len(t), np.int64)
-    for i in range(len(t)):
+    order = np.empty(len(table), np.int64)
+    for i in range(len(table)):
         place = i
-        while place > 0 and t[order[place - 1]] == t[i] and xy[order[place - 1], 0] > xy[i, 0]:
+        while place > 0 and table[order[place - 1], T] == table[i, T] and table[order[place - 1], X] > table[i, X]:
             order[place] = order[place - 1]
             place -= 1
         order[place] = i
@@ -77,44 +84,44 @@ def _in_order(t: Floats, xy: Floats) -> Ints:
 
 
 @kernel
-def _look(row: int, count: int, state: Floats, who: Ints, found: Floats) -> tuple[int, int]:
-    """Look at rows with those after them at the same moment, until all are done or the pairs need more room; the next
-    row and pair.
+def _look(row: int, count: int, order: Ints, table: Floats, who: Ints, found: Floats) -> tuple[int, int]:
+    """Look at rows in `order` (of time, then of x) with those after them at the same moment, until all are done or
+    the pairs need more room; the next row and pair.
 
-    state   (N, 10) rectangles in order of time, then of x, with velocities and the standard deviations of speeds
     who, found   the pairs: (M, 2) rows; (M, 3) time to collision and the normal along which they touch
     """
     fastest, longest = 0.0, 0.0
-    reach = np.empty(len(state))  # of the circles around the rectangles
-    for i in range(len(state)):
-        reach[i] = np.sqrt(state[i, LENGTH] ** 2 + state[i, WIDTH] ** 2) / 2
-        fastest = max(fastest, state[i, VX] ** 2 + state[i, VY] ** 2)
+    reach = np.empty(len(table))  # of the circles around the rectangles
+    for i in range(len(table)):
+        reach[i] = np.sqrt(table[i, LENGTH] ** 2 + table[i, WIDTH] ** 2) / 2
+        fastest = max(fastest, table[i, VX] ** 2 + table[i, VY] ** 2)
         longest = max(longest, reach[i])
     fastest = np.sqrt(fastest)
-    for i in range(row, len(state)):
-        begun = count
-        t, x, y, vx, vy = state[i, T], state[i, X], state[i, Y], state[i, VX], state[i, VY]
+    for first in range(row, len(order)):
+        i, begun = order[first], count
+        t, x, y, vx, vy = table[i, T], table[i, X], table[i, Y], table[i, VX], table[i, VY]
         widest = TTC_S * (np.sqrt(vx * vx + vy * vy) + fastest) + reach[i] + longest
-        for j in range(i + 1, len(state)):
-            dx = state[j, X] - x
-            if state[j, T] != t or dx > widest:
+        for later in range(first + 1, len(order)):
+            j = order[later]
+            dx = table[j, X] - x
+            if table[j, T] != t or dx > widest:
                 break
-            dy, wx, wy = state[j, Y] - y, state[j, VX] - vx, state[j, VY] - vy
+            dy, wx, wy = table[j, Y] - y, table[j, VX] - vx, table[j, VY] - vy
             far, nearing, w2 = dx * dx + dy * dy, -dx * wx - dy * wy, wx * wx + wy * wy
             near = (reach[i] + reach[j]) ** 2
             if far > near and (nearing <= 0 or (far - near) * w2 > nearing * nearing):
                 continue  # the circles around them never meet
             if nearing > TTC_S * w2 and far - 2 * TTC_S * nearing + TTC_S**2 * w2 > near:
                 continue  # they near each other still after TTC_S, and have not met
-            ttc, nx, ny = _touch(dx, dy, wx, wy, state[i], state[j])
-            if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(state[i, SPEED_SIGMA], state[j, SPEED_SIGMA]):
+            ttc, nx, ny = _touch(dx, dy, wx, wy, table[i], table[j])
+            if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(table[i, SPEED_SIGMA], table[j, SPEED_SIGMA]):
                 continue
             if count == len(who):
-                return i, begun
+                return first, begun
             who[count, 0], who[count, 1] = i, j
             found[count, 0], found[count, 1], found[count, 2] = ttc, nx, ny
             count += 1
-    return len(state), count
+    return len(order), count
 
 
 @kernel

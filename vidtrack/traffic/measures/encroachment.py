@@ -49,7 +49,7 @@ def encroachments(bodies: Bodies) -> Encounters:
     bodies  (N,) in order of time; the moment is when the second vehicle comes
     """
     order = _by_track(bodies.track)
-    track, rectangle = bodies.track[order], bodies.rectangles()[order]
+    track, rectangle = bodies.track[order], bodies.table[:, : WIDTH + 1][order]
     i, j = _met(track, rectangle)
     late = rectangle[i, T] > rectangle[j, T]
     i, j = np.where(late, j, i), np.where(late, i, j)
