@@ -5,8 +5,8 @@ least time between two moments at which the rectangle of the one and that of the
 differ. Only ways that meet there count: who drove along the way of the other before has a headway, also when one of
 them turns off or the road bends.
 
-Which moments to compare is found by boxes: each track is cut into legs of _LEG rows, and only legs whose boxes meet, soon
-after each other and with headings that differ, are looked at row by row. Between two rows vehicles are taken to go
+Which moments to compare is found by boxes: each track is cut into legs of _LEG rows, and only legs whose boxes meet,
+soon after each other and with headings that differ, are looked at row by row. Between two rows vehicles are taken to go
 straight on. With d between the middles of the first at t_a and the second at t_b, and g the vector with
 g v_a = g v_b = -1,
 

@@ -75,7 +75,9 @@ class Knotting:
         values, t, who = (np.concatenate(columns.pop()) for _ in range(3))  # a day of them is large: none stays twice
         order = np.lexsort((t, who))
         first = np.searchsorted(who[order], np.arange(tracks + 1))
-        values = values[order]
+        del who
+        for column in values.T:
+            column[:] = column[order]  # one after the other: no second copy of all
         return Knots(first, t[order], values[:, :4], values[:, 4])
 
     def _keep(self, who: Ints, done: Floats) -> None:
