@@ -137,16 +137,14 @@ class Passing:
             more = max(tracks, 2 * len(self._state))
             self._state, self._far = _longer(self._state, more, np.nan), _longer(self._far, more, 0.0)
             self._last, self._way = _longer(self._last, more, -1), _longer(self._way, more, np.nan)
-        speed = np.hypot(rows.v[:, 0], rows.v[:, 1])
-        values = np.column_stack([rows.t, rows.xy, rows.sigma, speed, rows.speed_sigma, rows.speed_shared])
         row = 0
         while row < len(rows):
             if self._count + len(self._frame) > len(self._whole):
                 more = 2 * len(self._whole) + 64 * len(self._frame)
                 self._real, self._whole = _longer(self._real, more, 0.0), _longer(self._whole, more, 0)
             row, self._count = _look(
-                row, self._count, values, rows.track, rows.margin, rows.seen, rows.merged,
-                self._segment, self._begin, self._first, self._frame, self._reach,
+                row, self._count, rows.t, rows.xy, rows.sigma, rows.v, rows.speed_sigma, rows.speed_shared,
+                rows.track, rows.margin, rows.seen, rows.merged, self._segment, self._begin, self._first, self._frame, self._reach,
                 self._state, self._way, self._far, self._last, self._real, self._whole,
             )  # fmt: skip
 
@@ -210,25 +208,28 @@ def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:
 
 @kernel
 def _look(
-    row: int, count: int, values: Floats, track: Ints, margin: Floats, seen: Mask, merged: Mask,
-    segment: Floats, begin: Floats, first: Ints, frame: Floats, reach: float,
+    row: int, count: int, t: Floats, xy: Floats, sigma: Floats, v: Floats, speed_sigma: Floats, speed_shared: Floats,
+    track: Ints, margin: Floats, seen: Mask, merged: Mask, segment: Floats, begin: Floats, first: Ints, frame: Floats, reach: float,
     state: Floats, way: Floats, far: Floats, last: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the passings need more room; the next row and passing.
 
-    values  (N, 7) of rows; state (T, 7) the last ones of each track
+    state   (T, 7) of each track the last values, columns _T...
     way     (T, 3) of each track the corner passed last, x, y, and what it had driven there
     frame   (G, 4) around each gate, `reach` beyond it
     far     (T, G) largest distance from the gate since the track passed it last; last (T, G) that passing, or -1
     real, whole   the passings: columns TIME... and GATE...
     """
-    gates = len(first) - 1
+    gates, now = len(first) - 1, np.empty(7)
     for i in range(row, len(track)):
         if count + gates > len(whole):
             return i, count
-        x, y, k = values[i, _X], values[i, _Y], track[i]
+        x, y, k = xy[i, 0], xy[i, 1], track[i]
         if np.isnan(x):
             continue
+        now[_T], now[_X], now[_Y], now[_SIGMA] = t[i], x, y, sigma[i]
+        now[_SPEED] = np.hypot(v[i, 0], v[i, 1])
+        now[_SPEED_SIGMA], now[_SPEED_SHARED] = speed_sigma[i], speed_shared[i]
         x0, y0 = state[k, _X], state[k, _Y]
         if np.isnan(way[k, 0]):
             way[k, 0], way[k, 1], way[k, 2] = x, y, 0.0
@@ -250,7 +251,7 @@ def _look(
                     last[k, g] = whole[passing, LAST]
                     far[k, g] = real[passing, BEFORE]
                 else:
-                    _note(real[count], values[i], state[k], share)
+                    _note(real[count], now, state[k], share)
                     real[count, ALONG] = along
                     px, py = x0 + share * (x - x0), y0 + share * (y - y0)
                     real[count, WAY] = way[k, 2] + np.hypot(px - way[k, 0], py - way[k, 1])
@@ -269,8 +270,7 @@ def _look(
             if passing >= 0:
                 real[passing, AFTER] = far[k, g]
                 whole[passing, SEEN] |= seen[i]
-        for column in range(7):
-            state[k, column] = values[i, column]
+        state[k] = now
         dx, dy = x - way[k, 0], y - way[k, 1]
         if dx * dx + dy * dy >= _CORNER**2:
             way[k, 0], way[k, 1], way[k, 2] = x, y, way[k, 2] + np.hypot(dx, dy)
