@@ -204,7 +204,9 @@ def both(*ways):
 
 @pytest.mark.parametrize(("first", "second"), [(np.pi / 2, np.pi / 2), (0.0, np.pi / 2), (np.pi / 2, 0.0)])
 def test_vehicles_behind_each_other_have_no_encroachment_on_a_bend_and_where_one_turns_off(first, second):
-    assert len(found_in(both(bend(0, 0.0, first), bend(1, 2.0, second)))) == 0
+    rows = both(bend(0, 0.0, first), bend(1, 2.0, second))
+    assert len(found_in(rows)) == 0
+    assert len(found_in(rows, block=20)) == 0
 
 
 def test_one_that_turns_into_the_way_of_another_encroaches():
@@ -265,6 +267,21 @@ def test_conflicts_of_a_simulated_junction_are_the_exact_ones():
             assert -0.081 <= found.value[PET, row] - one.pet_s <= 1e-6
         if one.ttc_s is not None:
             assert found.value[TTC, row] == pytest.approx(one.ttc_s, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["junction-3d", "roundabout"])
+def test_the_blocks_that_rows_come_in_do_not_matter(kind):
+    """Who only follows is told by what both drove before and after, in other blocks."""
+    clip = simulate_road(kind, seed=103, size=(640, 360), seconds=60, fps=10)
+    moved = motion(clip)
+    k, who = np.nonzero(np.isfinite(moved.speed))
+    heading = moved.heading[k, who]
+    v = moved.speed[k, who, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+    rows = rows_of(who, moved.time[k], moved.xy[k, who], v, clip.fleet.length[who], clip.fleet.width[who], heading)
+    whole = found_in(rows)
+    assert len(whole) >= 3
+    for block in (100, 700):
+        assert listed(found_in(rows, block)) == listed(whole)
 
 
 def crossing_run(folder, metres):

@@ -101,7 +101,8 @@ class Encounters:
     """E moments of two vehicles: `second` comes to where `first` was, or closes in on it.
 
     first, second   (E,) numbers
-    value, sigma    (E,) s; the time to collision or the post-encroachment time, and its standard deviation
+    value, sigma    (E,) s; the time to collision or the post-encroachment time (NaN: it does not count), and its
+                    standard deviation
     rank    (E,) s; of several moments of the same two vehicles the one with the least rank counts
     t       (E,) s; when
     xy      (E, 2) m; where they touch

@@ -18,6 +18,9 @@ _KINDS = np.array(["rear-end", "merging", "crossing", "head-on"])
 TTC, PET = range(2)
 _CLEAR = 2.0
 """Standard deviations from 0"""
+_MEMORY_S = 3 * PET_S + 1.0
+"""s; who encroaches is judged PET_S late, by where the second vehicle was up to PET_S before, and the first one up to
+PET_S before that; a second more for rows that are far apart"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +57,7 @@ class Conflicts:
 
 
 class Meeting:
-    """Takes blocks of rows in order of time; remembers those of the last PET_S, and each block's encounters."""
+    """Takes blocks of rows in order of time; remembers those of the last _MEMORY_S, and each block's encounters."""
 
     def __init__(self) -> None:
         self._recent: Bodies | None = None
@@ -68,15 +71,16 @@ class Meeting:
             bodies = self._recent.and_also(bodies)
         if len(bodies):
             self._look(bodies, until=bodies.t[-1])
-            recent = np.searchsorted(bodies.t, bodies.t[-1] - PET_S, side="right")
+            recent = np.searchsorted(bodies.t, bodies.t[-1] - _MEMORY_S, side="right")
             self._recent = bodies.only(slice(recent, None))
 
     def _look(self, bodies: Bodies, until: float) -> None:
-        """Take the moments before `until` that are new."""
+        """Take the moments before `until` that are new; for encroachments those PET_S earlier."""
         first, last = np.searchsorted(bodies.t, [self._done, until])
         if first < last:
             self._closed.append(closing(bodies.only(slice(first, last))))
-            self._encroached.append(encroachments(bodies))
+            met = encroachments(bodies)
+            self._encroached.append(met.only((met.t >= self._done - PET_S) & (met.t < until - PET_S)))
         self._done = until
 
     def conflicts(self, vehicle: Ints, spans: Floats) -> Conflicts:
@@ -94,19 +98,19 @@ class Meeting:
         return _joined(closed, encroached.only((span[0] == span[1]) & clear))
 
     def settled(self) -> Conflicts:
-        """What was found of tracks that have not come closer for PET_S, once; it is forgotten then."""
+        """What was found of tracks that have not come closer for PET_S, once, 2 PET_S later; it is forgotten then."""
         closed, encroached = Encounters.together(self._closed), Encounters.together(self._encroached)
         both = Encounters.together([closed, encroached])
         pairs, row = np.unique(both.pair, axis=0, return_inverse=True)
         newest = np.full(len(pairs), -np.inf)
         np.maximum.at(newest, row.ravel(), both.t)
-        over = (newest <= self._done - PET_S)[row.ravel()]
+        over = (newest <= self._done - 2 * PET_S)[row.ravel()]
         found = []
         for one, done in zip((closed, encroached), np.split(over, [len(closed)]), strict=True):
             done_ones = one.only(done & (one.first != one.second))
             found.append(done_ones.only(done_ones.least()))
         self._closed, self._encroached = [closed.only(~over[: len(closed)])], [encroached.only(~over[len(closed) :])]
-        return _joined(found[0], found[1].only(found[1].rank > 0))
+        return _joined(found[0], found[1].only((found[1].rank > 0) & np.isfinite(found[1].value)))
 
 
 def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:

@@ -18,6 +18,8 @@ arriving less leaving over its corners.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
@@ -47,6 +49,8 @@ def encroachments(bodies: Bodies) -> Encounters:
     """The least post-encroachment time of each two vehicles, of at most PET_S.
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
+
+    Its value is NaN where they follow each other, or nobody knows where their ways cross: no later one counts for it.
     """
     order = _by_track(bodies.track)
     track, rectangle = bodies.track[order], bodies.table[:, : WIDTH + 1][order]
@@ -55,8 +59,9 @@ def encroachments(bodies: Bodies) -> Encounters:
     i, j = np.where(late, j, i), np.where(late, i, j)
     steps = _step(track, rectangle, i, 1) + _step(track, rectangle, j, -1)
     found = _details(bodies.only(order[i]), bodies.only(order[j]), steps)
-    told = np.flatnonzero(_SURE * found.sigma < PET_S)
-    return found.only(told[~_follows(i[told], j[told], track, rectangle)])
+    counts = _SURE * found.sigma < PET_S
+    counts[counts] = ~_follows(i[counts], j[counts], track, rectangle)
+    return replace(found, value=np.where(counts, found.value, np.nan))
 
 
 def _met(track: Ints, rectangle: Floats) -> tuple[Ints, Ints]:
@@ -205,11 +210,13 @@ def _nearest(
 
 @kernel
 def _follows(first: Ints, second: Ints, track: Ints, rectangle: Floats) -> Mask:
-    """(E,) whether the vehicle of row `second`, a length earlier, is on the way of that of row `first` already."""
+    """(E,) whether the vehicle of row `second`, a length or PET_S earlier, is on the way of that of `first` already."""
     follows = np.zeros(len(first), np.bool_)
     for k in range(len(first)):
         i, at, then = first[k], second[k], rectangle[second[k]]
         while at > 0 and track[at - 1] == track[second[k]] and _distance(rectangle[at], then) < then[LENGTH]:
+            if rectangle[at, T] < then[T] - PET_S:
+                break
             at -= 1
         while i > 0 and track[i - 1] == track[i] and rectangle[i - 1, T] > rectangle[at, T] - PET_S:
             i -= 1

@@ -144,7 +144,8 @@ class Passing:
                 self._real, self._whole = _longer(self._real, more, 0.0), _longer(self._whole, more, 0)
             row, self._count = _look(
                 row, self._count, rows.t, rows.xy, rows.sigma, rows.v, rows.speed_sigma, rows.speed_shared,
-                rows.track, rows.margin, rows.seen, rows.merged, self._segment, self._begin, self._first, self._frame, self._reach,
+                rows.track, rows.margin, rows.seen, rows.merged,
+                self._segment, self._begin, self._first, self._frame, self._reach,
                 self._state, self._way, self._far, self._last, self._real, self._whole,
             )  # fmt: skip
 
@@ -209,7 +210,8 @@ def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:
 @kernel
 def _look(
     row: int, count: int, t: Floats, xy: Floats, sigma: Floats, v: Floats, speed_sigma: Floats, speed_shared: Floats,
-    track: Ints, margin: Floats, seen: Mask, merged: Mask, segment: Floats, begin: Floats, first: Ints, frame: Floats, reach: float,
+    track: Ints, margin: Floats, seen: Mask, merged: Mask,
+    segment: Floats, begin: Floats, first: Ints, frame: Floats, reach: float,
     state: Floats, way: Floats, far: Floats, last: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the passings need more room; the next row and passing.
