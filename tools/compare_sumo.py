@@ -42,6 +42,8 @@ FLOWS = {"through": 240, "left": 40, "right": 40}
 """vehicles/h of each arm"""
 DRIVER = 'tau="0.3" sigma="0.9" jmTimegapMinor="0.3"'
 """Short gaps, so that there are conflicts"""
+ENCOUNTER_S = 5.0
+"""Two vehicles that come close once more, later, have another encounter."""
 
 
 def binary(name: str) -> Path | None:
@@ -238,14 +240,16 @@ def ssm_of(folder: Path) -> tuple[dict, dict]:
 
 
 def conflicts(folder: Path, tables: dict[str, pa.Table]) -> dict[str, tuple[int, int, np.ndarray]]:
-    """For ttc and pet: pairs of vehicles there, and here, and the differences [s] of those in both."""
+    """For ttc and pet: pairs of vehicles there, and here, and the differences [s] of those in both at the same time."""
     ours = {
         tuple(sorted((row["first_track_id"], row["second_track_id"]))): row for row in tables["conflicts"].to_pylist()
     }
     found = {}
     for name, theirs in zip(("ttc", "pet"), ssm_of(folder), strict=True):
-        mine = {pair: row[f"{name}_s"] for pair, row in ours.items() if row[f"{name}_s"] is not None}
-        off = np.array([mine[pair] - theirs[pair][0] for pair in sorted(mine.keys() & theirs.keys())])
+        mine = {pair: row for pair, row in ours.items() if row[f"{name}_s"] is not None}
+        both = sorted(mine.keys() & theirs.keys())
+        one_time = [pair for pair in both if abs(mine[pair][f"{name}_time_s"] - theirs[pair][1]) < ENCOUNTER_S]
+        off = np.array([mine[pair][f"{name}_s"] - theirs[pair][0] for pair in one_time])
         found[name] = len(theirs), len(mine), off
     return found
 
