@@ -183,8 +183,8 @@ def main() -> None:
         print(f"{options.only}: {seconds:.1f} s, {time.process_time():.1f} s of CPU, at most {peak:.0f} MB")
         return
     again = [sys.executable, __file__, "-o", str(options.output), "--vehicles", str(options.vehicles), "--only"]
-    written = (options.output / "summary.json").exists()
-    for only in (*(() if written else (WRITE,)), *PARTS, *PARTS):
+    parts = [*PARTS, *PARTS] if (options.output / "summary.json").exists() else [WRITE, *PARTS, *PARTS]
+    for only in parts:
         subprocess.run([*again, only], check=True)
 
 

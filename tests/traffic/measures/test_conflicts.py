@@ -68,11 +68,32 @@ def test_conflicts_of_tracks_that_go_on_are_told_once_when_they_are_over():
     whole, meeting, told = found_in(rows), Meeting(), []
     for second in range(20):
         meeting.add(rows.only((rows.t >= second) & (rows.t < second + 1)))
-        found = meeting.settled()
+        found = meeting.settled(second + 1)
         told += [(one, other, kind, t) for one, other, kind, t in listed(found) if second + 1 - t >= 5.0]
     late = whole.t < 10  # the others may still go on
     assert sorted(told) == sorted(one for one, over in zip(listed(whole), late, strict=True) if over)
     assert told
+
+
+def test_who_comes_close_again_later_is_told_again():
+    """Though the two were closer before: 0.4 s, and 0.8 s when they come round again 13 s later."""
+    track, t, xy, v = driven((-24, 0, 10, 0), (0, -33, 0, 10), seconds=5)
+    later = xy + np.where(track[:, None] == 1, [0.0, -4.0], [0.0, 0.0])
+    rows = rows_of(np.tile(track, 2), np.append(t, t + 13), np.vstack([xy, later]), np.vstack([v, v]), width=1.0)
+    meeting, told = Meeting(), []
+    for second in range(40):
+        meeting.add(rows.only((rows.t >= second) & (rows.t < second + 1)))
+        told += meeting.settled(second + 1).value[PET].tolist()
+    assert told == pytest.approx([0.4, 0.8], abs=0.02)
+    assert found_in(rows).value[PET] == pytest.approx([0.4], abs=0.02)
+
+
+def test_what_may_be_nothing_is_told_neither_at_once_nor_at_the_end():
+    rows = rows_of(*driven((-24, 0, 10, 0), (0, -31, 0, 10), seconds=5), width=1.0, sigma=0.9)
+    meeting = Meeting()
+    meeting.add(rows)
+    assert np.isnan(meeting.settled(np.inf).value[PET]).all()
+    assert np.isnan(found_in(rows).value[PET]).all()
 
 
 def listed(found):

@@ -138,6 +138,7 @@ class LiveEvents:
 
     def use(self, subject: Subject) -> None:
         """Go on at the site of the subject. Raises ConfigError for a zone that is not on the road."""
+        self.end()
         self._road = None if subject.site is None else RoadEvents(subject, self._coast_s)
 
     def change(self, subject: Subject) -> None:
@@ -168,8 +169,12 @@ class LiveEvents:
         for entry in self._road.entries(steps, rows):
             told = {"zone": entry.zone, "track_id": entry.track_id, "came": entry.came}
             self._make(Kind.ENTRY, offset_s + entry.time_s, told)
-        for time_s, told in self._road.conflicts(rows):
-            self._make(Kind.CONFLICT, offset_s + time_s, told)
+        self._came_close(self._road.conflicts(steps, rows))
+
+    def end(self) -> None:
+        """Make events of the conflicts that are not over: nobody looks on."""
+        if self._road is not None:
+            self._came_close(self._road.unfinished())
 
     def save(self) -> None:
         """Put what was made into the outboxes; what the disk has no room for is tried again."""
@@ -187,6 +192,10 @@ class LiveEvents:
             sender.end()
         for sender in self._senders:
             sender.join(until_s)
+
+    def _came_close(self, conflicts: Iterable[tuple[float, dict[str, Any]]]) -> None:
+        for time_s, told in conflicts:
+            self._make(Kind.CONFLICT, self._began_s() + time_s, told)
 
     def _make(self, kind: Kind, unix_s: float, content: Mapping[str, Any]) -> None:
         event = Event(kind, self._camera, unix_s, content)

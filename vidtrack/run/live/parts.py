@@ -125,6 +125,7 @@ class Parts:
                 stack.callback(self._counting.close)
             if self._events is not None:
                 stack.callback(self._events.save)
+                self._events.end()
         for thread in self._finishing:
             thread.join()
 

@@ -12,6 +12,7 @@ import pyarrow as pa
 from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
+from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.conflicts import PET, TTC, Conflicts, Meeting
 from vidtrack.traffic.measures.rows import Rows, rows_of
 from vidtrack.traffic.measures.staying import outlines_of
@@ -25,7 +26,7 @@ _LOOK_S = 2.0  # between two looks for conflicts
 class RoadEvents:
     """Zone entries and conflicts of a subject with a site, of confirmed tracks.
 
-    gap_s   all tracks end in a longer pause
+    gap_s   all tracks end in a longer pause between pictures
     metres  whether the site is calibrated
 
     Raises ConfigError for a zone that is not on the road.
@@ -63,21 +64,29 @@ class RoadEvents:
         ]
         return [entry for of_moment in found for entry in of_moment]
 
-    def conflicts(self, rows: pa.Table | None) -> Iterator[tuple[float, dict[str, Any]]]:
-        """Time [s] and content of each conflict that is over; `rows` are new ones of tracks on the road."""
-        if self._ground is None:
+    def conflicts(self, steps: Sequence[Step], rows: pa.Table | None) -> Iterator[tuple[float, dict[str, Any]]]:
+        """Time [s] and content of each conflict that is over; `rows` of the tracks of these steps on the road."""
+        if self._ground is None or not steps:
             return
+        if self._last_s is not None and steps[0].time_s - self._last_s > self._gap_s:
+            yield from self.unfinished()  # nobody knows what happened meanwhile
+        self._last_s = steps[-1].time_s
         if rows is not None and len(rows):
             self._unseen.append(rows)
-        if not (self._unseen and self._due()):
-            return
-        seen = rows_of(pa.concat_tables(self._unseen), self._ground)
-        self._unseen = []
-        if self._last_s is not None and seen.t[0] - self._last_s > self._gap_s:
-            self._meeting = Meeting()  # nobody knows what happened meanwhile
-        self._last_s = float(seen.t[-1])
-        self._meeting.add(seen)
-        yield from _told(self._meeting.settled())
+        if self._due():
+            yield from self._over(self._ground, self._last_s)
+
+    def unfinished(self) -> Iterator[tuple[float, dict[str, Any]]]:
+        """The same of those that are not over, since nobody looks on."""
+        if self._ground is not None:
+            yield from self._over(self._ground, np.inf)
+            self._meeting = Meeting()
+
+    def _over(self, ground: Ground, until_s: float) -> Iterator[tuple[float, dict[str, Any]]]:
+        if self._unseen:
+            self._meeting.add(rows_of(pa.concat_tables(self._unseen), ground))
+            self._unseen = []
+        return _told(self._meeting.settled(until_s))
 
 
 def prepare() -> None:
@@ -107,7 +116,7 @@ def prepare() -> None:
             np.full((len(track), 4), np.nan),
         )
     )
-    meeting.settled()
+    meeting.settled(np.inf)
 
 
 def _told(found: Conflicts) -> Iterator[tuple[float, dict[str, Any]]]:

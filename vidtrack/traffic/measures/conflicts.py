@@ -18,9 +18,9 @@ _KINDS = np.array(["rear-end", "merging", "crossing", "head-on"])
 TTC, PET = range(2)
 _CLEAR = 2.0
 """Standard deviations from 0"""
-_MEMORY_S = 3 * PET_S + 1.0
+_MEMORY_S = 3 * PET_S
 """s; who encroaches is judged PET_S late, by where the second vehicle was up to PET_S before, and the first one up to
-PET_S before that; a second more for rows that are far apart"""
+PET_S before that"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,38 +67,39 @@ class Meeting:
     def add(self, rows: Rows) -> None:
         """Look at some rows. Their last moment may go on in the next block and waits for it."""
         bodies = Bodies.of(rows)
-        if self._recent is not None:
-            bodies = self._recent.and_also(bodies)
-        if len(bodies):
-            self._look(bodies, until=bodies.t[-1])
-            recent = np.searchsorted(bodies.t, bodies.t[-1] - _MEMORY_S, side="right")
-            self._recent = bodies.only(slice(recent, None))
+        self._recent = bodies if self._recent is None else self._recent.and_also(bodies)
+        if len(self._recent):
+            self._look(until=self._recent.t[-1])
 
-    def _look(self, bodies: Bodies, until: float) -> None:
+    def _look(self, until: float) -> None:
         """Take the moments before `until` that are new; for encroachments those PET_S earlier."""
+        bodies = self._recent
+        if bodies is None or until <= self._done:
+            return
         first, last = np.searchsorted(bodies.t, [self._done, until])
         if first < last:
             self._closed.append(closing(bodies.only(slice(first, last))))
-            met = encroachments(bodies)
-            self._encroached.append(met.only((met.t >= self._done - PET_S) & (met.t < until - PET_S)))
+        self._encroached.append(encroachments(bodies, self._done - PET_S, until - PET_S))
         self._done = until
+        self._recent = bodies.only(slice(np.searchsorted(bodies.t, until - _MEMORY_S, side="right"), None))
 
     def conflicts(self, vehicle: Ints, spans: Floats) -> Conflicts:
-        """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break.
-
-        Two that are in one place at one time have no post-encroachment time: vehicles are not, so it is their error.
-        So have those whose time does not differ from 0 by _CLEAR of its standard deviations.
-        """
-        if self._recent is not None and len(self._recent):
-            self._look(self._recent, until=np.inf)
-        both = (Encounters.together(found).between(vehicle) for found in (self._closed, self._encroached))
-        closed, encroached = (found.only(found.least()) for found in both)
+        """What was found; `vehicle` (T,) of each track, `spans` (S, 2) s what was watched without a break."""
+        self._look(until=np.inf)
+        closed, encroached = Encounters.together(self._closed), Encounters.together(self._encroached)
+        encroached = encroached.only(encroached.least())
+        encroached = encroached.only(np.isfinite(encroached.value))
+        closed, encroached = (found.between(vehicle) for found in (closed, encroached))
+        closed, encroached = (found.only(found.least()) for found in (closed, encroached))
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
-        clear = (encroached.rank > 0) & (encroached.value > _CLEAR * encroached.sigma)
-        return _joined(closed, encroached.only((span[0] == span[1]) & clear))
+        return _joined(closed, _clear(encroached.only(span[0] == span[1])))
 
-    def settled(self) -> Conflicts:
-        """What was found of tracks that have not come closer for PET_S, once, 2 PET_S later; it is forgotten then."""
+    def settled(self, until: float) -> Conflicts:
+        """What was found of tracks that were in no encounter for 2 PET_S before `until`, once; it is forgotten then.
+
+        until   s; all rows before it were added, or no more will come: inf
+        """
+        self._look(until)
         closed, encroached = Encounters.together(self._closed), Encounters.together(self._encroached)
         both = Encounters.together([closed, encroached])
         pairs, row = np.unique(both.pair, axis=0, return_inverse=True)
@@ -110,7 +111,15 @@ class Meeting:
             done_ones = one.only(done & (one.first != one.second))
             found.append(done_ones.only(done_ones.least()))
         self._closed, self._encroached = [closed.only(~over[: len(closed)])], [encroached.only(~over[len(closed) :])]
-        return _joined(found[0], found[1].only((found[1].rank > 0) & np.isfinite(found[1].value)))
+        return _joined(found[0], _clear(found[1]))
+
+
+def _clear(met: Encounters) -> Encounters:
+    """Those whose post-encroachment time differs from 0 by _CLEAR of its standard deviations.
+
+    Two that are in one place at one time have none: vehicles are not, so it is their error.
+    """
+    return met.only((met.rank > 0) & (met.value > _CLEAR * met.sigma))
 
 
 def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:

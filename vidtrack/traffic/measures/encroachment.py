@@ -45,16 +45,16 @@ LEFT, LOW, BEGIN, RIGHT, HIGH, END, AHEAD_X, AHEAD_Y, TURNED = range(9)
 _HULL = tuple((k, np.minimum) for k in (LEFT, LOW, BEGIN)) + tuple((k, np.maximum) for k in (RIGHT, HIGH, END))
 
 
-def encroachments(bodies: Bodies) -> Encounters:
-    """The least post-encroachment time of each two vehicles, of at most PET_S.
+def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
+    """The least post-encroachment time of each two vehicles, of at most PET_S, from `since` on and before `until`.
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
 
-    Its value is NaN where they follow each other, or nobody knows where their ways cross: no later one counts for it.
+    Its value is NaN where they follow each other, or nobody knows where their ways cross: no other one counts for it.
     """
     order = _by_track(bodies.track)
     track, rectangle = bodies.track[order], bodies.table[:, : WIDTH + 1][order]
-    i, j = _met(track, rectangle)
+    i, j = _met(track, rectangle, since, until)
     late = rectangle[i, T] > rectangle[j, T]
     i, j = np.where(late, j, i), np.where(late, i, j)
     steps = _step(track, rectangle, i, 1) + _step(track, rectangle, j, -1)
@@ -64,7 +64,7 @@ def encroachments(bodies: Bodies) -> Encounters:
     return replace(found, value=np.where(counts, found.value, np.nan))
 
 
-def _met(track: Ints, rectangle: Floats) -> tuple[Ints, Ints]:
+def _met(track: Ints, rectangle: Floats, since: float, until: float) -> tuple[Ints, Ints]:
     """The rows, nearest in time, in which each two vehicles have been in one place with headings that differ.
 
     track, rectangle   (N,) and (N, 7) in order of tracks and time
@@ -76,7 +76,7 @@ def _met(track: Ints, rectangle: Floats) -> tuple[Ints, Ints]:
     order = np.argsort(life[:, BEGIN], kind="stable")
     row, count = 0, 0
     while row < len(order):
-        row, count = _look(row, count, order, life, first, leg, begin, rectangle, rows)
+        row, count = _look(row, count, order, life, first, leg, begin, rectangle, since, until, rows)
         if row < len(order):
             rows = np.vstack([rows, np.empty_like(rows)])
     return rows[:count, 0], rows[:count, 1]
@@ -84,7 +84,7 @@ def _met(track: Ints, rectangle: Floats) -> tuple[Ints, Ints]:
 
 def _legs_begin(track: Ints) -> tuple[Ints, Ints]:
     """(L + 1,) rows at which the legs of tracks begin, and (K + 1,) the legs at which those of the next track do."""
-    new = np.diff(track, prepend=-1) != 0
+    new = np.diff(track, prepend=track[:1] - 1) != 0
     since = np.flatnonzero(new)
     number = np.arange(len(track)) - np.repeat(since, np.diff(since, append=len(track)))
     begin = np.flatnonzero(number % _LEG == 0)
@@ -152,7 +152,7 @@ def _legs(begin: Ints, rectangle: Floats) -> Floats:
 @kernel
 def _look(
     row: int, count: int, order: Ints, life: Floats, first: Ints, leg: Floats, begin: Ints, rectangle: Floats,
-    rows: Ints,
+    since: float, until: float, rows: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Compare tracks in `order` of their beginnings with those that begin at most PET_S after their ends, until all are
     done or the rows need more room; the next track and the number of rows.
@@ -171,7 +171,8 @@ def _look(
                 continue
             if count == len(rows):
                 return a, before
-            i, j = _nearest(first[one], first[one + 1], first[other], first[other + 1], leg, begin, rectangle)
+            legs = first[one], first[one + 1], first[other], first[other + 1]
+            i, j = _nearest(*legs, leg, begin, rectangle, since, until)
             if i >= 0:
                 rows[count, 0], rows[count, 1] = i, j
                 count += 1
@@ -180,9 +181,13 @@ def _look(
 
 @kernel
 def _nearest(
-    one: int, one_end: int, other: int, other_end: int, leg: Floats, begin: Ints, rectangle: Floats
-) -> tuple[int, int]:
-    """Of the legs of two tracks the rows, nearest in time, whose rectangles overlap; -1 where there are none."""
+    one: int, one_end: int, other: int, other_end: int, leg: Floats, begin: Ints, rectangle: Floats, since: float,
+    until: float,
+) -> tuple[int, int]:  # fmt: skip
+    """Of the legs of two tracks the rows, nearest in time, whose rectangles overlap; -1 where there are none.
+
+    The later row is not before `since`, and before `until`.
+    """
     best, first, second = PET_S, -1, -1
     for b in range(other, other_end):
         while one < one_end and leg[one, END] < leg[b, BEGIN] - best:
@@ -190,6 +195,8 @@ def _nearest(
         for a in range(one, one_end):
             if leg[a, BEGIN] > leg[b, END] + best:
                 break
+            if max(leg[a, END], leg[b, END]) < since or max(leg[a, BEGIN], leg[b, BEGIN]) >= until:
+                continue
             if not _boxes_meet(leg[a], leg[b]) or not _crossing(leg[a], leg[b]):
                 continue
             low = begin[a]
@@ -203,6 +210,8 @@ def _nearest(
                     wait = abs(t - rectangle[i, T])
                     if first >= 0 and wait > best - _ROUNDING_S:
                         continue
+                    if not since <= max(t, rectangle[i, T]) < until:
+                        continue
                     if not _aligned(rectangle[i], rectangle[j]) and _overlap(rectangle[i], rectangle[j]):
                         best, first, second = wait, i, j
     return first, second
@@ -214,11 +223,9 @@ def _follows(first: Ints, second: Ints, track: Ints, rectangle: Floats) -> Mask:
     follows = np.zeros(len(first), np.bool_)
     for k in range(len(first)):
         i, at, then = first[k], second[k], rectangle[second[k]]
-        while at > 0 and track[at - 1] == track[second[k]] and _distance(rectangle[at], then) < then[LENGTH]:
-            if rectangle[at, T] < then[T] - PET_S:
-                break
+        while _distance(rectangle[at], then) < then[LENGTH] and _before(at, track, rectangle, then[T] - PET_S):
             at -= 1
-        while i > 0 and track[i - 1] == track[i] and rectangle[i - 1, T] > rectangle[at, T] - PET_S:
+        while _before(i, track, rectangle, rectangle[at, T] - PET_S):
             i -= 1
         while i < len(track) and track[i] == track[first[k]] and rectangle[i, T] < rectangle[at, T] + PET_S:
             if _aligned(rectangle[i], rectangle[at]) and _overlap(rectangle[i], rectangle[at]):
@@ -226,6 +233,12 @@ def _follows(first: Ints, second: Ints, track: Ints, rectangle: Floats) -> Mask:
                 break
             i += 1
     return follows
+
+
+@kernel
+def _before(row: int, track: Ints, rectangle: Floats, since: float) -> bool:
+    """Whether there is a row of the same track before it, and after a time."""
+    return row > 0 and track[row - 1] == track[row] and rectangle[row - 1, T] > since
 
 
 @kernel
