@@ -124,7 +124,7 @@ def event_rows(clips: Sequence[Clip], rivals: dict[str, Contender], told: Iterab
     total = {rival: Judged() for rival in rivals}
     single: list[str] = []
     for clip in clips:
-        scored = {rival: judge(tracked(run, clip).counts, clip.events) for rival, run in rivals.items()}
+        scored = {rival: judge_clip(tracked(run, clip), clip) for rival, run in rivals.items()}
         print_row(clip.name, "hit/missed/false", {rival: str(judged) for rival, judged in scored.items()})
         total = {rival: total[rival] + judged for rival, judged in scored.items()}
         if clip.name in told:
@@ -134,6 +134,11 @@ def event_rows(clips: Sequence[Clip], rivals: dict[str, Contender], told: Iterab
         shares = {rival: f"{judged.recall:.3f} / {judged.precision:.3f}" for rival, judged in total.items()}
         print_row(f"{len(clips)} clips", "recall / precision", shares)
     print("\n".join(["", *single, ""]) if single else "", end="", flush=True)
+
+
+def judge_clip(result: Tracked, clip: Clip) -> Judged:
+    """The counts of a clip, from where its crossings are known."""
+    return judge((count for count in result.counts if count.frame >= clip.first), clip.events)
 
 
 def told_events(name: str, scored: dict[str, Judged]) -> Iterator[str]:

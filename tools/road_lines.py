@@ -41,7 +41,8 @@ def crossings(truth: Path, lines: dict[str, np.ndarray]) -> list[Event]:
             along = (stop - start) / np.linalg.norm(stop - start)
             side = (centre - start) @ np.array([-along[1], along[0]])
             within = (centre - start) @ along
-            crossed = (side[1:] * side[:-1] < 0) & (within[1:] >= 0) & (within[1:] <= np.linalg.norm(stop - start))
+            beyond = side >= 0
+            crossed = (beyond[1:] != beyond[:-1]) & (within[1:] >= 0) & (within[1:] <= np.linalg.norm(stop - start))
             flat = abs(along[0]) > abs(along[1])
             step = np.diff(centre[:, 1] if flat else centre[:, 0])
             for way, name in ((1, "down" if flat else "right"), (-1, "up" if flat else "left")):

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import score_highway
+from numpy.typing import NDArray
 from road_lines import crossings, leg_lines
 from score_events import Event, read_truth
 
@@ -27,7 +29,15 @@ FILES = {
     "dual_carriageway": ("dual_carriageway.mp4", ("near:190,280,480,280", "far:200,110,200,235")),
     "haze": ("haze.mp4", ("a:55,190,180,190",)),
 }
+CROSSED = {
+    "highway": ("a:0,170,215,170", ("down",)),
+    "traffic": ("a:40,120,319,120", ("up",)),
+    "pets": ("a:400,150,400,570", ("left", "right")),
+}
+"""Lines across the clips whose truth is boxes with identities, and the ways that are driven or walked over them."""
 TRAFFIC_FIRST, TRAFFIC_LAST = 900, 1235  # image numbers with truth
+_FIRST = {"highway": score_highway.FIRST - 1, "traffic": TRAFFIC_FIRST - 1}  # frames
+_BY_BOXES = 9.0  # frames; tolerance of a crossing of the true boxes' centres
 
 
 def everything(result: Table, truth: Table) -> Table:
@@ -53,6 +63,7 @@ class Clip:
     video   file, or a folder of pictures in%06d.jpg
     lines   counted lines, NAME:x1,y1,x2,y2
     events  crossings of these lines
+    first   frame before which crossings are unknown, and those that are counted are left out
     truth   MOT file
     fps     to be told where the video has no rate
     judged  the rows of a result that are scored
@@ -63,6 +74,7 @@ class Clip:
     video: Path
     lines: tuple[str, ...] = ()
     events: tuple[Event, ...] = ()
+    first: float = 0.0
     truth: Path | None = None
     fps: float | None = None
     judged: Callable[[Table, Table], Table] = field(default=everything, repr=False)
@@ -89,6 +101,22 @@ def with_identities(data: Path) -> dict[str, Clip]:
         "highway": Clip("highway", highway / "input", truth=highway / "gt_ids.txt", fps=25, judged=of_highway),
         "pets": Clip("pets", pets / "video.avi", truth=pets / "gt.txt"),
     }
+
+
+def with_crossings(name: str, data: Path) -> Clip:
+    """A clip whose truth is boxes with identities, and the crossings of a line by their centres."""
+    clip, (line, ways) = with_identities(data)[name], CROSSED[name]
+    assert clip.truth is not None
+    label, ends = read_line(line)
+    events = (replace(event, tolerance=_BY_BOXES) for event in crossings(clip.truth, {label: ends}))
+    known = tuple(event for event in events if event.direction in ways)
+    return replace(clip, lines=(line,), events=known, first=_FIRST.get(name, 0.0), masked=False)
+
+
+def read_line(text: str) -> tuple[str, NDArray]:
+    """Name and (2, 2) ends of a line NAME:x1,y1,x2,y2."""
+    name, _, numbers = text.rpartition(":")
+    return name, np.array([float(number) for number in numbers.split(",")]).reshape(2, 2)
 
 
 def simulated(folder: Path, label: str, seeds: Iterable[int], **knobs: Any) -> list[Clip]:

@@ -16,10 +16,11 @@ from zlib import crc32
 import av
 import cv2
 import numpy as np
+from av.container import InputContainer
 from numpy.random import Generator
 from numpy.typing import NDArray
 from score_events import Event
-from video_clips import Clip
+from video_clips import Clip, read_line
 
 Picture = NDArray[np.uint8]
 SMALLEST_TOLERANCE = 4.0  # frames
@@ -190,7 +191,7 @@ def drawn(clip: Clip, seed: int) -> Variant:
     """A chance combination of changes, another one for each clip; the part that is seen holds the counted lines."""
     rng = np.random.default_rng([seed, crc32(clip.name.encode())])
     size, _, length_s = _stream(clip.video)
-    ends = np.concatenate([_ends(text) for text in clip.lines]) / size
+    ends = np.concatenate([read_line(text)[1] for text in clip.lines]) / size
     low, high = np.clip(ends.min(axis=0) - ROOM, 0, 0.3), np.clip(ends.max(axis=0) + ROOM, 0.7, 1)
     left, top, right, bottom = [*(low * rng.uniform(0, 1, 2)), *(1 - (1 - high) * rng.uniform(0, 1, 2))]
     gamma, gain, veil, sigma = rng.uniform(0.6, 1.6), rng.uniform(0.7, 1.2), rng.uniform(0, 50), rng.uniform(0, 5)
@@ -230,12 +231,13 @@ def derive(clip: Clip, name: str, folder: Path, variant: Variant | None = None) 
     lines = tuple(_line(text, variant, size) for text in clip.lines)
     events = tuple(_event(event, variant, count, rate) for event in clip.events)
     seen = tuple(event for event in events if event.frame >= -event.tolerance)
-    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=seen)
+    first = (clip.first - round(variant.start_s * float(rate))) / variant.every
+    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=seen, first=first, fps=None)
 
 
 def _stream(video: Path) -> tuple[tuple[int, int], Fraction, float]:
     """Width and height [px], frames/s, and length [s]."""
-    with av.open(str(video)) as container:
+    with _opened(video) as container:
         stream = container.streams.video[0]
         rate, length = stream.average_rate, container.duration
         assert rate is not None  # all clips with crossings have both
@@ -272,8 +274,13 @@ def _pictures(video: Path, variant: Variant, rate: float) -> Iterator[Picture]:
         yield changed
 
 
+def _opened(video: Path) -> InputContainer:
+    """A video, or a folder of pictures in%06d.jpg at 25 frames/s."""
+    return av.open(str(video / "in%06d.jpg" if video.is_dir() else video))
+
+
 def _decoded(video: Path) -> Iterator[Picture]:
-    with av.open(str(video)) as container:
+    with _opened(video) as container:
         for frame in container.decode(video=0):
             yield np.asarray(frame.to_ndarray(format="bgr24"), np.uint8)
 
@@ -305,11 +312,6 @@ def _corner(width: int, height: int) -> NDArray:
     return (np.array([width, height]) - _crop(width, height)) / 2
 
 
-def _ends(line: str) -> NDArray:
-    """(2, 2) ends of a line NAME:x1,y1,x2,y2."""
-    return np.array([float(number) for number in line.rpartition(":")[2].split(",")]).reshape(2, 2)
-
-
 def _even(length: float) -> int:
     return 2 * int(length / 2)
 
@@ -323,13 +325,14 @@ def _pixels(variant: Variant, size: tuple[int, int]) -> tuple[int, int, int, int
 def _line(text: str, variant: Variant, size: tuple[int, int]) -> str:
     """The line where the variant has it."""
     left, top, right, bottom = _pixels(variant, size)
-    ends = _ends(text) - (left, top)
+    name, ends = read_line(text)
+    ends -= (left, top)
     if variant.mirror:
         ends[:, 0] = right - left - ends[:, 0]
     ends *= variant.scale
     if variant.sway is not None:
         ends -= _corner(_even(variant.scale * (right - left)), _even(variant.scale * (bottom - top)))
-    return f"{text.rpartition(':')[0]}:{','.join(f'{value:g}' for value in ends.ravel())}"
+    return f"{name}:{','.join(f'{value:g}' for value in ends.ravel())}"
 
 
 def _event(event: Event, variant: Variant, count: int, rate: Fraction) -> Event:
