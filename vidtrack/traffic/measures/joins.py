@@ -28,8 +28,8 @@ from vidtrack.traffic.measures.rows import Rows, off_road
 from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M_S, STANDING_JOLT, End, Lives
 
 LONGEST_S = 20.0
-_ROUNDS, _PASSES = 4, 30
-"""In which the rate of chance is found, and of belief propagation"""
+_ROUNDS, _PASSES, _SETTLED = 4, 30, 1e-9
+"""In which the rate of chance is found, and of belief propagation, at most: until no message changes by more"""
 _LOST_S = 2.0
 """s; mean time that a track is lost for"""
 OVERLAP_S = 0.3
@@ -97,7 +97,9 @@ def marginals(R: Floats, a: Ints, b: Ints, ends: int) -> Floats:
     for _ in range(_PASSES):
         going = R * back
         going = R / (1 + np.bincount(a, going, ends)[a] - going)
-        back = 1 / (1 + np.bincount(b, going, ends)[b] - going)
+        before, back = back, 1 / (1 + np.bincount(b, going, ends)[b] - going)
+        if np.abs(back - before).max() < _SETTLED:
+            break
     going = R * back
     return np.asarray(going / (1 + np.bincount(a, going, ends)[a]))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from os import SEEK_END
 from pathlib import Path
@@ -130,7 +131,7 @@ class Reader:
             wanted, road = _needed(recording.folder, ground), None
             if ground is not None and "x_m" not in wanted:
                 road = roads.setdefault(recording.session, Footprints(ground, recording.size))
-            for table in blocks(recording.folder, wanted):
+            for table in _ahead(blocks(recording.folder, wanted)):
                 yield self._rows(table, recording, ground, road)
 
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
@@ -146,7 +147,9 @@ class Reader:
             return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
             column |= _stand(road, track, column)
-        edge = (edges(column, recording.size) + 0.5) * (self._size[0] / recording.size[0]) - 0.5
+        edge = edges(column, recording.size)
+        if recording.size != self._size:
+            edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         rows = _on_road(ground, column, track, t, seen, merged, edge)
         if len(self._latest) < len(self._numbers):
             more = max(len(self._numbers), 2 * len(self._latest)) - len(self._latest)
@@ -317,6 +320,15 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
         raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
     if waiting:
         yield pa.Table.from_batches(waiting)
+
+
+def _ahead(tables: Iterator[pa.Table]) -> Iterator[pa.Table]:
+    """The same, each read while the one before is worked on."""
+    with ThreadPoolExecutor(1) as beside:
+        coming = beside.submit(next, tables, None)
+        while (table := coming.result()) is not None:
+            coming = beside.submit(next, tables, None)
+            yield table
 
 
 def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 
 LEFT, TOP, RIGHT, BOTTOM = range(4)
 X, Y, LENGTH, WIDTH, HEIGHT = range(5)
@@ -23,33 +23,47 @@ def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_
     G (3, 3), up (3,); state (5,) x, y of the footprint's middle, length, width, height [m]; e (2,) unit vector ahead.
     Edges are NaN where a corner lies behind the camera.
     """
-    edge[0], edge[1], edge[2], edge[3] = np.inf, np.inf, -np.inf, -np.inf
+    x, y, length, width, height = state[X], state[Y], state[LENGTH], state[WIDTH], state[HEIGHT]
+    u, u_ahead, u_left = _seen(G[0], x, y, e)
+    v, v_ahead, v_left = _seen(G[1], x, y, e)
+    w, w_ahead, w_left = _seen(G[2], x, y, e)
+    if w - abs(w_ahead) * length / 2 - abs(w_left) * width / 2 + min(height * up[2], 0.0) <= 0:
+        edge[:] = np.nan
+        return 0.0
+    left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
+    leftmost = uppermost = rightmost = lowest = 0
     for corner in range(8):
-        a = 0.5 if corner & 1 else -0.5
-        b = 0.5 if corner & 2 else -0.5
-        top = 1.0 if corner & 4 else 0.0
-        qx = state[X] + a * state[LENGTH] * e[0] - b * state[WIDTH] * e[1]
-        qy = state[Y] + a * state[LENGTH] * e[1] + b * state[WIDTH] * e[0]
-        z = top * state[HEIGHT]
-        w = G[2, 0] * qx + G[2, 1] * qy + G[2, 2] + z * up[2]
-        if w <= 0:
-            edge[:] = np.nan
-            return 0.0
-        near = 1 / w
-        for axis in range(2):
-            u = (G[axis, 0] * qx + G[axis, 1] * qy + G[axis, 2] + z * up[axis]) * near
-            for side in (axis, axis + 2):
-                if (side < 2 and u < edge[side]) or (side >= 2 and u > edge[side]):
-                    edge[side] = u
-                    by_state[side, X], by_state[side, LENGTH] = near, a  # until it is known which corner it is
-                    by_state[side, WIDTH], by_state[side, HEIGHT] = b, top
+        a, b, z = _at(corner, length, width, height)
+        near = 1 / (w + a * w_ahead + b * w_left + z * up[2])
+        across = (u + a * u_ahead + b * u_left + z * up[0]) * near
+        down = (v + a * v_ahead + b * v_left + z * up[1]) * near
+        left, leftmost = (across, corner) if across < left else (left, leftmost)
+        top, uppermost = (down, corner) if down < top else (top, uppermost)
+        right, rightmost = (across, corner) if across > right else (right, rightmost)
+        bottom, lowest = (down, corner) if down > bottom else (bottom, lowest)
+    edge[LEFT], edge[TOP], edge[RIGHT], edge[BOTTOM] = left, top, right, bottom
     for side in range(4):
-        axis, u, near = side % 2, edge[side], by_state[side, X]
-        by_x, by_y = (G[axis, 0] - u * G[2, 0]) * near, (G[axis, 1] - u * G[2, 1]) * near
+        corner = (leftmost, uppermost, rightmost, lowest)[side]
+        axis, place = side % 2, edge[side]
+        a, b, z = _at(corner, length, width, height)
+        near = 1 / (w + a * w_ahead + b * w_left + z * up[2])
+        by_x, by_y = (G[axis, 0] - place * G[2, 0]) * near, (G[axis, 1] - place * G[2, 1]) * near
         by_state[side, X], by_state[side, Y] = by_x, by_y
-        by_state[side, LENGTH] *= by_x * e[0] + by_y * e[1]
-        by_state[side, WIDTH] *= by_y * e[0] - by_x * e[1]
-        by_state[side, HEIGHT] *= (up[axis] - u * up[2]) * near
-    left = by_state[LEFT, X] ** 2 + by_state[LEFT, Y] ** 2
-    right = by_state[RIGHT, X] ** 2 + by_state[RIGHT, Y] ** 2
-    return np.sqrt(max(left, right))
+        by_state[side, LENGTH] = ((corner & 1) - 0.5) * (by_x * e[0] + by_y * e[1])
+        by_state[side, WIDTH] = ((corner >> 1 & 1) - 0.5) * (by_y * e[0] - by_x * e[1])
+        by_state[side, HEIGHT] = (corner >> 2) * (up[axis] - place * up[2]) * near
+    of_left = by_state[LEFT, X] ** 2 + by_state[LEFT, Y] ** 2
+    of_right = by_state[RIGHT, X] ** 2 + by_state[RIGHT, Y] ** 2
+    return np.sqrt(max(of_left, of_right))
+
+
+@inlined
+def _seen(row: Floats, x: float, y: float, e: Floats) -> tuple[float, float, float]:
+    """A coordinate of a point of the road, and what a metre along e and to its left adds; `row` (3,) is G's."""
+    return row[0] * x + row[1] * y + row[2], row[0] * e[0] + row[1] * e[1], row[1] * e[0] - row[0] * e[1]
+
+
+@inlined
+def _at(corner: int, length: float, width: float, height: float) -> tuple[float, float, float]:
+    """m; how far a corner, 0 to 7, is ahead, to the left and above the footprint's middle."""
+    return ((corner & 1) - 0.5) * length, ((corner >> 1 & 1) - 0.5) * width, (corner >> 2) * height

@@ -40,6 +40,8 @@ _FAR, _FAR_SHARE = 3.0, 0.2
 """Standard deviations by which an edge is far off; where more than a share are, the track is not of one vehicle."""
 _COARSE = (10.0, 3.0, 1.0, 1.0, 1.0)
 """Factors of the standard deviations in the rounds: what is far off loses its weight only when the path is known."""
+_STILL_M = 0.01
+"""m; once a round moves nothing by more, the next one changes no speed by more than some mm/s"""
 _HEADING_M = 4.0
 """m of path that a heading is taken from"""
 _DRIFT = 0.006
@@ -98,12 +100,16 @@ def fit(
             _eliminate(coupling[:n], right[:n], whole, rest)
             step = np.maximum(np.linalg.solve(whole, rest), _LEAST - size[i])
             size[i] += step
+            moved = np.abs(step).max()
             for k in range(b - a):
                 for axis in range(2):
                     change = right[2 * k + axis, SIZE]
                     for s in range(SIZE):
                         change -= right[2 * k + axis, s] * step[s]
                     path[a + k, axis] += change
+                    moved = max(moved, abs(change))
+            if coarse == 1.0 and moved < _STILL_M:
+                break
         cov[i] = np.linalg.inv(whole)
         quality[i] = max(misfit, _LEAST_MISFIT)
         if strange > _FAR_SHARE:
@@ -144,7 +150,7 @@ def _normal(
     """
     band[:], right[:], whole[:], rest[:] = 0.0, 0.0, 0.0, 0.0
     state, ahead, model, by_state = np.empty(5), np.empty(2), np.empty(4), np.zeros((4, 5))
-    by_size = np.empty(SIZE)
+    by = np.empty(SIZE + 3)  # derivatives of a residual: by x, by y, by the size; then the residual
     total, strange, count = 0.0, 0, 0
     for s in range(SIZE):
         whole[s, s] = 1 / SIGMA[s] ** 2
@@ -152,36 +158,37 @@ def _normal(
     state[2], state[3], state[4] = size[0], size[1], size[2]
     for k in range(len(t)):
         state[0], state[1], ahead[0], ahead[1] = path[k, 0], path[k, 1], heading[k, 0], heading[k, 1]
-        scale, squares = box_edges(G, up, state, ahead, model, by_state), 0.0
+        scale = box_edges(G, up, state, ahead, model, by_state)
+        row, noise = 2 * k, _EDGE_PX**2 + _ROW_PX**2 / rows[k]
         for side in range(4):
             sign = -1.0 if side < 2 else 1.0
             residual = edge[k, side] - model[side] - sign * size[3]
             if np.isnan(residual):
                 continue
-            variance = _EDGE_PX**2 + _ROW_PX**2 / rows[k] + (_SHAPE_M[side] * scale) ** 2
-            variance *= coarse**2
+            variance = (noise + (_SHAPE_M[side] * scale) ** 2) * coarse**2
             far = residual**2 / variance
-            weight = (_FREEDOM + 1) / (_FREEDOM + far) / variance
-            squares += weight * residual**2
+            weight = (_FREEDOM + 1) / ((_FREEDOM + far) * variance)
+            total += weight * residual**2
             strange += far > _FAR**2
             count += 1
-            by_size[0], by_size[1], by_size[2] = by_state[side, 2], by_state[side, 3], by_state[side, 4]
-            by_size[3] = sign
-            x, y = weight * by_state[side, 0], weight * by_state[side, 1]
-            band[2 * k, 0] += x * by_state[side, 0]
-            band[2 * k + 1, 1] += y * by_state[side, 0]
-            band[2 * k + 1, 0] += y * by_state[side, 1]
+            for i in range(5):
+                by[i] = by_state[side, i]
+            by[5], by[6] = sign, residual
+            x, y = weight * by[0], weight * by[1]
+            band[row, 0] += x * by[0]
+            band[row + 1, 1] += y * by[0]
+            band[row + 1, 0] += y * by[1]
+            for s in range(SIZE + 1):
+                right[row, s] += x * by[2 + s]
+                right[row + 1, s] += y * by[2 + s]
             for s in range(SIZE):
-                right[2 * k, s] += x * by_size[s]
-                right[2 * k + 1, s] += y * by_size[s]
-            right[2 * k, SIZE] += x * residual
-            right[2 * k + 1, SIZE] += y * residual
-            for s in range(SIZE):
-                ws = weight * by_size[s]
-                for r in range(SIZE):
-                    whole[s, r] += ws * by_size[r]
-                rest[s] += ws * residual
-        total += squares
+                weighted = weight * by[2 + s]
+                for r in range(s, SIZE):
+                    whole[s, r] += weighted * by[2 + r]
+                rest[s] += weighted * by[6]
+    for s in range(SIZE):
+        for r in range(s):
+            whole[s, r] = whole[r, s]
     c = np.empty(3)
     for k in range(1, len(t) - 1):
         _bending(t, k, c)
@@ -209,15 +216,13 @@ def _factor(band: Floats) -> None:
     Of the diagonal it has the inverses, since all that is done with it is to divide by it.
     """
     for i in range(len(band)):
-        for d in range(min(i, _BAND), -1, -1):
-            j = i - d
+        for d in range(_BAND, -1, -1):
+            if d > i:
+                continue
             value = band[i, d]
-            for m in range(max(i - _BAND, j - _BAND, 0), j):
-                value -= band[i, i - m] * band[j, j - m]
-            if d == 0:
-                band[i, 0] = 1 / np.sqrt(max(value, 1e-12))
-            else:
-                band[i, d] = value * band[j, 0]
+            for m in range(_BAND, d, -1):  # zero where m > i
+                value -= band[i, m] * band[i - d, m - d]
+            band[i, d] = value * band[i - d, 0] if d > 0 else 1 / np.sqrt(max(value, 1e-12))
 
 
 @kernel

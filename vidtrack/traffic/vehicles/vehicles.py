@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.vehicles.classes import Classified, classified
 from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
 from vidtrack.traffic.vehicles.knots import Knots, Knotting
 from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
-from vidtrack.traffic.vehicles.straightness import Paths, Straightness, paths_of, straightness
+from vidtrack.traffic.vehicles.straightness import LOOKED_AT, Paths, Straightness, paths_of, straightness
 
 _BATCH, _AT_ONCE = 1024, 2
 """Tracks that are fitted together, and how many such batches at a time: they bound the memory."""
@@ -68,10 +68,11 @@ class Vehicles:
         def batch(number: int) -> tuple[_Sizes, Paths]:
             begin, asked = number * _BATCH, order[first[number] : first[number + 1]]
             some = knots.between(begin, min(begin + _BATCH, tracks))
-            speeds[:, asked], found, paths = _fitted(ground, some, track[asked] - begin, t[asked])
+            looked = np.arange(begin, begin + _BATCH) % every == 0
+            speeds[:, asked], found, paths = _fitted(ground, some, track[asked] - begin, t[asked], looked)
             return replace(found, track=found.track + begin), paths
 
-        speeds = np.full((3, len(t)), np.nan)
+        speeds, every = np.full((3, len(t)), np.nan), -(-tracks // LOOKED_AT)
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             sizes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
         told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
@@ -95,8 +96,8 @@ class _Sizes:
     speed: Floats
 
 
-def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Floats, _Sizes, Paths]:
-    """(3, W) speeds as in `Speeds`, sizes, and straight paths, of some tracks.
+def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats, looked: Mask) -> tuple[Floats, _Sizes, Paths]:
+    """(3, W) speeds as in `Speeds`, sizes, and the straight paths of those that are `looked` at (T,), of T tracks.
 
     Each time is looked up in the piece that it lies in.
     """
@@ -120,7 +121,7 @@ def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats) -> tuple[Float
     result = np.empty((3, len(t)))
     result[0, order], result[1, order] = speed[:, 0], speed[:, 1]
     result[2, order] = _by_shared(ground, knots.t, path, speed)
-    driven = paths_of(ground, path, first, np.isfinite(misfit))
+    driven = paths_of(ground, path, first, np.isfinite(misfit) & looked[owner])
     return result, _sizes(knots.t, first, owner, path, size, cov, misfit), driven
 
 
