@@ -107,6 +107,12 @@ def test_a_setting_that_another_one_switches_off_is_refused():
     assert load(assignments=["output.link_s=2"], kind=Input.DETECTIONS).output.link_s == 2
 
 
+def test_only_stored_detections_are_smoothed_by_default():
+    assert "output.smooth=true" in refused(Input.VIDEO, "output.smooth_lag_s=2")
+    assert "output.smooth" in refused(Input.DETECTIONS, "output.smooth_lag_s=2", "output.smooth=false")
+    assert load(assignments=["output.smooth_lag_s=2"], kind=Input.DETECTIONS).output.smooth_lag_s == 2
+
+
 def test_a_resolution_cell_is_for_unresolved_targets_or_a_threshold():
     cell, off = "radar.cell_range_m=150", "radar.unresolved=false"
     said = "setting radar.cell_range_m has no effect here; it needs radar.unresolved=true or radar.snr_db=NUMBER"

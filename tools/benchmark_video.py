@@ -137,8 +137,9 @@ def event_rows(clips: Sequence[Clip], rivals: dict[str, Contender], told: Iterab
 
 
 def judge_clip(result: Tracked, clip: Clip) -> Judged:
-    """The counts of a clip, from where its crossings are known."""
-    return judge((count for count in result.counts if count.frame >= clip.first), clip.events)
+    """The counts of a clip, where its crossings are known."""
+    first, last = clip.known
+    return judge((count for count in result.counts if first <= count.frame <= last), clip.events)
 
 
 def told_events(name: str, scored: dict[str, Judged]) -> Iterator[str]:

@@ -36,7 +36,7 @@ CROSSED = {
 }
 """Lines across the clips whose truth is boxes with identities, and the ways that are driven or walked over them."""
 TRAFFIC_FIRST, TRAFFIC_LAST = 900, 1235  # image numbers with truth
-_FIRST = {"highway": score_highway.FIRST - 1, "traffic": TRAFFIC_FIRST - 1}  # frames
+_KNOWN = {"highway": (score_highway.FIRST, score_highway.LAST), "traffic": (TRAFFIC_FIRST, TRAFFIC_LAST)}
 _BY_BOXES = 9.0  # frames; tolerance of a crossing of the true boxes' centres
 
 
@@ -63,7 +63,7 @@ class Clip:
     video   file, or a folder of pictures in%06d.jpg
     lines   counted lines, NAME:x1,y1,x2,y2
     events  crossings of these lines
-    first   frame before which crossings are unknown, and those that are counted are left out
+    known   first and last frame for which crossings are known; those that are counted elsewhere are left out
     truth   MOT file
     fps     to be told where the video has no rate
     judged  the rows of a result that are scored
@@ -74,7 +74,7 @@ class Clip:
     video: Path
     lines: tuple[str, ...] = ()
     events: tuple[Event, ...] = ()
-    first: float = 0.0
+    known: tuple[float, float] = (0.0, np.inf)
     truth: Path | None = None
     fps: float | None = None
     judged: Callable[[Table, Table], Table] = field(default=everything, repr=False)
@@ -109,8 +109,9 @@ def with_crossings(name: str, data: Path) -> Clip:
     assert clip.truth is not None
     label, ends = read_line(line)
     events = (replace(event, tolerance=_BY_BOXES) for event in crossings(clip.truth, {label: ends}))
+    first, last = _KNOWN.get(name, (1.0, np.inf))
     known = tuple(event for event in events if event.direction in ways)
-    return replace(clip, lines=(line,), events=known, first=_FIRST.get(name, 0.0), masked=False)
+    return replace(clip, lines=(line,), events=known, known=(first - 1, last - 1), masked=False)
 
 
 def read_line(text: str) -> tuple[str, NDArray]:

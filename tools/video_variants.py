@@ -231,8 +231,8 @@ def derive(clip: Clip, name: str, folder: Path, variant: Variant | None = None) 
     lines = tuple(_line(text, variant, size) for text in clip.lines)
     events = tuple(_event(event, variant, count, rate) for event in clip.events)
     seen = tuple(event for event in events if event.frame >= -event.tolerance)
-    first = (clip.first - round(variant.start_s * float(rate))) / variant.every
-    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=seen, first=first, fps=None)
+    known = tuple(sorted(_frame(frame, variant, count, rate) for frame in clip.known))
+    return replace(clip, name=f"{clip.name}-{name}", video=path, lines=lines, events=seen, known=known, fps=None)
 
 
 def _stream(video: Path) -> tuple[tuple[int, int], Fraction, float]:
@@ -336,14 +336,21 @@ def _line(text: str, variant: Variant, size: tuple[int, int]) -> str:
 
 
 def _event(event: Event, variant: Variant, count: int, rate: Fraction) -> Event:
-    """The crossing as the variant of a clip of `count` frames has it; its frame is negative before the first."""
+    """The crossing as the variant of a clip of `count` frames has it."""
+    frame = _frame(event.frame, variant, count, rate)
     if variant.backward:
-        return replace(event, frame=count - 1 - event.frame, direction=OTHER_WAY[event.direction])
+        return replace(event, frame=frame, direction=OTHER_WAY[event.direction])
     direction = OTHER_SIDE.get(event.direction, event.direction) if variant.mirror else event.direction
     tolerance = event.tolerance if variant.every == 1 else max(event.tolerance / variant.every, SMALLEST_TOLERANCE)
-    frame = event.frame - round(variant.start_s * float(rate))
-    certain = event.certain and (variant.start_s == 0 or frame >= SETTLE_S * rate)
-    return replace(event, frame=frame / variant.every, direction=direction, tolerance=tolerance, certain=certain)
+    certain = event.certain and (variant.start_s == 0 or frame * variant.every >= SETTLE_S * rate)
+    return replace(event, frame=frame, direction=direction, tolerance=tolerance, certain=certain)
+
+
+def _frame(frame: float, variant: Variant, count: int, rate: Fraction) -> float:
+    """The frame of a variant of a clip of `count` frames that shows the same; it is negative before the first."""
+    if variant.backward:
+        return count - 1 - frame
+    return (frame - round(variant.start_s * float(rate))) / variant.every
 
 
 def _write(

@@ -194,6 +194,16 @@ def test_broken_tracks_of_detections_are_linked_unless_told_otherwise(tmp_path):
     assert len(np.unique(result(path, tmp_path / "c", *short, "output.link_s=0.4")[:, 1])) > 3
 
 
+def test_tracks_of_detections_are_smoothed_unless_told_otherwise(tmp_path):
+    path, rough = traffic(tmp_path / "det.txt"), {}
+    for name, smooth in (("by default", ()), ("asked for", ("true",)), ("refused", ("false",))):
+        assignments = ["source.fps=10", *(f"output.smooth={value}" for value in smooth)]
+        found = result(path, tmp_path / name, *assignments)
+        left = [found[found[:, 1] == track, 2] for track in np.unique(found[:, 1])]
+        rough[name] = np.mean([np.abs(np.diff(side, 2)).mean() for side in left])
+    assert rough["by default"] == rough["asked for"] < 0.5 * rough["refused"]
+
+
 @pytest.mark.skipif("VIDTRACK_DATA" not in os.environ, reason="needs the real data: set VIDTRACK_DATA")
 def test_mot15_sequence():
     path = Path(os.environ["VIDTRACK_DATA"]) / "mot15" / "ADL-Rundle-6" / "det" / "det.txt"

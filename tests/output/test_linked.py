@@ -1,5 +1,7 @@
 """Broken tracks joined: what is one object and what is not, what stands in the gaps, when rows are passed on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic_steps import Kept
@@ -9,6 +11,7 @@ from vidtrack.config.load import load
 from vidtrack.errors import ConfigError
 from vidtrack.output.linked import Linked, _within
 from vidtrack.output.sink import Step
+from vidtrack.output.smoothed import Smoothed
 from vidtrack.run.live.run import LiveRun
 from vidtrack.run.radar import run_plots
 
@@ -21,10 +24,11 @@ def drive(k, x, v, y=100.0, size=(40.0, 20.0)):
     return [x + v * k / FPS - size[0] / 2, y - size[1] / 2, *size]
 
 
-def steps(count, boxes_of, model=MODEL):
+def steps(count, boxes_of, model=MODEL, smooth=False):
     """Steps of a tracker that gives up after 0.3 s, fed with boxes_of(k) and errors of a pixel."""
     rng = np.random.default_rng(3)
-    tracker = vt.Tracker(model, life=vt.LifeCycle(confirm_hits=1, confirm_window=1, coast_s=0.3, coast_scans=None))
+    life = vt.LifeCycle(confirm_hits=1, confirm_window=1, coast_s=0.3, coast_scans=None)
+    tracker = vt.Tracker(model, life=life, smooth=smooth)
     for k in range(count):
         boxes = np.array(boxes_of(k), float).reshape(-1, 4) + np.array([1.0, 1.0, 0, 0]) * rng.normal(size=4)
         scan = vt.box_scan(k / FPS, boxes)
@@ -165,3 +169,26 @@ def test_pairs_in_reach_are_found_without_comparing_all_tracks():
     expected = np.nonzero((gap > 0) & (gap <= 0.4))
     assert np.array_equal([before, after], expected)
     assert np.array_equal(between, gap[expected])
+
+
+def test_a_linked_track_is_smoothed_on_either_side_of_its_gap():
+    """Also where the rows with which the second part began are gone, as those of a track that was tentative for long."""
+    made = list(steps(70, broken(), smooth=True))
+    new = max(ids(made))
+    begin = next(step.index for step in made if new in step.tracks.id)
+    late = [
+        replace(step, tracks=step.tracks.only((step.tracks.id != new) | (step.index >= begin + 3))) for step in made
+    ]
+    kept = Kept()
+    sink = Linked(Smoothed(kept), motion=MODEL, longest_s=3.0)
+    for step in late:
+        sink.step(step)
+    sink.close()
+
+    assert ids(kept.steps).tolist() == [1, 2]
+    variance = np.concatenate([np.diagonal(step.tracks.P, axis1=1, axis2=2) for step in kept.steps])
+    assert (variance > 0).all()
+    last = made[24].tracks
+    np.testing.assert_array_equal(kept.steps[24].tracks.x[0], last.x[last.id == 1][0])
+    first, before = kept.steps[begin + 3].tracks, made[begin + 3].tracks
+    assert np.trace(first.P[0]) < np.trace(before.P[before.id == new][0])

@@ -61,7 +61,7 @@ Examples:
 @seed_option
 @settings_options
 @association_options
-@smooth_option
+@smooth_option("no-smooth")
 @click.option(
     "--radars",
     type=click.Path(path_type=Path),

@@ -32,7 +32,7 @@ Examples:
 @common("Folder for the results.  [default: runs/NAME]")
 @settings_options
 @picture_options
-@smooth_option
+@smooth_option("of stored detections")
 @click.option(
     "--link/--no-link",
     default=None,

@@ -130,11 +130,10 @@ def picture_options(function: Function) -> Function:
     return association_options(function)
 
 
-def smooth_option(function: Function) -> Function:
-    """--smooth, for files."""
-    return click.option(
-        "--smooth", is_flag=True, default=None, help="Let each row know what came after it; rows appear later."
-    )(function)
+def smooth_option(default: str) -> Callable[[Function], Function]:
+    """--smooth, for files; `default` says when it is so by itself."""
+    text = f"Let each row know what came after it; rows appear later.  [default: {default}]"
+    return click.option("--smooth/--no-smooth", default=None, help=text)
 
 
 def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") -> None:

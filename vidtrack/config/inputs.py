@@ -107,7 +107,6 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "live.keep_pictures_s": ("events.pictures", (True,)),
     "live.keep_pictures_bytes": ("events.pictures", (True,)),
     "output.every_s": ("output.level", ("tracks", "all")),
-    "output.smooth_lag_s": ("output.smooth", (True,)),
 }
 """Groups and settings that have an effect only if another setting has one of these values."""
 
@@ -121,6 +120,8 @@ _REPLACED: Mapping[str, tuple[str, ...]] = {
     "radar.group_link_m": tuple(f"radar.{name}" for name in ("unresolved", *_CELL)),
 }
 """Settings without effect if this one is given."""
+_WHERE_STORED = {"output.link_s": "output.link", "output.smooth_lag_s": "output.smooth"}
+"""Settings without effect unless this one is set; stored detections have it by default"""
 _OTHER_LIFE = {Input.RADAR: "radar.life"}
 
 
@@ -131,8 +132,8 @@ def reads(kind: Input, name: str) -> bool:
 
 def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Settings on which the effect of this one depends, each with its required values."""
-    if name == "output.link_s":  # stored detections are linked by default
-        yield "output.link", (True, None) if kind is Input.DETECTIONS else (True,)
+    if name in _WHERE_STORED:
+        yield _WHERE_STORED[name], (True, None) if kind is Input.DETECTIONS else (True,)
     for other, idle in _REPLACED.items():
         if name in idle:
             yield other, (None,)

@@ -137,8 +137,8 @@ class OutputSettings(Group):
     """how much is written: counts, also tracks (tracks.parquet alone), or all (also CSV, MOT and picture)"""
     every_s: float = Field(0.0, ge=0)
     """s; least time between two frames in the files of tracks, so that they are smaller; 0: every frame"""
-    smooth: bool = False
-    """tracks are smoothed: each row uses the measurements after it too; not in live runs"""
+    smooth: bool | None = None
+    """tracks are smoothed: each row uses the measurements after it too; not in live runs; None: stored detections"""
     smooth_lag_s: float | None = Field(None, gt=0)
     """s; smoothing lag: rows are written after one to two times this; None: smoothed over all, written at the end"""
     link: bool | None = None

@@ -173,7 +173,7 @@ class Ends:
 
     def joined(self, steps: list[Step], before: Ints, after: Ints) -> list[Step]:
         """The steps with rows `after` (L,) under the ids of rows `before` (L,), and with rows added in the gaps."""
-        name, begins, ends = self.id.copy(), np.zeros(len(self.id), np.int64), np.full(len(self.id), len(steps))
+        name, begins, ends = self.id.copy(), np.full(len(self.id), -1), np.full(len(self.id), len(steps))
         begins[after], ends[before] = self.first[after], self.last[before]
         bridges: dict[int, list[Tracks]] = {}
         for k in np.argsort(self.first[after], kind="stable"):
@@ -189,7 +189,10 @@ class Ends:
             rows = np.searchsorted(self.id, tracks.id).clip(max=len(self.id) - 1)
             known = self.id[rows] == tracks.id
             stays = ~known | ((begins[rows] <= k) & (k <= ends[rows]))
-            tracks = replace(tracks, id=np.where(known, name[rows], tracks.id)).only(stays)
+            prior_x = tracks.prior_x
+            if prior_x is not None:  # the smoother does not go back over a gap
+                prior_x = np.where((known & (begins[rows] == k))[:, None], np.nan, prior_x)
+            tracks = replace(tracks, id=np.where(known, name[rows], tracks.id), prior_x=prior_x).only(stays)
             done.append(replace(step, tracks=_together(tracks, bridges.get(k, []))))
         return done
 
@@ -205,6 +208,7 @@ class Ends:
             row, t=t, status=np.array([COASTING], np.int8), x=x, P=(P + np.swapaxes(P, 1, 2)) / 2,
             box=absolute(box, x[:, list(self.motion.position)]), age_s=row.age_s + ahead,
             measurement=np.array([-1]), nis=np.array([np.nan]),
+            prior_x=None if row.prior_x is None else np.full_like(row.prior_x, np.nan),
         )  # fmt: skip
 
 
@@ -236,8 +240,9 @@ COLUMNS = (
 def _together(tracks: Tracks, more: list[Tracks]) -> Tracks:
     """The tracks and the rows of others, sorted by id."""
     if more:
+        names = COLUMNS if tracks.prior_x is None else (*COLUMNS, "prior_x", "prior_P", "gain")
         columns: dict[str, Any] = {
-            name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in COLUMNS
+            name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in names
         }
-        tracks = replace(tracks, **columns, choices=None, prior_x=None, prior_P=None, gain=None)
+        tracks = replace(tracks, **columns, choices=None)
     return tracks.only(np.argsort(tracks.id, kind="stable"))

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from vidtrack.config.settings import OutputSettings
 from vidtrack.estimate.smoother import smoothed
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.threaded import close_together
@@ -54,11 +53,6 @@ class Smoothed:
             step = replace(self._waiting.popleft(), tracks=tracks)
             for sink in self._sinks:
                 sink.step(step)
-
-
-def smoothed_first(settings: OutputSettings, *sinks: Sink) -> tuple[Sink, ...]:
-    """The sinks, behind a smoother if output.smooth is set."""
-    return (Smoothed(*sinks, lag_s=settings.smooth_lag_s),) if settings.smooth else sinks
 
 
 def smoothed_by(tracks: Tracks, later: Tracks) -> Tracks:

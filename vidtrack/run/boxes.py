@@ -21,13 +21,14 @@ def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipe
     """The pipeline of a MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
     boxes = open_detections(path, settings)
     refuse_overwriting(boxes.place, extras.masks, extras.video)
+    smooth = settings.output.smooth is not False
     tracker = build_box_tracker(
         settings.tracker,
         boxes.settings,
         (boxes.width, boxes.height),
         pace=boxes.pace,
         explain=extras.explain,
-        smooth=settings.output.smooth,
+        smooth=smooth,
     )
     subject = file_subject(extras.source or path, boxes, tracker.rates.as_dict, settings, scene=None)
     link_s = None if settings.output.link is False else settings.output.link_s * boxes.pace
@@ -37,5 +38,5 @@ def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipe
         count=boxes.frames,
         steps=scan_steps(((index, scan) for index, _, scan in boxes), tracker, settings.tracker.redundant),
         summary=subject.summary,
-        sinks=partial(file_sinks, subject, extras, motion=tracker.model, link_s=link_s, hold_s=HOLD_S),
+        sinks=partial(file_sinks, subject, extras, motion=tracker.model, smooth=smooth, link_s=link_s, hold_s=HOLD_S),
     )

@@ -155,7 +155,7 @@ def build_road_tracker(
         picture=NoPicture(),
         stations=stations,
         explain=explain,
-        smooth=settings.output.smooth,
+        smooth=bool(settings.output.smooth),
     )
 
 

@@ -18,7 +18,7 @@ from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.sink import Sink
 from vidtrack.output.site_copy import SiteCopy
-from vidtrack.output.smoothed import smoothed_first
+from vidtrack.output.smoothed import Smoothed
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.thinned import Thinned
@@ -124,11 +124,19 @@ def file_subject(
 
 
 def file_sinks(
-    subject: Subject, extras: Extras, folder: Path, *, motion: Motion, link_s: float | None, hold_s: float
+    subject: Subject,
+    extras: Extras,
+    folder: Path,
+    *,
+    motion: Motion,
+    smooth: bool,
+    link_s: float | None,
+    hold_s: float,
 ) -> Iterator[Sink]:
     """The sinks of a run over a file.
 
     motion  the tracker's motion model, for links
+    smooth  the tracker keeps what the smoother needs, and tables are smoothed, each track as far as it is not broken
     link_s  longest gap over which broken tracks are joined [s]; None: they are not joined
     hold_s  longest time that rows wait for the confirmation of their track [s]
     """
@@ -140,10 +148,12 @@ def file_sinks(
     tables = _tables(subject, folder)
     if tables and output.every_s:
         tables = (Thinned(*tables, every_s=output.every_s),)
+    if tables and smooth:
+        tables = (Smoothed(*tables, lag_s=output.smooth_lag_s),)
     if tables and link_s is not None:
         tables = (Linked(*tables, motion=motion, longest_s=link_s),)
     if tables:
-        yield Confirmed(*smoothed_first(output, *tables), hold_s=hold_s)
+        yield Confirmed(*tables, hold_s=hold_s)
     if extras.decisions:
         yield DecisionLog(folder / "decisions.csv")
     for _, sink in picture_sinks(subject, extras):

@@ -106,8 +106,9 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         frame_by_frame(settings.detector.kind),
     ):
         refuse_overwriting(source.place, extras.masks, extras.video)
+        smooth = bool(settings.output.smooth)
         tracker = build_blob_tracker(
-            settings.tracker, (source.width, source.height), explain=extras.explain, smooth=settings.output.smooth
+            settings.tracker, (source.width, source.height), explain=extras.explain, smooth=smooth
         )
         detector = build_detector(settings)
         if isinstance(source, Recording):
@@ -123,7 +124,9 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
             count=source.frames,
             steps=video_steps(source, detector, tracker, settings),
             summary=subject.summary,
-            sinks=partial(file_sinks, subject, extras, motion=tracker.model, link_s=link_s, hold_s=hold_s),
+            sinks=partial(
+                file_sinks, subject, extras, motion=tracker.model, smooth=smooth, link_s=link_s, hold_s=hold_s
+            ),
         )
 
 

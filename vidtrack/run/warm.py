@@ -38,7 +38,7 @@ def warm() -> None:
     """
     settings = Settings()
     masks = [_drawn(np.zeros((_HEIGHT, _WIDTH), np.uint8), k, 255) for k in range(_PICTURES)]
-    tracker = build_blob_tracker(settings.tracker, (_WIDTH, _HEIGHT), smooth=settings.output.smooth)
+    tracker = build_blob_tracker(settings.tracker, (_WIDTH, _HEIGHT), smooth=bool(settings.output.smooth))
     for k, mask in enumerate(masks):
         tracker.predict(k / _FPS)
         tracker.step(_labelled(mask, settings).scan(k / _FPS))

@@ -73,7 +73,7 @@ def stitched_pipeline(
         steps=_counted(stitched(slices), source.stats),
         summary=subject.summary,
         sinks=partial(
-            file_sinks, subject, Extras(), motion=motion, hold_s=HOLD_S,
+            file_sinks, subject, Extras(), motion=motion, hold_s=HOLD_S, smooth=bool(settings.output.smooth),
             link_s=settings.output.link_s if settings.output.link else None,
         ),
     )  # fmt: skip

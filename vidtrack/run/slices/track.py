@@ -51,7 +51,7 @@ def track_slice(
     with source, frame_by_frame(settings.detector.kind):
         detector = build_detector(settings)
         size = source.width, source.height
-        tracker = build_blob_tracker(settings.tracker, size, smooth=settings.output.smooth)
+        tracker = build_blob_tracker(settings.tracker, size, smooth=bool(settings.output.smooth))
         both = _Both(detector, tracker)
         if before is None:
             look_ahead(source, detector, settings)
