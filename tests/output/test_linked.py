@@ -172,7 +172,7 @@ def test_pairs_in_reach_are_found_without_comparing_all_tracks():
 
 
 def test_a_linked_track_is_smoothed_on_either_side_of_its_gap():
-    """Also where the rows with which the second part began are gone, as those of a track that was tentative for long."""
+    """Also where the rows with which the second part began are gone, as those of a track that was long tentative."""
     made = list(steps(70, broken(), smooth=True))
     new = max(ids(made))
     begin = next(step.index for step in made if new in step.tracks.id)
