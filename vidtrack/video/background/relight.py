@@ -120,8 +120,5 @@ def _is_scene(picture: Picture, scene: Scene, y: int, x: int, r: np.float32, bla
     if len(picture.cb) > 0:
         off, tint = chroma(picture, scene, y // 2, x // 2, r)
     light = r * (scene.luma[y, x] - black)
-    return (
-        r > _LEAST
-        and off < CHROMA + HARD.chroma_share * r * tint
-        and missed < HARD.texture + HARD.texture_share * light
-    )
+    coloured_alike = off < CHROMA + HARD.chroma_share * r * tint
+    return bool(r > _LEAST and coloured_alike and missed < HARD.texture + HARD.texture_share * light)
