@@ -109,8 +109,15 @@ def test_a_setting_that_another_one_switches_off_is_refused():
 
 def test_only_stored_detections_are_smoothed_by_default():
     assert "output.smooth=true" in refused(Input.VIDEO, "output.smooth_lag_s=2")
-    assert "output.smooth" in refused(Input.DETECTIONS, "output.smooth_lag_s=2", "output.smooth=false")
-    assert load(assignments=["output.smooth_lag_s=2"], kind=Input.DETECTIONS).output.smooth_lag_s == 2
+    unlinked = ("output.smooth_lag_s=2", "output.link=false")
+    assert "output.smooth" in refused(Input.DETECTIONS, *unlinked, "output.smooth=false")
+    assert load(assignments=unlinked, kind=Input.DETECTIONS).output.smooth_lag_s == 2
+    assert "output.link=false" in refused(Input.DETECTIONS, "output.smooth_lag_s=2")
+    assert "output.link=false" in refused(
+        Input.VIDEO, "output.smooth=true", "output.smooth_lag_s=2", "output.link=true"
+    )
+    assert "output.smooth has no effect on a camera" in refused(Input.CAMERA, "output.smooth=true")
+    assert "output.level" in refused(Input.DETECTIONS, "output.smooth=true", "output.level=counts")
 
 
 def test_a_resolution_cell_is_for_unresolved_targets_or_a_threshold():

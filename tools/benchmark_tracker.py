@@ -10,8 +10,8 @@ Peers (their settings: peers/track.py) run in environments that pip makes in DIR
 detections are made beforehand in the form that each tracker wants. Round k uses seed k, all trackers take
 turns in it: times are medians of the rounds' median frames, ratios medians of the rounds' ratios, MOTA is
 the mean and switches are the sum over rounds. A tracker is scored by the boxes that its established tracks
-took, at IoU 0.5; "in the file" is what `vidtrack track` writes, in which a track that is confirmed has its first
-boxes, too. Ratios are to ours. The last rows show how our step grows up to 10,000 objects.
+took, at IoU 0.5; "with first boxes" counts those before its confirmation, too, as a file of `vidtrack track`
+has them. Ratios are to ours. The last rows show how our step grows up to 10,000 objects.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ ENVIRONMENT = {
     "norfair-iou": "numpy1",
     "norfair-euclidean": "numpy1",
 }
-OURS, WRITTEN = "vidtrack", "in the file"
+OURS, WRITTEN = "vidtrack", "with first boxes"
 
 
 @dataclass(frozen=True)

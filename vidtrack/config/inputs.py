@@ -32,7 +32,10 @@ _OF_PICTURES = (
 )
 _UNREAD = {
     Input.VIDEO: ("detections", "radar", "live", "events", "tracker.redundant"),
-    Input.CAMERA: ("detections", "radar", "tracker.redundant", "detector.disturbance.preview_s"),
+    Input.CAMERA: (
+        *("detections", "radar", "tracker.redundant", "detector.disturbance.preview_s"),
+        *("output.smooth", "output.smooth_lag_s"),
+    ),
     Input.DETECTIONS: (
         *("detector", "blobs", "radar", "live", "events"),
         *_OF_PICTURES,
@@ -106,7 +109,10 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "radar.group_merge_m": ("radar.group_link_m", (GIVEN,)),
     "live.keep_pictures_s": ("events.pictures", (True,)),
     "live.keep_pictures_bytes": ("events.pictures", (True,)),
-    "output.every_s": ("output.level", ("tracks", "all")),
+    **dict.fromkeys(
+        ("output.every_s", "output.smooth", "output.smooth_lag_s", "output.link", "output.link_s"),
+        ("output.level", ("tracks", "all")),
+    ),
 }
 """Groups and settings that have an effect only if another setting has one of these values."""
 
@@ -134,6 +140,8 @@ def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Settings on which the effect of this one depends, each with its required values."""
     if name in _WHERE_STORED:
         yield _WHERE_STORED[name], (True, None) if kind is Input.DETECTIONS else (True,)
+    if name == "output.smooth_lag_s" and kind is not Input.RADAR:  # a link waits for the end
+        yield "output.link", (False,) if kind is Input.DETECTIONS else (False, None)
     for other, idle in _REPLACED.items():
         if name in idle:
             yield other, (None,)

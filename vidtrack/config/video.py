@@ -29,8 +29,6 @@ class DisturbanceSettings(Group):
     """shadow inside a vehicle counts as vehicle, such as dark paint; soft shadow then widens boxes"""
     dark: bool = True
     """what passes for shadow, but has edges inside that the scene does not have, is a dark vehicle"""
-    relight: bool = True
-    """a large region that shows the scene in more light, as when a cloud moves on, becomes scene at once"""
     veil: bool = True
     """what haze or glare adds to black is learnt at each place, from the darkest parts of vehicles there"""
     beams: bool = True

@@ -21,7 +21,7 @@ def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipe
     """The pipeline of a MOT file of detections. Raises SourceError, FormatError, ConfigError, OutputError."""
     boxes = open_detections(path, settings)
     refuse_overwriting(boxes.place, extras.masks, extras.video)
-    smooth = settings.output.smooth is not False
+    smooth = settings.output.smooth is not False and settings.output.level != "counts"
     tracker = build_box_tracker(
         settings.tracker,
         boxes.settings,

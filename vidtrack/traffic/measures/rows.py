@@ -22,7 +22,7 @@ from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
 from vidtrack.traffic.measures.runs import Day, Recording
 
 BLOCK = 1 << 16
-"""Rows that are in memory at a time: 25 columns of 0.5 MB. Larger blocks are not faster and take more memory."""
+"""Rows that are worked on at a time, while the next are read: 25 columns of 0.5 MB. Larger blocks are not faster."""
 _PICTURE = ("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "width_px", "height_px")
 _ALWAYS = ("time_s", "track_id", "status")
 _ROAD = (

@@ -23,8 +23,8 @@ _ROAD, _LEAST_PATHS, _MOST_ROADS = np.radians(6.0), 10, 4
 """rad to either side; paths of one road differ by less. How many make a road"""
 _MOST_PATHS = 600
 """More than that say nothing new."""
-LOOKED_AT = 20 * _MOST_PATHS
-"""Tracks of a day among which these are looked for, evenly spread: one in twenty drives straight on, or more."""
+LOOKED_AT = 40 * _MOST_PATHS
+"""Tracks of a day among which these are looked for, evenly spread: all, or at least half as many as this"""
 _WANDER_M = 0.15
 """m; standard deviation of where vehicles drive within their lane, at each end of a path and in its middle"""
 _LANES, _LENS_PX = np.radians(0.25), 3.0

@@ -97,7 +97,7 @@ class _Sizes:
 
 
 def _fitted(ground: Ground, knots: Knots, track: Ints, t: Floats, looked: Mask) -> tuple[Floats, _Sizes, Paths]:
-    """(3, W) speeds as in `Speeds`, sizes, and the straight paths of those that are `looked` at (T,), of T tracks.
+    """(3, W) speeds as in `Speeds`, sizes, and the straight paths of those that are `looked` at, of some tracks.
 
     Each time is looked up in the piece that it lies in.
     """

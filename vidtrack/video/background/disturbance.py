@@ -20,7 +20,6 @@ from vidtrack.video.background.exposure import follow_gain, follow_tint
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.relight import Relight
 from vidtrack.video.background.scene import Levels, Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import SOFT, Sunlight, find_dark, mark_shadow, reclaim
 from vidtrack.video.background.veil import VeilByPlace
@@ -57,14 +56,10 @@ class Disturbance:
         "_veil",
         "_sunlight",
         "_veil_by_place",
-        "_relight",
         "_coloured",
         "_dark",
     )
-    ADDED: ClassVar = {
-        "_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black)),
-        "_relight": lambda found: Relight(),
-    }
+    ADDED: ClassVar = {"_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black))}
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
@@ -78,7 +73,6 @@ class Disturbance:
         self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
         self._sunlight = Sunlight()
         self._veil_by_place = VeilByPlace()
-        self._relight = Relight()
         self._coloured, self._dark = True, False
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
@@ -257,8 +251,6 @@ class Disturbance:
         if s.shadow and s.dark:
             sunlit = self._sunlight.tolerance is not SOFT and not self._dark  # lamps cast hard shadows, too
             find_dark(told, scene, black_here, sunlit, hit)
-        if s.relight:
-            self._relight.follow(seen, scene, self._black_by_place(picture), hit, weak, dt)
         return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

@@ -12,12 +12,13 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
-from vidtrack.video.background.structure import CHROMA, SEEN, STRUCTURE, chroma, texture
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs
 
 _LIGHTEST = np.float32(0.97)  # share of the scene's light
 _GREY_SHARE = np.float32(0.05)  # share of the scene's light in place of `texture_share` where there is no colour
+_CHROMA = np.float32(4)  # grey levels by which each chroma plane may miss the factor
+_REACH = 1  # px to either side over which luminance differences are taken; farther, they reach out of small shadows
 _LEFT, _ABOVE, _RIGHT, _BELOW = np.uint8(1), np.uint8(2), np.uint8(4), np.uint8(8)
 _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
@@ -28,8 +29,11 @@ _SOFT_PX = 3  # px
 _OWN = 0.05  # share of the pixels inside a shadow with edges of their own, from which it is a dark vehicle
 _FEW = 10.0  # px; fewer are no body
 _EDGE, _EDGE_NOISE = np.float32(4), np.float32(4)  # luminance differences of an edge: grey levels, and times the noise
+_NEUTRAL = np.float32(128)  # chroma of grey
 _BINS = 20  # of the share of light that is left, from 0 to 1
 _HARDEST, _MILDEST = 5, 13  # the bins that the sun's shadows are in: there is always light of the sky
+_STRUCTURE = np.float32(6)  # luminance differences that a shadow leaves and a body hides; fewer tell nothing
+_SEEN = np.float32(0.5)  # share of the structure by which it may be missed
 _FORGET_S = 60.0  # time constant with which it is forgotten how dark the shadows were
 _LEAST = 2e-3  # share of the picture, times seconds, of darkened structure before it tells of the light
 _PEAK = 0.07  # least share of the darkened structure that is seen in two neighbouring bins, in sunlight
@@ -40,7 +44,7 @@ class Tolerance(NamedTuple):
     """Limits of the shadow test.
 
     darkest        least share of the scene's light
-    chroma_share   share of the scene's colour by which the chroma planes may miss the factor, beside CHROMA
+    chroma_share   share of the scene's colour by which the chroma planes may miss the factor, beside _CHROMA
     texture        grey levels by which luminance differences may miss the factor: soft edges
     texture_share  the same as a share of the scene's light
     """
@@ -52,7 +56,7 @@ class Tolerance(NamedTuple):
 
 
 SOFT = Tolerance(np.float32(0.5), np.float32(0), np.float32(2), np.float32(0.22))
-HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3))
+_HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3))
 
 
 class Sunlight:
@@ -82,7 +86,7 @@ class Sunlight:
             return SOFT
         while least > 0 and shadow[least - 1] > _TAIL * peak:
             least -= 1
-        return HARD._replace(darkest=min(HARD.darkest, np.float32((least + _HARDEST) / _BINS)))
+        return _HARD._replace(darkest=min(_HARD.darkest, np.float32((least + _HARDEST) / _BINS)))
 
 
 @kernel
@@ -107,21 +111,41 @@ def mark_shadow(picture: Picture, scene: Scene, black: Levels, tolerance: Tolera
             r = (np.float32(picture.luma[y, x]) - black[y, x]) / light
             if not r < _LIGHTEST:
                 continue
-            missed, structure = texture(picture.luma, scene.luma, y, x, r)
-            darkened += structure > STRUCTURE
+            missed, structure = _texture(picture.luma, scene.luma, y, x, r)
+            darkened += structure > _STRUCTURE
             if r * _BINS < _HARDEST:
                 continue
-            off, colour = chroma(picture, scene, y // 2, x // 2, r) if coloured else (np.float32(0), np.float32(0))
-            if structure > STRUCTURE and missed < SEEN * structure and off < CHROMA:
+            off, colour = _colour(picture, scene, y // 2, x // 2, r) if coloured else (np.float32(0), np.float32(0))
+            if structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA:
                 count[int(r * _BINS)] += 1
             if (
                 r >= tolerance.darkest
-                and off < CHROMA + tolerance.chroma_share * colour
+                and off < _CHROMA + tolerance.chroma_share * colour
                 and missed < tolerance.texture + share * light
             ):
                 hit[y, x] = SHADOW
     count[_BINS] = darkened
     return count
+
+
+@inlined
+def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
+    """Deviation [grey levels] of the colour from the scene's colour times r, and the scene's colour."""
+    blue, red = scene.cb[y, x] - _NEUTRAL, scene.cr[y, x] - _NEUTRAL
+    off_blue = np.float32(picture.cb[y, x]) - _NEUTRAL - r * blue
+    off_red = np.float32(picture.cr[y, x]) - _NEUTRAL - r * red
+    return max(abs(off_blue), abs(off_red)), max(abs(blue), abs(red))
+
+
+@inlined
+def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
+    """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
+    h, w = luma.shape
+    up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
+    across, along = r * (scene[y, right] - scene[y, left]), r * (scene[down, x] - scene[up, x])
+    off_across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - across
+    off_along = np.float32(luma[down, x]) - np.float32(luma[up, x]) - along
+    return abs(off_across) + abs(off_along), abs(across) + abs(along)
 
 
 @kernel
@@ -207,8 +231,8 @@ def _is_inside(hit: Image, y: int, x: int) -> bool:
 def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -> bool:
     """Whether there is an edge that is neither the scene's nor noise."""
     r = (np.float32(luma[y, x]) - black) / (scene.luma[y, x] - black)
-    missed, structure = texture(luma, scene.luma, y, x, r)
-    return missed > _EDGE + _EDGE_NOISE * scene.noise[y, x] + SEEN * structure
+    missed, structure = _texture(luma, scene.luma, y, x, r)
+    return missed > _EDGE + _EDGE_NOISE * scene.noise[y, x] + _SEEN * structure
 
 
 @inlined
