@@ -140,7 +140,7 @@ class OutputSettings(Group):
     smooth: bool | None = None
     """tracks are smoothed: each row uses the measurements after it too; not in live runs; None: stored detections"""
     smooth_lag_s: float | None = Field(None, gt=0)
-    """s; smoothing lag, without links: rows are written after one to two times this; None: over all, written at the end"""
+    """s; smoothing lag, without links: rows appear after one to two times this; None: over all, written at the end"""
     link: bool | None = None
     """broken tracks are joined and gaps filled, at the end; not in live and radar runs; None: for stored detections"""
     link_s: float = Field(3.0, gt=0)
