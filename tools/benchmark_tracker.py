@@ -50,7 +50,7 @@ ENVIRONMENT = {
     "norfair-iou": "numpy1",
     "norfair-euclidean": "numpy1",
 }
-OURS, WRITTEN = "vidtrack", "with first boxes"
+OURS, WITH_FIRST = "vidtrack", "with first boxes"
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def run_ours(data: Traffic) -> dict[str, Outcome]:
         detection = detections_of(scan, data.frames[frame])[tracks.measurement[took]]
         rows.append((np.full(took.sum(), frame), tracks.id[took], detection, tracks.status[took] != Status.TENTATIVE))
     frames, ids, detections, established = (np.concatenate(column) for column in zip(*rows, strict=True))
-    chosen = {OURS: established, WRITTEN: np.isin(ids, ids[established])}
+    chosen = {OURS: established, WITH_FIRST: np.isin(ids, ids[established])}
     return {name: Outcome(seconds, frames[some], ids[some], detections[some]) for name, some in chosen.items()}
 
 

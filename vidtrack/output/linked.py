@@ -18,6 +18,7 @@ from vidtrack.estimate.motion.model import Motion
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.threaded import close_together
 from vidtrack.tracking.boxes import absolute, longer
+from vidtrack.tracking.register import Register
 from vidtrack.tracks import COASTING, Tracks
 
 PROBABILITY = 0.999
@@ -240,7 +241,7 @@ COLUMNS = (
 def _together(tracks: Tracks, more: list[Tracks]) -> Tracks:
     """The tracks and the rows of others, sorted by id."""
     if more:
-        names = COLUMNS if tracks.prior_x is None else (*COLUMNS, "prior_x", "prior_P", "gain")
+        names = COLUMNS if tracks.prior_x is None else (*COLUMNS, *Register.LINKS)
         columns: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in (tracks, *more)]) for name in names
         }

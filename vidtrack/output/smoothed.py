@@ -55,6 +55,11 @@ class Smoothed:
                 sink.step(step)
 
 
+def smoothed_first(smooth: bool | None, lag_s: float | None, *sinks: Sink) -> tuple[Sink, ...]:
+    """The sinks, behind a smoother with this lag if tracks are smoothed."""
+    return (Smoothed(*sinks, lag_s=lag_s),) if smooth else sinks
+
+
 def smoothed_by(tracks: Tracks, later: Tracks) -> Tracks:
     """Tracks smoothed by the smoothed snapshot after them; boxes move with the positions."""
     assert later.prior_x is not None

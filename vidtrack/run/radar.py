@@ -23,7 +23,7 @@ from vidtrack.output.linked import refuse_link
 from vidtrack.output.radar_page import RadarPage
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.sink import Sink
-from vidtrack.output.smoothed import Smoothed
+from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import RADAR, RADAR_3D, TrackTable
 from vidtrack.output.threaded import Threaded
@@ -106,13 +106,10 @@ def radar_sinks(
 
     now  returns the tracker of one radar, once there is one
     """
-    tables: tuple[Sink, ...] = (
-        TrackTable(folder, RADAR if dim == 2 else RADAR_3D),
-        RadarPlot(folder / "tracks.png", radars),
-        RadarPage(folder / "radar.html", radars, lambda: _clutter_map(now())),
-    )
-    if settings.output.smooth:
-        tables = (Smoothed(*tables, lag_s=settings.output.smooth_lag_s),)
+    table = TrackTable(folder, RADAR if dim == 2 else RADAR_3D)
+    plot = RadarPlot(folder / "tracks.png", radars)
+    page = RadarPage(folder / "radar.html", radars, lambda: _clutter_map(now()))
+    tables = smoothed_first(settings.output.smooth, settings.output.smooth_lag_s, table, plot, page)
     yield Confirmed(*tables, hold_s=math.inf)  # scans may be far apart
     if settings.radar.group_link_m is not None:
         yield GroupTable(folder / "groups.csv", lambda: _sizes(now()))

@@ -18,7 +18,7 @@ from vidtrack.output.mot import MotFile
 from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.sink import Sink
 from vidtrack.output.site_copy import SiteCopy
-from vidtrack.output.smoothed import Smoothed
+from vidtrack.output.smoothed import smoothed_first
 from vidtrack.output.summary import Summary
 from vidtrack.output.tables import TrackTable
 from vidtrack.output.thinned import Thinned
@@ -148,8 +148,8 @@ def file_sinks(
     tables = _tables(subject, folder)
     if tables and output.every_s:
         tables = (Thinned(*tables, every_s=output.every_s),)
-    if tables and smooth:
-        tables = (Smoothed(*tables, lag_s=output.smooth_lag_s),)
+    if tables:
+        tables = smoothed_first(smooth, output.smooth_lag_s, *tables)
     if tables and link_s is not None:
         tables = (Linked(*tables, motion=motion, longest_s=link_s),)
     if tables:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, fields
 from os import SEEK_END
 from pathlib import Path
@@ -20,6 +20,7 @@ from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
 from vidtrack.traffic.measures.runs import Day, Recording
+from vidtrack.video.readahead import ReadAhead
 
 BLOCK = 1 << 16
 """Rows that are worked on at a time, while the next are read: 25 columns of 0.5 MB. Larger blocks are not faster."""
@@ -131,8 +132,9 @@ class Reader:
             wanted, road = _needed(recording.folder, ground), None
             if ground is not None and "x_m" not in wanted:
                 road = roads.setdefault(recording.session, Footprints(ground, recording.size))
-            for table in _ahead(blocks(recording.folder, wanted)):
-                yield self._rows(table, recording, ground, road)
+            with closing(ReadAhead(blocks(recording.folder, wanted), depth=1)) as tables:
+                for table in tables:
+                    yield self._rows(table, recording, ground, road)
 
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
         column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
@@ -320,15 +322,6 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
         raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
     if waiting:
         yield pa.Table.from_batches(waiting)
-
-
-def _ahead(tables: Iterator[pa.Table]) -> Iterator[pa.Table]:
-    """The same, each read while the one before is worked on."""
-    with ThreadPoolExecutor(1) as beside:
-        coming = beside.submit(next, tables, None)
-        while (table := coming.result()) is not None:
-            coming = beside.submit(next, tables, None)
-            yield table
 
 
 def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
