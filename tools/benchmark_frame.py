@@ -1,13 +1,15 @@
 """Where the processor's time of one frame goes, beside decoding and beside MOG2 with components.
 
     python tools/benchmark_frame.py CLIP ... [--rounds 3]
+    python tools/benchmark_frame.py CLIP ... --over detector.disturbance.registration=false
 
 Each round runs on each clip, one after the other: decoding alone; a whole run into a folder, as `vidtrack track CLIP`
 makes it; the same stages without results, each on a clock of its own; and OpenCV's MOG2 with connected components, in
 one thread, on the same pictures. All times are processor time in ms a frame, user and system, of all threads for
 decoding, run and MOG2, and of the main thread for the stages: other processes on the machine do not count, apart from
 the caches that they share. Medians of the rounds. `beyond` is the run less decoding, `ratio` the duration of the run,
-with all cores, over that of decoding in one thread; other processes count there.
+with all cores, over that of decoding in one thread; other processes count there. `over` is the time of the detector
+over that with the settings of `--over`, of the same round.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ import av
 import cv2
 import numpy as np
 
+from vidtrack.config.load import load
 from vidtrack.config.settings import Settings
 from vidtrack.run.files import run_file
 from vidtrack.run.trackers import build_blob_tracker
@@ -65,9 +68,8 @@ def mog2(path: Path) -> None:
             cv2.connectedComponentsWithStats(np.where(mask == 255, np.uint8(255), np.uint8(0)))
 
 
-def stages(path: Path) -> dict[str, float]:
+def stages(path: Path, settings: Settings) -> dict[str, float]:
     """Seconds of the main thread in each stage."""
-    settings = Settings()
     spent = dict.fromkeys(STAGES, 0.0)
     with open_source(str(path), settings.source) as source, frame_by_frame(settings.detector.kind):
         tracker, detector = (
@@ -110,7 +112,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", type=Path, nargs="+", metavar="CLIP")
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--over", default="", metavar="SETTINGS", help="separated by semicolons; adds `over`")
     options = parser.parse_args()
+    other = load(assignments=options.over.split(";")) if options.over else None
     found: dict[Path, list[dict[str, float]]] = {clip: [] for clip in options.clips}
     sizes: dict[Path, tuple[int, int]] = {}
     cv2.setNumThreads(1)
@@ -120,9 +124,12 @@ def main() -> None:
             frames = decode(clip)
             with open_source(str(clip), Settings().source) as source:
                 sizes[clip] = source.width, source.height
-            row = {"decode": cost(decode, clip), "run": cost(whole_run, clip), "MOG2": cost(mog2, clip), **stages(clip)}
+            row = {"decode": cost(decode, clip), "run": cost(whole_run, clip), "MOG2": cost(mog2, clip)}
+            row |= stages(clip, Settings())
             rows.append({name: 1e3 * seconds / frames for name, seconds in row.items()} | {"ratio": ratio(clip)})
-    names = ("decode", "run", *STAGES, "MOG2", "beyond", "ratio")
+            if other is not None:
+                rows[-1]["over"] = row["detect"] / stages(clip, other)["detect"]
+    names = ["decode", "run", *STAGES, "MOG2", "beyond", "ratio", *(["over"] if other is not None else [])]
     print("ms a frame          " + "".join(f"{name:>9s}" for name in names))
     for clip, rows in found.items():
         width, height = sizes[clip]
