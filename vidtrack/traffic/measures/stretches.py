@@ -124,7 +124,7 @@ class Stretches:
             self._current = np.concatenate([self._current, np.full(more, -1)])
         stretches = self._count + rows
         if stretches > len(self._track):
-            more = max(stretches, 2 * len(self._track)) - len(self._track)
+            more = max(stretches, 5 * len(self._track) // 4) - len(self._track)
             unknown = np.full((more, 9), np.nan)
             self._head, self._tail = np.vstack([self._head, unknown]), np.vstack([self._tail, unknown])
             self._track = np.concatenate([self._track, np.full(more, -1)])
