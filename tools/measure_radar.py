@@ -7,7 +7,7 @@ Each argument after the scenario is one choice of settings, separated by semicol
 those of `vidtrack simulate`, and `opensky` (VIDTRACK_DATA; real air traffic, see track_opensky.py). A row has the mean
 and the standard deviation over the seeds; below it, from the second choice on, the mean difference from the first one,
 seed by seed, with its standard error. Rows of tracks count from their beginning if they are confirmed later, as in
-tracks.csv. NEES is of positions and of velocities; 2 is right in the plane.
+tracks.csv. NEES is of positions and of velocities; 2 is right in the plane. `rms` is of both axes, m and m/s.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from track_opensky import aircraft, write_plots
 from vidtrack import formats, score
 from vidtrack.config.load import load
 from vidtrack.config.settings import Settings
+from vidtrack.output.smoothed import smoothed_by
 from vidtrack.run.radar import track_plots
 from vidtrack.score.clear import correspondences
 from vidtrack.score.matching import match_points
 from vidtrack.simulate.radar_scenarios import SCENARIOS, simulate_radar
 from vidtrack.simulate.radar_write import write_radar
-from vidtrack.tracks import TENTATIVE
+from vidtrack.tracks import TENTATIVE, Tracks
 
 NEAR_M = {"opensky": 2000.0}
 SCORES = ("idf1", "switches", "gospa", "gospa_missed", "gospa_false", "tracks", "nees")
@@ -50,7 +51,7 @@ def drawn(scenario: str, seed: int, folder: Path, options: argparse.Namespace) -
 def scored(plots: Path, truth: formats.Table, settings: Settings, near_m: float) -> dict[str, float]:
     """The scores of one run."""
     frames, states, ids, covs, v_covs, seen = [], [], [], [], [], set()
-    for scan, tracks in track_plots(plots, settings):
+    for scan, tracks in _shown(plots, settings):
         frames.append(np.full(len(tracks), scan))
         ids.append(tracks.id)
         seen |= set(tracks.id[tracks.status != TENTATIVE].tolist())
@@ -73,7 +74,19 @@ def scored(plots: Path, truth: formats.Table, settings: Settings, near_m: float)
         error = state[matched.result[pairs], dim:] - true_v[matched.truth[pairs]]
         weighed = np.linalg.solve(np.concatenate(v_covs)[kept][matched.result[pairs]], error[..., None])[..., 0]
         scores["nees_v"] = float(np.mean((error * weighed).sum(axis=1)))
+        scores["rms_v"] = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
+        off = state[matched.result[pairs], :dim] - truth.xy[matched.truth[pairs], :dim]
+        scores["rms"] = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
     return scores
+
+
+def _shown(plots: Path, settings: Settings) -> list[tuple[int, Tracks]]:
+    """The scans and their tracks, smoothed if so set."""
+    steps = list(track_plots(plots, settings))
+    if settings.output.smooth:
+        for k in range(len(steps) - 2, -1, -1):
+            steps[k] = steps[k][0], smoothed_by(steps[k][1], steps[k + 1][1])
+    return steps
 
 
 def _velocities(truth: Path, dim: int) -> np.ndarray:

@@ -38,7 +38,7 @@ def backward(posterior, prior, F):
     result = [posterior[-1]]
     for k in range(len(posterior) - 2, -1, -1):
         x, P = posterior[k]
-        gain = smoothing_gain(P, F[None], prior[k + 1][1])
+        gain = smoothing_gain(P @ F.T, prior[k + 1][1])
         result.insert(0, smoothed(x, P, gain, *prior[k + 1], *result[0]))
     return result
 
@@ -136,6 +136,55 @@ def test_smoothed_tracks_are_nearer_to_the_truth(bank):
     assert rms(back, truth, gap) < 0.85 * rms(snapshots, truth, gap)
     for tracks in back:
         assert np.linalg.eigvalsh(tracks.P).min() > 0
+
+
+def turning():
+    """IMM filters of one target that may turn, as it is after some turning, most likely in a turn."""
+    steady, turn = vt.ConstantVelocity(accel=0.5, speed=20.0), vt.CoordinatedTurn(accel=3.0, turn=0.4, speed=20.0)
+    bank = IMMBank([steady, turn], [60.0, 8.0])
+    tracker = vt.Tracker(steady, estimator=lambda _: bank)
+    for k in range(12):
+        angle = 0.35 * max(k - 5, 0)
+        z = np.array([[60 * np.sin(angle) + 20 * min(k, 5), 60 * (1 - np.cos(angle))]])
+        tracker.step(vt.Scan(float(k), z, 4 * np.eye(2)))
+    assert len(bank) == 1
+    assert bank.mode[0].min() > 0.02
+    return bank
+
+
+def test_the_covariance_of_mixed_modes_with_what_they_become_is_that_of_drawn_targets():
+    """Targets drawn from the mixture, each moved by its linearised model after the switching."""
+    bank, rng, count = turning(), np.random.default_rng(0), 400_000
+    mixed, mode = bank._mixed(1.0)
+    now, later = [], []
+    for each, share in zip(mixed, mode[0], strict=True):
+        x = rng.multivariate_normal(each.x[0], each.P[0], round(share * count))
+        noise = each.model.process_noise(1.0, each.x, each.P, each.hits, each.scale)
+        J = each.model.jacobian(1.0, each.x, each.model.transition(1.0, each.x))[0]
+        moved = each.ahead(1.0)[0] + (x - each.x) @ J.T
+        now.append(x[:, :4])
+        later.append((moved + rng.multivariate_normal(np.zeros(len(noise[0])), noise[0], len(x)))[:, :4])
+    drawn = np.cov(np.concatenate(now).T, np.concatenate(later).T)
+    sigma = np.sqrt(np.diag(drawn))
+    expected = np.block([[bank.P[0], bank.cross(1.0)[0]], [bank.cross(1.0)[0].T, bank.ahead(1.0)[1][0]]])
+    np.testing.assert_allclose(drawn / np.outer(sigma, sigma), expected / np.outer(sigma, sigma), atol=0.03)
+    assert np.linalg.eigvalsh(expected).min() > 0
+
+
+def test_smoothed_covariances_of_mixed_modes_are_covariances():
+    """With the gain of straight motion in place of that of the modes some variances were below zero."""
+    steady, turn = vt.ConstantVelocity(accel=0.5, speed=300.0), vt.CoordinatedTurn(accel=30.0, turn=0.1, speed=300.0)
+    rng, tracker = (
+        np.random.default_rng(3),
+        vt.Tracker(steady, estimator=lambda _: IMMBank([steady, turn], [500.0, 20.0]), smooth=True),
+    )
+    x, heading, snapshots = np.zeros(2), 0.0, []
+    for k in range(60):
+        heading += 0.3 if 20 <= k < 28 or 40 <= k < 46 else 0.0
+        x = x + 4 * 250 * np.array([np.cos(heading), np.sin(heading)])
+        snapshots.append(tracker.step(vt.Scan(4.0 * k, x + 150 * rng.normal(size=(1, 2)), 150**2 * np.eye(2))))
+    least = [np.linalg.eigvalsh(tracks.P).min() for tracks in looked_back(snapshots) if len(tracks)]
+    assert min(least) > 0
 
 
 @pytest.mark.parametrize("method", [vt.GNN, vt.PDA, vt.JPDA, vt.Split, vt.MHT])

@@ -37,8 +37,8 @@ class Estimator(Protocol):
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         """x, P after dt seconds; changes nothing."""
 
-    def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) or (T, n, n) derivative of `ahead` by the means x (T, n)."""
+    def cross(self, dt: float) -> Floats:
+        """(T, n, n) covariance of each state with itself dt seconds later, which a smoother needs."""
 
     def predict(self, dt: float) -> None:
         """Predict all rows by dt seconds."""

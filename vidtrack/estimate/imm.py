@@ -90,11 +90,14 @@ class IMMBank:
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         return self._moments(*self._moved(dt))
 
-    def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) derivative of constant velocity, which all modes share."""
-        J = np.eye(x.shape[1])
-        J[self.model.position, self.model.velocity] = dt
-        return J[None]
+    def cross(self, dt: float) -> Floats:
+        """(T, n, n) over all modes: within each, as it moves after the mixing, and between their means."""
+        banks, mode = self._mixed(dt)
+        n = 2 * self.model.dim
+        now, later = np.stack([b.x[:, :n] for b in banks]), np.stack([b.ahead(dt)[0][:, :n] for b in banks])
+        within = np.stack([b.cross(dt)[:, :n, :n] for b in banks])
+        off = now - self.x  # whose mean is zero: the mixing keeps x
+        return np.einsum("jt,jtik->tik", mode.T, within) + np.einsum("jt,jti,jtk->tik", mode.T, off, later)
 
     def predict(self, dt: float) -> None:
         """Mix the modes and predict all rows by dt seconds."""
@@ -190,17 +193,23 @@ class IMMBank:
 
     def _moved(self, dt: float) -> tuple[tuple[KalmanBank, ...], Floats]:
         """The banks after mixing and a prediction by dt seconds, and the probabilities of the modes then."""
+        banks, mode = self._mixed(dt)
+        for bank in banks:
+            bank.predict(dt)
+        return banks, mode
+
+    def _mixed(self, dt: float) -> tuple[tuple[KalmanBank, ...], Floats]:
+        """The banks as they are now for each mode dt seconds later, and the probabilities of the modes then."""
         switch = self._switching(dt)
         mode = self.mode @ switch
-        moved = []
+        banks = []
         for j, bank in enumerate(self.banks):
             weight = (self.mode * switch[:, j] / np.maximum(mode[:, j : j + 1], LEAST)).T
             lifted = [_lifted(other, bank, 2 * self.model.dim) for other in self.banks]
             mixed = copy(bank)
             mixed.x, mixed.P = _mixture(weight, np.stack([x for x, _ in lifted]), np.stack([P for _, P in lifted]))
-            mixed.predict(dt)
-            moved.append(mixed)
-        return tuple(moved), mode
+            banks.append(mixed)
+        return tuple(banks), mode
 
     def _switching(self, dt: float) -> Floats:
         """(r, r) transition probabilities of the models over dt seconds."""

@@ -63,9 +63,10 @@ class KalmanBank:
         self._known = _Ahead(dt, self.x, self.P, x, P)
         return x, P
 
-    def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) or (T, n, n) derivative of the motion at means x (T, n)."""
-        return self.model.jacobian(dt, x, self.model.transition(dt, x))
+    def cross(self, dt: float) -> Floats:
+        """(T, n, n) P J', with the derivative J of the motion at the means."""
+        J = self.model.jacobian(dt, self.x, self.model.transition(dt, self.x))
+        return self.P @ np.swapaxes(J, 1, 2)
 
     def predict(self, dt: float) -> None:
         self.x, self.P = self.ahead(dt)

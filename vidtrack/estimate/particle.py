@@ -85,9 +85,10 @@ class ParticleBank:
         """(T, n, n) covariances."""
         return self._known()[1]
 
-    def jacobian(self, dt: float, x: Floats) -> Floats:
-        """(1, n, n) or (T, n, n) derivative of the motion at means x (T, n), without the particles' spread."""
-        return self.model.jacobian(dt, x, self.model.transition(dt, x))
+    def cross(self, dt: float) -> Floats:
+        """(T, n, n) P J', with the derivative J of the motion at the means, without the particles' spread."""
+        J = self.model.jacobian(dt, self.x, self.model.transition(dt, self.x))
+        return self.P @ np.swapaxes(J, 1, 2)
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         moved = self.particles.copy()

@@ -7,9 +7,11 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 
 
-def smoothing_gain(P: Floats, F: Floats, prior_P: Floats) -> Floats:
-    """(T, n, n) C = P F' prior_P^-1, with prior_P (T, n, n) predicted from P (T, n, n) by F (T or 1, n, n)."""
-    return np.swapaxes(np.linalg.solve(prior_P, F @ P), 1, 2)
+def smoothing_gain(cross: Floats, prior_P: Floats) -> Floats:
+    """(T, n, n) C = cross prior_P^-1: cross (T, n, n) is the covariance of a state with its prediction, which has
+    prior_P (T, n, n); P F' for a linear motion.
+    """
+    return np.swapaxes(np.linalg.solve(prior_P, np.swapaxes(cross, 1, 2)), 1, 2)
 
 
 def smoothed(

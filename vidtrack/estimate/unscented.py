@@ -19,14 +19,15 @@ class UnscentedBank(KalmanBank):
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         """x, P after dt seconds, from the points, each moved by its own F; changes nothing."""
-        n = self.x.shape[1]
-        points, weight = sigma_points(self.x, self.P)
-        flat = points.reshape(-1, n)
-        F = self.model.transition(dt, flat)
-        moved = np.einsum("kij,kj->ki", np.broadcast_to(F, (len(flat), n, n)), flat).reshape(points.shape)
+        weight, _, moved = self._moved(dt)
         x = np.einsum("s,tsi->ti", weight, moved)
         Q = self.model.process_noise(dt, self.x, self.P, self.hits, self.scale)
         return x, _spread(weight, moved - x[:, None], moved - x[:, None]) + Q
+
+    def cross(self, dt: float) -> Floats:
+        """(T, n, n) covariance of the points with the same points moved."""
+        weight, points, moved = self._moved(dt)
+        return _spread(weight, points - self.x[:, None], moved)
 
     def linearised(self, sensor: Sensor) -> tuple[Floats, Floats, Floats]:
         """zhat (T, m), H (T, m, n), excess (T, m, m) from the expected measurements of the points."""
@@ -42,6 +43,14 @@ class UnscentedBank(KalmanBank):
         excess = _spread(weight, off, off) - H @ self.P @ np.swapaxes(H, 1, 2)
         zhat = wrapped(seen[:, 0] + mean, sensor.angles)
         return zhat, np.ascontiguousarray(H), np.ascontiguousarray((excess + np.swapaxes(excess, 1, 2)) / 2)
+
+    def _moved(self, dt: float) -> tuple[Floats, Floats, Floats]:
+        """Weights (s,), points (T, s, n), and the points dt seconds later (T, s, n), each moved by its own F."""
+        points, weight = sigma_points(self.x, self.P)
+        flat = points.reshape(-1, points.shape[2])
+        F = self.model.transition(dt, flat)
+        moved = np.einsum("kij,kj->ki", np.broadcast_to(F, (len(flat), *F.shape[1:])), flat)
+        return weight, points, moved.reshape(points.shape)
 
 
 def sigma_points(x: Floats, P: Floats) -> tuple[Floats, Floats]:

@@ -211,12 +211,12 @@ class Tracker:
         if len(scan) and scan.sensor is None and scan.z.shape[1] != self.model.dim:
             raise ScanError(f"measurements have {scan.z.shape[1]} components but the model moves in {self.model.dim}")
         dt = self._since_last(t)
-        x, P = self.bank.x, self.bank.P
+        x, cross = self.bank.x, self.bank.cross(dt) if self.smooth else None
         self.bank.predict(dt)
         self.t = t
         self.picture.rescale(self.register, x, self.bank)
-        if self.smooth:
-            self._remember(dt, x, P)
+        if cross is not None:
+            self._remember(cross)
         lost = self.life.lost(self.register, t)
         if np.count_nonzero(lost):
             last = dict(zip(self.register.id[lost].tolist(), self.register.updated_s[lost].tolist(), strict=True))
@@ -225,10 +225,10 @@ class Tracker:
             self._keep(~lost)
         return dt
 
-    def _remember(self, dt: float, x: Floats, P: Floats) -> None:
-        """Keep what a smoother needs: the prediction of the tracks that were shown, and the gain back to x, P."""
-        gain = smoothing_gain(P, self.bank.jacobian(dt, x), self.bank.P)
-        prior_x = np.where(self.timing.shown(len(x))[:, None], self.bank.x, np.nan)
+    def _remember(self, cross: Floats) -> None:
+        """Keep what a smoother needs: the prediction of the tracks that were shown, and the gain back from it."""
+        gain = smoothing_gain(cross, self.bank.P)
+        prior_x = np.where(self.timing.shown(len(cross))[:, None], self.bank.x, np.nan)
         self.register.link(prior_x, self.bank.P, gain)
 
     def _since_last(self, t: float) -> float:
