@@ -10,6 +10,7 @@ from vidtrack.config.load import load
 from vidtrack.config.names import Model
 from vidtrack.config.radar import RadarSettings
 from vidtrack.decision import Decision
+from vidtrack.errors import ConfigError
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.run.radar import track_plots
@@ -62,6 +63,17 @@ def test_particles_are_the_same_for_the_same_seed(speed):
     )
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("resampling", ["none", "error-signal"])
+def test_particles_of_which_one_has_all_the_weight_are_tracked_and_not_smoothed(resampling, tmp_path):
+    write_radar(simulate_radar("radar-crossing", 7), tmp_path)
+    chosen = [("radar.estimator", "particle"), ("radar.particles", 200), ("radar.resampling", resampling)]
+    scans = [tracks for _, tracks in track_plots(tmp_path / "plots.csv", load(assignments=chosen))]
+    assert len(scans) > 40
+    assert sum(len(tracks) > 0 for tracks in scans) > 30
+    with pytest.raises(ConfigError, match="cannot be smoothed"):
+        next(track_plots(tmp_path / "plots.csv", load(assignments=[*chosen, ("output.smooth", True)])))
 
 
 @pytest.mark.parametrize(("swing_m", "agile"), [(1200.0, True), (0.0, False)])

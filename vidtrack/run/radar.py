@@ -178,8 +178,9 @@ def build_point_tracker(
         raise ConfigError(
             f"the plots have no amplitudes, by which {common.method} chooses; take another method (gnn, jpda, mht)"
         )
-    if settings.output.smooth and radar.estimator == "alpha-beta":
-        raise ConfigError("alpha-beta keeps no covariances of its own, and cannot be smoothed; take another estimator")
+    if settings.output.smooth and not _has_covariances(radar):
+        filter_ = radar.estimator if radar.estimator != "particle" else f"particle with resampling {radar.resampling}"
+        raise ConfigError(f"{filter_} keeps no covariances of its own, and cannot be smoothed; take another estimator")
     if radar.group_link_m is not None or (radar.snr_db is not None and len(found) > 1):
         raise ConfigError("radar.group_link_m and radar.snr_db are for one radar; leave them out")
     sharing = _sharing(radar, [place[:dim] for place in places])
@@ -213,9 +214,15 @@ def _gate_and_threshold(settings: Settings, found: Measurements) -> tuple[Gate, 
     return Gate(gated(dim, width)), controller(radar, found, width)
 
 
+def _has_covariances(radar: RadarSettings) -> bool:
+    """Whether the filter knows its errors: alpha-beta does not, nor do particles of which one gets all the weight."""
+    degenerate = radar.estimator == "particle" and radar.resampling in ("none", "error-signal")
+    return radar.estimator != "alpha-beta" and not degenerate
+
+
 def _sharing(radar: RadarSettings, places: Sequence[tuple[float, ...]]) -> Sharing:
-    """The model for targets that radars at these places do not resolve; alpha-beta has no covariances to tell them."""
-    if not radar.unresolved or radar.estimator == "alpha-beta":
+    """The model for targets that radars at these places do not resolve; without covariances they cannot be told."""
+    if not radar.unresolved or not _has_covariances(radar):
         return Exclusive()
     angles = (radar.cell_azimuth_deg, radar.cell_elevation_deg)[: len(places[0]) - 1]
     sides = (radar.cell_range_m, *(None if side is None else math.radians(side) for side in angles))
