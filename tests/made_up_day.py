@@ -206,12 +206,12 @@ def write_run(folder, begin_s):
     t = np.arange(0, 60, 1 / FPS)
     on = (t > begin_s - 1.05) & (t < begin_s + 9.05)
     ours, still = t[on], np.ones(len(t))
+    x, y = np.append(595 * np.ones(len(ours)), 700 * still), np.append(180 + SPEED * (ours - begin_s), 300 * still)
     columns = {
         "time_s": np.append(ours, t),
         "track_id": np.append(np.ones(len(ours), int), 2 * still.astype(int)),
         "status": ["confirmed"] * (len(ours) + len(t)),
-        "x_px": np.append(595 * np.ones(len(ours)), 700 * still),
-        "y_px": np.append(180 + SPEED * (ours - begin_s), 300 * still),
+        **{"x_px": x, "y_px": y, "left_px": x - 0.5, "top_px": y - 0.8},
         **{
             name: np.ones(len(ours) + len(t))
             for name in ("vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "width_px", "height_px")

@@ -208,7 +208,7 @@ def test_paths_are_as_many_as_tracks(desk):
     assert count == 4
     assert len(content) == 4 + 4 * count + 8 * sum(lengths)
     x, y = struct.unpack_from("<2f", content, 4 + 4 * count)
-    assert (x, y) == (50, 150)
+    assert (x, y) == (50, 151)  # a fifth of the box above its lower edge
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,19 @@ def test_sections_give_speeds_without_a_calibration(tmp_path):
     assert speeds == {"west": None, "middle": None, "east": pytest.approx(72, rel=1e-3)}
 
 
+def test_without_a_calibration_a_tall_vehicle_passes_where_it_stands_on_the_road(tmp_path):
+    """A lorry whose blob has its middle 30 px above the middle of its footprint drives up the picture."""
+    t = np.arange(125) / 25
+    run = write_run(tmp_path / "run", [(1, t, np.column_stack([np.full(125, 300.0), 400 - 50 * t]))])
+    column = pq.read_table(f"{run}/tracks.parquet").to_pydict()
+    column["top_px"] = [top - 40 for top in column["top_px"]]
+    column["height_px"] = [100.0] * len(column["top_px"])
+    pq.write_table(pa.table(column), f"{run}/tracks.parquet")
+    lower = np.array(column["top_px"]) + 80
+    (row,) = crossings(run, site(gates={"across": {"line": [[200, 300], [400, 300]]}}))
+    assert row["time_s"] == pytest.approx(np.interp(-300, -lower, column["time_s"]), abs=1e-6)
+
+
 def test_jitter_on_a_gate_does_not_count(tmp_path):
     t = np.arange(0, 8, 0.04)
     x = np.interp(t, [0, 2, 6, 8], [60, 100, 100, 140]) + np.where((t > 2) & (t < 6), 2 * (-1) ** np.arange(len(t)), 0)
