@@ -45,9 +45,9 @@ def is_feed(path: str | Path) -> bool:
 
 def decoder_of(payload: bytes) -> type[Decoder] | None:
     """The decoder of a payload; None for one of another format."""
-    if b"\0" in payload and asterix.looks_like(payload):
-        return asterix.Decoder
-    return nmea.Decoder if nmea.looks_like(payload) else None
+    if nmea.looks_like(payload):
+        return nmea.Decoder
+    return asterix.Decoder if b"\0" in payload and asterix.looks_like(payload) else None
 
 
 def _kind(content: bytes) -> type[Decoder] | None:
