@@ -13,9 +13,8 @@ import numpy as np
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError, PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
-from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
-from vidtrack.radar.feeds.pace import pace_of
+from vidtrack.radar.feeds.pace import paced
 from vidtrack.radar.feeds.packets import payloads
 from vidtrack.radar.feeds.plots import Choice, choose, plots_of, warn_of_assumed_errors, warn_of_others
 from vidtrack.radar.plane import Plane
@@ -119,11 +118,12 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     choice = choose(messages, settings, name)
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
-    messages = Clock(losses).on_one_clock(choice.of(messages))
-    plane = plane_of(choice, messages, settings, name)
-    if messages.marks.all():
+    found = paced(choice.of(messages), settings.scan_s, losses)
+    if found is None:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
-    scan = np.floor(pace_of(messages, settings.scan_s).progress(messages)).astype(np.int64)
+    messages, pace = found
+    plane = plane_of(choice, messages, settings, name)
+    scan = np.floor(pace.progress(messages)).astype(np.int64)
     plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
     if str(losses):
         _log.warning("%s: left out: %s", name, losses)
