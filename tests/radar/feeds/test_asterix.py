@@ -15,7 +15,7 @@ from vidtrack.radar.feeds import asterix, layout
 from vidtrack.radar.feeds.asterix import Decoder
 from vidtrack.radar.feeds.layout import Layout
 from vidtrack.radar.feeds.messages import Kind, Losses
-from vidtrack.radar.feeds.recording import is_feed, read_messages
+from vidtrack.radar.feeds.recording import is_feed, read_messages, senders
 from vidtrack.radar.reading import read
 from vidtrack.run.radar import track_plots
 from vidtrack.simulate.radar_scenarios import simulate_radar
@@ -151,6 +151,18 @@ def test_several_radars_are_refused_until_one_is_chosen(tmp_path):
     assert set(seconds(path, sic=202).z[:, 0].round(-3)) == {21000}
     with pytest.raises(PlotFormatError, match="no plots of the radar with this sac and sic"):
         seconds(path, sic=7)
+
+
+def test_a_damaged_code_of_a_sender_is_no_other_radar(tmp_path, caplog):
+    stray = block(plot(1039.9, 20000, 300, OTHER))
+    path = recorded(tmp_path, *turning(1000), stray, *turning(1040))
+    plots = seconds(path)
+    assert (len(plots), plots.losses["damaged"]) == (240, 1)
+    assert f"{path}: left out: 1 damaged" in caplog.messages
+    assert senders(path) == [(25, 201)]
+    assert len(seconds(path, sic=202)) == 1
+    with pytest.raises(PlotFormatError, match="2 radars"):
+        seconds(recorded(tmp_path, *turning(1000), *[stray] * 4))
 
 
 def test_reports_without_a_detection_are_no_plots(tmp_path):

@@ -16,7 +16,7 @@ from vidtrack.radar.feeds import asterix, nmea
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
 from vidtrack.radar.feeds.pace import paced
 from vidtrack.radar.feeds.packets import payloads
-from vidtrack.radar.feeds.plots import Choice, choose, plots_of, warn_of_assumed_errors, warn_of_others
+from vidtrack.radar.feeds.plots import Choice, choose, plots_of, stray_senders, warn_of_assumed_errors, warn_of_others
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
 
@@ -92,10 +92,14 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
 
 
 def senders(path: str | Path) -> list[tuple[int, int]]:
-    """SAC and SIC of each radar whose plots are in a recording of ASTERIX. Raises the errors of `read_messages`."""
+    """SAC and SIC of each radar whose plots are in a recording of ASTERIX.
+
+    Raises the errors of `read_messages`.
+    """
     messages = read_messages(path, Losses())
     plots = messages.only((messages.kind == Kind.POLAR) & (messages.category > 0))
-    return [(source >> 8, source & 255) for source in np.unique(plots.source).tolist()]
+    sending = np.setdiff1d(plots.source, stray_senders(messages))
+    return [(source >> 8, source & 255) for source in sending.tolist()]
 
 
 def _informed(kind: type[Decoder], content: bytes) -> Decoder:
@@ -116,6 +120,7 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     losses, name = Losses(), str(path)
     messages = read_messages(path, losses)
     choice = choose(messages, settings, name)
+    losses.damaged += choice.damaged
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
     found = paced(choice.of(messages), settings.scan_s, losses)

@@ -142,6 +142,7 @@ class ScanStream:
         warn_of_others(choice, heard, self._settings, self._name)
         warn_of_assumed_errors(choice, self._settings, self._name)
         self._choice, self._pace, self._heard = choice, pace, []
+        self.losses.damaged += choice.damaged
         self._clock = Clock(self.losses, pace.disorder_s)
         self._clock.on_one_clock(chosen)
         self.plane = plane_of(choice, believed, self._settings, self._name)
