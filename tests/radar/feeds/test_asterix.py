@@ -15,7 +15,7 @@ from vidtrack.radar.feeds import asterix, layout
 from vidtrack.radar.feeds.asterix import Decoder
 from vidtrack.radar.feeds.layout import Layout
 from vidtrack.radar.feeds.messages import Kind, Losses
-from vidtrack.radar.feeds.recording import is_feed, read_messages
+from vidtrack.radar.feeds.recording import is_feed, read_messages, senders
 from vidtrack.radar.reading import read
 from vidtrack.run.radar import track_plots
 from vidtrack.simulate.radar_scenarios import simulate_radar
@@ -110,6 +110,37 @@ def test_a_clock_that_is_set_back_goes_on(tmp_path):
     assert plots.time_s[-1] < 1100
 
 
+def turning(*begins_s):
+    """Blocks of ten turns of 4 s with twelve plots each, from each of these times on."""
+    return [
+        part
+        for begin_s in begins_s
+        for turn in range(10)
+        for north_s in [begin_s + 4 * turn]
+        for part in (
+            mark(north_s, turn_s=4.0),
+            *(block(plot(north_s + (k + 0.5) / 3, 20000 + 5 * north_s, 30 * k + 15)) for k in range(12)),
+        )
+    ]
+
+
+@pytest.mark.parametrize("back_s", [12, 20, 29, 60])
+def test_an_antenna_that_is_turned_back_in_time_has_had_its_clock_set(tmp_path, back_s):
+    plots = seconds(recorded(tmp_path, *turning(1000, 1040 - back_s)))
+    assert plots.losses["resets"] == 1
+    assert (np.diff(plots.time_s) >= 0).all()
+    assert np.bincount(plots.scan).tolist() == [12] * 10 + [11] + [12] * 9
+
+
+def test_plots_that_come_late_by_part_of_a_turn_are_in_their_scan(tmp_path):
+    blocks = turning(1000)
+    turns = [blocks[k : k + 13] for k in range(0, len(blocks), 13)]
+    late = [part for mark_, *plots in turns for part in (*plots[1:], mark_, plots[0])]
+    plots = seconds(recorded(tmp_path, *late))
+    assert len(plots) == 120
+    assert not any(plots.losses.values())
+
+
 def test_several_radars_are_refused_until_one_is_chosen(tmp_path):
     blocks = [
         block(plot(4 * k, 20000 + 1000 * n, 1.0, radar)) for k in range(4) for n, radar in enumerate([RADAR, OTHER])
@@ -120,6 +151,18 @@ def test_several_radars_are_refused_until_one_is_chosen(tmp_path):
     assert set(seconds(path, sic=202).z[:, 0].round(-3)) == {21000}
     with pytest.raises(PlotFormatError, match="no plots of the radar with this sac and sic"):
         seconds(path, sic=7)
+
+
+def test_a_damaged_code_of_a_sender_is_no_other_radar(tmp_path, caplog):
+    stray = block(plot(1039.9, 20000, 300, OTHER))
+    path = recorded(tmp_path, *turning(1000), stray, *turning(1040))
+    plots = seconds(path)
+    assert (len(plots), plots.losses["damaged"]) == (240, 1)
+    assert f"{path}: left out: 1 damaged" in caplog.messages
+    assert senders(path) == [(25, 201)]
+    assert len(seconds(path, sic=202)) == 1
+    with pytest.raises(PlotFormatError, match="2 radars"):
+        seconds(recorded(tmp_path, *turning(1000), *[stray] * 4))
 
 
 def test_reports_without_a_detection_are_no_plots(tmp_path):

@@ -11,6 +11,7 @@ from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.feeds import nmea
 from vidtrack.radar.feeds.messages import Kind, Losses
+from vidtrack.radar.feeds.recording import is_feed
 from vidtrack.radar.reading import read
 
 
@@ -74,6 +75,37 @@ def test_a_wrong_checksum_is_damage():
     )
     assert not found
     assert losses.damaged == 1
+
+
+@pytest.mark.parametrize(
+    "trash",
+    [b"\0\0\0\r\n", b"\xff\xfe\0garbage\r\n", b"$RATTM,01,4.0\r\n", b"$H@HDT,090.0,T*26\r\n", b"@HEHDT,1,T*00\n"],
+)
+@pytest.mark.parametrize("before", [0, 1, 20])
+def test_a_damaged_line_is_counted_and_the_others_are_read(tmp_path, trash, before):
+    lines = [
+        sentence(f"RATTM,01,{4 + k / 100:.2f},30.0,T,10.0,90.0,T,0.0,0.0,N,T1,T,,12{k // 20:02}{k % 20 * 3:02}.00,A")
+        for k in range(40)
+    ]
+    path = tmp_path / "ship.nmea"
+    path.write_bytes(b"".join([*(line.encode() for line in lines[:before]), trash, *map(str.encode, lines[before:])]))
+    assert is_feed(path)
+    plots = read(path, RadarSettings())
+    assert (len(plots), plots.losses["damaged"]) == (40, 1)
+
+
+def test_a_file_with_many_damaged_lines_is_what_most_of_it_says(tmp_path):
+    line = sentence("RATTM,01,4.00,30.0,T,10.0,90.0,T,0.0,0.0,N,T1,T,,120000.00,A").encode()
+    path = tmp_path / "ship.nmea"
+    path.write_bytes((line + b"\0\x0e\0\x01" + line[:30] + b"\r\n") * 100)
+    assert is_feed(path)
+    path.write_bytes(line + b"a table,of numbers\r\n" * 100)
+    assert not is_feed(path)
+
+
+def test_what_stands_between_the_sentences_is_no_damage():
+    _, losses = messages("# a comment: $5*00\r\n", "2026-01-01 12:00:00\r\n", "\r\n", "$PSRF103,00,01,00,01*25\r\n")
+    assert not losses.damaged
 
 
 def test_hostile_text_never_crashes():

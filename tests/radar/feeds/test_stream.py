@@ -53,9 +53,24 @@ def test_scans_are_those_of_the_recording(tmp_path, blocks):
 
 
 def test_what_comes_late_is_counted(blocks):
-    late = block(plot(512.5, 31000, 45))
-    stream, _ = given_out([*blocks[:50], late, *blocks[50:]])
-    assert stream.losses.late == 1
+    late = block(plot(530.5, 31000, 225))
+    stream, _ = given_out([*blocks[:53], late, *blocks[53:]])
+    assert (stream.losses.late, stream.losses.strayed) == (1, 0)
+
+
+def test_a_clock_that_is_set_back_by_some_turns_goes_on():
+    rng = np.random.default_rng(7)
+    scan = np.repeat(np.arange(20), 12)
+    table = {
+        "scan": scan,
+        "range_m": rng.uniform(20e3, 40e3, len(scan)),
+        "azimuth_deg": np.tile(np.arange(12) * 30.0, 20),
+    }
+    turns = sweeps(table, begin_s=500.0)
+    stream, scans = given_out([*turns[:130], *turns[65:]])
+    assert (stream.losses.resets, stream.losses.late) == (1, 0)
+    assert [number for number, _ in scans] == list(range(24))
+    assert (np.diff([scan.t for _, scan in scans]) > 0).all()
 
 
 def test_a_silence_ends_the_scan_that_is_open(blocks):

@@ -19,12 +19,15 @@ BELIEVED = 3
 class Clock:
     """Seconds since midnight of the first day for messages in order of arrival.
 
-    A message that is more than JUMP_S from the one before is set aside, unless BELIEVED in a row agree: then the clock
-    has jumped. After a jump forward there is a gap; after one back, time goes on without one.
+    A message that is more than JUMP_S after the one before, or more than disorder_s before it, is set aside, unless
+    BELIEVED in a row agree: then the clock has jumped. After a jump forward there is a gap, which a pause of the radar
+    would leave as well; after one back, time goes on without one.
+
+    disorder_s  s; by how much a message may be older than the one before
     """
 
-    def __init__(self, losses: Losses) -> None:
-        self._losses = losses
+    def __init__(self, losses: Losses, disorder_s: float = JUMP_S) -> None:
+        self._losses, self._disorder_s = losses, disorder_s
         self._last: float | None = None
         self._offset = 0.0
         self._suspect, self._agreed = 0.0, 0
@@ -44,7 +47,7 @@ class Clock:
             self._last = clock_s
             return clock_s
         step = _within_a_day(clock_s + self._offset - self._last)
-        if abs(step) > JUMP_S:
+        if not -self._disorder_s <= step <= JUMP_S:
             agrees = self._agreed and abs(_within_a_day(clock_s - self._suspect)) <= JUMP_S
             self._suspect, self._agreed = clock_s, self._agreed + 1 if agrees else 1
             if self._agreed < BELIEVED:

@@ -18,6 +18,9 @@ from vidtrack.radar.feeds.clock import DAY_S
 from vidtrack.radar.feeds.messages import NAN, Kind, Losses, Message
 
 _SENTENCE = re.compile(rb"[$!][A-Z]{2}[A-Z0-9]{3},[^\r\n]{0,1000}")
+_PROPRIETARY = re.compile(rb"[$!]P[A-Z0-9]+,")
+_TORN = re.compile(rb"[$!]|\*[0-9A-Fa-f]{2}\s*$|[^\t\x20-\x7e]")
+"""What makes a line without a sentence a damaged one: a begin, a checksum, or what is not text."""
 _STAMP = re.compile(rb"\\[^\\\r\n]*?\bc:(\d{9,13})[^\\\r\n]*\\")
 _METRES = {b"K": 1000.0, b"N": NAUTICAL_MILE, b"S": 1609.344}
 _FARTHEST_LATITUDE, _FARTHEST_LONGITUDE = 90.0, 180.0
@@ -25,16 +28,30 @@ _POSITIONS = (1, 2, 3, 9, 18)
 """Types of AIS messages with a position, all of one sentence."""
 _MILLISECONDS = 1e11
 """Time stamps from here on are in milliseconds."""
+_LOOKED_AT = 1 << 16
+"""Octets whose lines tell whether a content is NMEA."""
 
 
 def looks_like(content: bytes) -> bool:
-    """Whether one of the first lines is a sentence, and none has bytes that are not text."""
-    head = content[:4096]
-    return b"\0" not in head and _SENTENCE.search(head) is not None
+    """Whether most of the beginning, by octets, is lines with a sentence whose checksum is not wrong."""
+    lines = content[:_LOOKED_AT].splitlines()
+    sound = sum(len(line) for line in lines if (found := _SENTENCE.search(line)) and _is_sound(found.group()))
+    return 2 * sound > sum(len(line) for line in lines)
+
+
+def _is_sound(sentence: bytes) -> bool:
+    """Whether the checksum is right, if there is one."""
+    body, star, checksum = sentence[1:].partition(b"*")
+    return not star or checksum[:2].upper() == b"%02X" % reduce(lambda sum_, octet: sum_ ^ octet, body, 0)
+
+
+def _is_damaged(line: bytes) -> bool:
+    """Whether a line without a sentence was one; a comment or what a recorder wrote between them was not."""
+    return not line.startswith(b"#") and bool(_TORN.search(line)) and not _PROPRIETARY.search(line)
 
 
 class Decoder:
-    """Turns text into messages, and counts sentences that cannot be used in `losses`.
+    """Turns text into messages, and counts lines that are damaged in `losses`.
 
     It remembers the own ship's clock and heading for sentences that need them.
     """
@@ -50,6 +67,7 @@ class Decoder:
         for line in payload.splitlines():
             found = _SENTENCE.search(line)
             if found is None:
+                self.losses.damaged += _is_damaged(line)
                 continue
             stamp = _STAMP.search(line)
             try:
@@ -62,12 +80,11 @@ class Decoder:
 
     def _message(self, sentence: bytes, stamp: int | None) -> Message | None:
         """The message of a sentence; None for one of another kind. Raises ValueError for a damaged one."""
-        body, star, checksum = sentence[1:].partition(b"*")
-        if star and int(checksum[:2], 16) != reduce(lambda sum_, octet: sum_ ^ octet, body, 0):
+        if not _is_sound(sentence):
             raise ValueError
         if stamp is not None:
             self._clock_s = (stamp / 1000 if stamp >= _MILLISECONDS else stamp) % DAY_S
-        fields = body.split(b",")
+        fields = sentence[1:].partition(b"*")[0].split(b",")
         kind = fields[0][2:]
         if kind in (b"VDM", b"VDO"):
             return self._ais(sentence, fields, stamped=stamp is not None)

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Messages
+from vidtrack.radar.feeds.clock import JUMP_S, Clock
+from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses, Messages
 
 FASTEST_S, SLOWEST_S = 0.4, 20.0
 """s; durations of a turn that are looked for."""
@@ -24,6 +25,8 @@ turns: a false time must not turn the antenna."""
 LONGEST_ROUND_S = 30.0
 """s; targets that report more rarely are missing in some scans."""
 
+DISORDER_S = 5.0
+"""s; so much later than others a message may come through a network and a recorder, even if the antenna turns fast."""
 ONE_SCAN_S = 1.0
 """s; duration of a scan where all plots are of one time."""
 
@@ -31,10 +34,12 @@ ONE_SCAN_S = 1.0
 class Pace(Protocol):
     """Numbers the scans of messages, batch after batch.
 
-    period_s  duration of a scan
+    period_s    duration of a scan
+    disorder_s  by how much a message may be older than the one before; a clock that goes back further was set
     """
 
     period_s: float
+    disorder_s: float
 
     def progress(self, messages: Messages) -> Floats:
         """(N,) scans that had passed at each message; its integer part is the number of the message's scan."""
@@ -47,13 +52,15 @@ class Turns:
     times and is pulled to the azimuths of marks and plots, so a plot just west of north stays in its scan however its
     time is rounded, and lost marks do no harm.
 
-    period_s  duration of a turn
-    beamed    the times of plots are those at which the antenna passed them; else the antenna follows the marks alone,
-              and a scan holds the plots from one north mark to the next
+    period_s    duration of a turn
+    disorder_s  a radar sends a plot before the antenna has turned once more
+    beamed      the times of plots are those at which the antenna passed them; else the antenna follows the marks
+                alone, and a scan holds the plots from one north mark to the next
     """
 
     def __init__(self, period_s: float, *, beamed: bool = True) -> None:
         self.period_s = period_s
+        self.disorder_s = min(max(period_s, DISORDER_S), JUMP_S)
         self._beamed = beamed
         self._turn: float | None = None
         self._time = 0.0
@@ -95,11 +102,27 @@ class Rounds:
 
     def __init__(self, period_s: float, start_s: float) -> None:
         self.period_s = period_s
+        self.disorder_s = JUMP_S
         self._start_s = start_s
 
     def progress(self, messages: Messages) -> Floats:
         """(N,) durations since the start at each message."""
         return np.asarray((messages.time_s - self._start_s) / self.period_s)
+
+
+def paced(messages: Messages, scan_s: float | None, losses: Losses) -> tuple[Messages, Pace] | None:
+    """The first messages of a feed that can be believed, and its pace; None: among them is no plot with a time.
+
+    The clock is read twice: how far back it may go without having been set is known from the pace.
+    """
+    roughly = Clock(Losses()).on_one_clock(messages)
+    if roughly.marks.all():
+        return None
+    pace = pace_of(roughly, scan_s)
+    believed = Clock(losses, pace.disorder_s).on_one_clock(messages)
+    if believed.marks.all():
+        return None
+    return believed, pace_of(believed, scan_s) if losses.resets else pace
 
 
 def pace_of(messages: Messages, scan_s: float | None) -> Pace:

@@ -23,13 +23,21 @@ _KINDS = (Kind.POLAR, Kind.GEODETIC, Kind.CARTESIAN)
 _NAMES = {48: "CAT 048", 1: "CAT 001", 62: "CAT 062", 21: "CAT 021", 0: "NMEA"}
 
 
+_STRAYS, _STRAY_SHARE = 3, 0.01
+"""A sender of at most so many messages, and of at most this share of all, is none: its code is damaged."""
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What of a feed is tracked: the messages of one sender (SAC * 256 + SIC), category and kind, and its marks."""
+    """What of a feed is tracked: the messages of one sender (SAC * 256 + SIC), category and kind, and its marks.
+
+    damaged  number of plots of the category whose sender's code is damaged
+    """
 
     source: int
     category: int
     kind: Kind
+    damaged: int
 
     def holds(self, messages: Messages) -> Mask:
         """(N,) the chosen messages and the antenna's marks."""
@@ -61,6 +69,9 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
         raise PlotFormatError(f"{name} holds {nothing_wanted(messages, settings)}")
     category = next(one for one in _CATEGORIES if (positions.category == one).any())
     chosen = positions.only(positions.category == category)
+    stray = np.isin(chosen.source, stray_senders(messages))
+    stray &= not stray.all()
+    chosen = chosen.only(~stray)
     sources = Counter(chosen.source.tolist())
     if len(sources) > 1:
         listed = ", ".join(f"{_sender(one)} ({count} plots)" for one, count in sources.most_common(8))
@@ -69,7 +80,13 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
             "--set radar.sic=..."
         )
     kind = next(one for one in _KINDS if (chosen.kind == one).any())
-    return Choice(chosen.source[0].item(), category, kind)
+    return Choice(chosen.source[0].item(), category, kind, int(stray.sum()))
+
+
+def stray_senders(messages: Messages) -> Ints:
+    """(N,) senders of so few messages that a damaged code made them."""
+    source, count = np.unique(messages.source, return_counts=True)
+    return np.asarray(source[(count <= _STRAYS) & (count <= _STRAY_SHARE * len(messages))])
 
 
 def nothing_wanted(messages: Messages, settings: RadarSettings) -> str:

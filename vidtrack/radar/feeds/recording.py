@@ -13,11 +13,10 @@ import numpy as np
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError, PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
-from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
-from vidtrack.radar.feeds.pace import pace_of
+from vidtrack.radar.feeds.pace import paced
 from vidtrack.radar.feeds.packets import payloads
-from vidtrack.radar.feeds.plots import Choice, choose, plots_of, warn_of_assumed_errors, warn_of_others
+from vidtrack.radar.feeds.plots import Choice, choose, plots_of, stray_senders, warn_of_assumed_errors, warn_of_others
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
 
@@ -45,9 +44,9 @@ def is_feed(path: str | Path) -> bool:
 
 def decoder_of(payload: bytes) -> type[Decoder] | None:
     """The decoder of a payload; None for one of another format."""
-    if b"\0" in payload and asterix.looks_like(payload):
-        return asterix.Decoder
-    return nmea.Decoder if nmea.looks_like(payload) else None
+    if nmea.looks_like(payload):
+        return nmea.Decoder
+    return asterix.Decoder if b"\0" in payload and asterix.looks_like(payload) else None
 
 
 def _kind(content: bytes) -> type[Decoder] | None:
@@ -93,10 +92,14 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
 
 
 def senders(path: str | Path) -> list[tuple[int, int]]:
-    """SAC and SIC of each radar whose plots are in a recording of ASTERIX. Raises the errors of `read_messages`."""
+    """SAC and SIC of each radar whose plots are in a recording of ASTERIX.
+
+    Raises the errors of `read_messages`.
+    """
     messages = read_messages(path, Losses())
     plots = messages.only((messages.kind == Kind.POLAR) & (messages.category > 0))
-    return [(source >> 8, source & 255) for source in np.unique(plots.source).tolist()]
+    sending = np.setdiff1d(plots.source, stray_senders(messages))
+    return [(source >> 8, source & 255) for source in sending.tolist()]
 
 
 def _informed(kind: type[Decoder], content: bytes) -> Decoder:
@@ -117,13 +120,15 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     losses, name = Losses(), str(path)
     messages = read_messages(path, losses)
     choice = choose(messages, settings, name)
+    losses.damaged += choice.damaged
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
-    messages = Clock(losses).on_one_clock(choice.of(messages))
-    plane = plane_of(choice, messages, settings, name)
-    if messages.marks.all():
+    found = paced(choice.of(messages), settings.scan_s, losses)
+    if found is None:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
-    scan = np.floor(pace_of(messages, settings.scan_s).progress(messages)).astype(np.int64)
+    messages, pace = found
+    plane = plane_of(choice, messages, settings, name)
+    scan = np.floor(pace.progress(messages)).astype(np.int64)
     plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
     if str(losses):
         _log.warning("%s: left out: %s", name, losses)

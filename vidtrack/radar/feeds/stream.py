@@ -12,7 +12,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import Losses, Message, Messages
-from vidtrack.radar.feeds.pace import Pace, pace_of
+from vidtrack.radar.feeds.pace import Pace, paced
 from vidtrack.radar.feeds.plots import (
     Choice,
     choose,
@@ -129,19 +129,22 @@ class ScanStream:
             self._wait(nothing_wanted(heard, self._settings))
             return
         choice = choose(heard, self._settings, self._name)
-        believed = Clock(Losses()).on_one_clock(choice.of(heard))
-        if believed.marks.all():
+        chosen = choice.of(heard)
+        found = paced(chosen, self._settings.scan_s, Losses())
+        if found is None:
             self._wait("no plots with a time")
             return
         self.lacks = None
-        pace = pace_of(believed, self._settings.scan_s)
+        believed, pace = found
         progress = pace.progress(believed)
         if np.ptp(progress) < LEARNT_SCANS + LATE and not silent:
             return
         warn_of_others(choice, heard, self._settings, self._name)
         warn_of_assumed_errors(choice, self._settings, self._name)
         self._choice, self._pace, self._heard = choice, pace, []
-        self._clock.on_one_clock(choice.of(heard))
+        self.losses.damaged += choice.damaged
+        self._clock = Clock(self.losses, pace.disorder_s)
+        self._clock.on_one_clock(chosen)
         self.plane = plane_of(choice, believed, self._settings, self._name)
         self._first = self._next = int(np.floor(progress[~believed.marks].min()))
         self._keep(believed, progress)
