@@ -72,6 +72,12 @@ def test_plots_of_one_time_are_a_scan_where_no_column_says_which(tmp_path, caplo
     assert "4 scans, 4 s apart" in caplog.text
 
 
+def test_a_pause_holds_no_empty_scans_where_no_column_says_which(tmp_path):
+    rows = ("0,100,5", "4,100,5", "8,100,5", "1000008,100,5", "1000012,100,5")
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [0, 1, 2, 3, 4]
+
+
 def test_bad_times_without_scans_are_refused_as_bad_times(tmp_path):
     path = write(tmp_path / "p.csv", "0,100,5", "nan,100,5", "4,100,5", header="time_s,range_m,azimuth_deg")
     with pytest.raises(PlotFormatError, match="time_s"):

@@ -17,6 +17,7 @@ from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.plane import Plane
+from vidtrack.radar.rhythm import longest_step
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -93,7 +94,7 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
 def _numbered(table: Table) -> Table:
     """The table with a column of scans: those of its times, if it has none and no other column may be meant.
 
-    A gap of several usual steps between two times holds empty scans.
+    A gap of several usual steps between two times holds empty scans, and a pause none.
     """
     scan, time = TIME
     similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
@@ -102,7 +103,8 @@ def _numbered(table: Table) -> Table:
     times, member = np.unique(table.columns[time], return_inverse=True)
     steps = np.diff(times[np.isfinite(times)])
     usual = float(np.median(steps)) if len(steps) else 1.0
-    number = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(steps / usual)))])
+    passed = np.where(steps > longest_step(steps), 1, np.maximum(1, np.round(steps / usual)))
+    number = np.concatenate([[0], np.cumsum(passed)])
     number = np.concatenate([number, np.full(len(times) - len(number), np.nan)])
     _log.warning(
         "%s has no column 'scan': plots of the same time are one scan; %d scans, %.6g s apart",

@@ -206,8 +206,7 @@ def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
     if plots.polar:
         plots.z[:, 1] = wrap(plots.z[:, 1] + placed.turned)
     found = measurements(plots, settings)
-    length_s = (plots.time_s[-1] - plots.time_s[0]) / max(1, found.count - 1)
-    return Feed(placed, plots, settings, found, radar.scan_s or max(float(length_s), 1e-3))
+    return Feed(placed, plots, settings, found, radar.scan_s or max(found.rhythm.scan_s, 1e-3))
 
 
 def _level(plots: Plots, path: Path) -> Plots:
