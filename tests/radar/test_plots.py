@@ -96,6 +96,7 @@ def test_spaces_after_commas_do_no_harm(tmp_path):
         ("scan,time_s,range_km,azimuth_deg", ["'range_m'", "'range_km'"]),
         ("scan,time,range_m,azimuth_deg", ["'time_s'", "'time'"]),
         ("skan,time_s,range_m,azimuth_deg", ["'scan'", "'skan'"]),
+        ("time,nr,range_m,azimuth_deg", ["no column 'time_s'", "'time'", "'scan' may be left out"]),
         ("scan,time_s,x_m,ym", ["'y_m'", "'ym'"]),
         ("scan,time_s,a,b", ["range_m", "azimuth_deg", "x_m", "y_m"]),
     ],

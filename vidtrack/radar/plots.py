@@ -135,6 +135,11 @@ def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plot
 def _measured(table: Table) -> list[str]:
     """The measurement columns in the order of z; polar columns if the file has both kinds."""
     unknown = [name for name in table.names if name not in KNOWN] or table.names
+    if not set(TIME) & set(table.names):
+        time = TIME[1]
+        raise PlotFormatError(
+            f"{table.path} has no column {time!r}, which plots need; {nearest(time, unknown)}; 'scan' may be left out"
+        )
     for name in TIME:
         if name not in table.columns:
             raise PlotFormatError(f"{table.path} has no column {name!r}; {nearest(name, unknown)}")
