@@ -52,6 +52,7 @@ class Table:
     cov    (N, d, d) covariance of xy
     nis    (N,) normalised innovation squared; NaN for rows without a measurement
     unit   of xy: "px" or "m"
+    time_s (N,) time of a radar's scan; None for frames of a video
     """
 
     frame: Ints
@@ -62,14 +63,16 @@ class Table:
     cov: Floats | None = None
     nis: Floats | None = None
     unit: str = "px"
+    time_s: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.frame)
 
     def select(self, rows: Mask | Ints) -> Table:
         """A table of the rows selected by a mask or by indices."""
-        box, cov, nis = (None if column is None else column[rows] for column in (self.box, self.cov, self.nis))
-        return Table(self.frame[rows], self.id[rows], self.xy[rows], box, self.conf[rows], cov, nis, self.unit)
+        optional = (self.box, self.cov, self.nis, self.time_s)
+        box, cov, nis, time_s = (None if column is None else column[rows] for column in optional)
+        return Table(self.frame[rows], self.id[rows], self.xy[rows], box, self.conf[rows], cov, nis, self.unit, time_s)
 
 
 def box_table(frame: Ints, identity: Ints, box: Floats, conf: Floats | None = None) -> Table:
@@ -237,7 +240,14 @@ def _from_columns(columns: pa.Table, path: str, place: Place) -> Table:
     nis = numbers("nis")[:, 0] if "nis" in names else None
     if box is not None and len(box) and np.isnan(box).all():
         box = None
-    return Table(frame, identity, xy, box, conf, cov, nis, unit)
+    timed = frame_column == "scan" and "time_s" in names and _is_numeric(columns["time_s"])
+    return Table(frame, identity, xy, box, conf, cov, nis, unit, numbers("time_s")[:, 0] if timed else None)
+
+
+def _is_numeric(column: pa.ChunkedArray) -> bool:
+    import pyarrow as pa
+
+    return bool(pa.types.is_floating(column.type) or pa.types.is_integer(column.type))
 
 
 def _covariance(sigma: Floats, corr: Floats) -> Floats:

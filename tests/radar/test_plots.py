@@ -72,6 +72,28 @@ def test_plots_of_one_time_are_a_scan_where_no_column_says_which(tmp_path, caplo
     assert "4 scans, 4 s apart" in caplog.text
 
 
+def test_a_pause_holds_no_empty_scans_where_no_column_says_which(tmp_path):
+    rows = ("0,100,5", "4,100,5", "8,100,5", "1000008,100,5", "1000012,100,5")
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_turns_of_the_antenna_are_scans_where_each_plot_has_its_own_time(tmp_path, caplog):
+    rng = np.random.default_rng(0)
+    turn, azimuth = np.divmod(np.sort(rng.uniform(0, 40, 400)), 1)
+    rows = [f"{4 * (k + a):.4f},{rng.uniform(1e3, 5e4):.1f},{360 * a:.3f}" for k, a in zip(turn, azimuth, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert (plots.scan == turn).mean() > 0.99
+    assert "40 scans, 4" in caplog.text
+
+
+def test_plots_one_by_one_that_follow_no_antenna_are_warned_of(tmp_path, caplog):
+    rng = np.random.default_rng(0)
+    rows = [f"{t:.4f},{rng.uniform(1e3, 5e4):.1f},{rng.uniform(0, 360):.3f}" for t in np.sort(rng.uniform(0, 160, 400))]
+    read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert "nearly every plot its own time" in caplog.text
+
+
 def test_bad_times_without_scans_are_refused_as_bad_times(tmp_path):
     path = write(tmp_path / "p.csv", "0,100,5", "nan,100,5", "4,100,5", header="time_s,range_m,azimuth_deg")
     with pytest.raises(PlotFormatError, match="time_s"):
@@ -90,6 +112,7 @@ def test_spaces_after_commas_do_no_harm(tmp_path):
         ("scan,time_s,range_km,azimuth_deg", ["'range_m'", "'range_km'"]),
         ("scan,time,range_m,azimuth_deg", ["'time_s'", "'time'"]),
         ("skan,time_s,range_m,azimuth_deg", ["'scan'", "'skan'"]),
+        ("time,nr,range_m,azimuth_deg", ["no column 'time_s'", "'time'", "'scan' may be left out"]),
         ("scan,time_s,x_m,ym", ["'y_m'", "'ym'"]),
         ("scan,time_s,a,b", ["range_m", "azimuth_deg", "x_m", "y_m"]),
     ],

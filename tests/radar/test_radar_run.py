@@ -142,6 +142,32 @@ def test_doppler_makes_the_velocity_known_at_once(tmp_path):
     assert np.sqrt(last.P[0, 3, 3]) < 3
 
 
+@pytest.mark.parametrize("assignments", [(), ("radar.life=llr",), ("radar.group_link_m=300",)])
+def test_a_jump_of_the_clock_ends_the_tracks_and_spoils_nothing_before_it(tmp_path, scenario, caplog, assignments):
+    for name, jump_s in (("even", 0), ("jumped", 1e6)):
+        with (scenario("radar-tws") / "plots.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        for row in rows:
+            row["time_s"] = float(row["time_s"]) + jump_s * (int(row["scan"]) >= 30)
+        (tmp_path / name).mkdir()
+        write(
+            tmp_path / name / "plots.csv", *(",".join(map(str, row.values())) for row in rows), header=",".join(rows[0])
+        )
+    even, jumped = (
+        formats.read_states(run(tmp_path / name, tmp_path / f"{name}-out", *assignments)) for name in ("even", "jumped")
+    )
+    early, again = even.select(even.frame < 25), jumped.select(jumped.frame < 25)
+    assert len(set(again.id.tolist())) <= len(set(early.id.tolist())) + 1
+    assert not set(jumped.id[jumped.frame < 30].tolist()) & set(jumped.id[jumped.frame >= 30].tolist())
+    assert np.sqrt(jumped.cov[:, 0, 0]).max() < 2 * np.sqrt(even.cov[:, 0, 0]).max()
+    density = [
+        json.loads((tmp_path / f"{name}-out" / "summary.json").read_text())["clutter_density"]
+        for name in ("even", "jumped")
+    ]
+    assert 0.5 < density[1] / density[0] < 2
+    assert "the time jumps from 116 to 1000120 s" in caplog.text
+
+
 def test_evaluation_knows_the_run(tmp_path, scenario):
     out = run(scenario("radar-crossing"), tmp_path / "out")
     found = scores(out, scenario("radar-crossing"), 1000.0)

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from vidtrack.cli.eval import command
-from vidtrack.errors import OutputError
+from vidtrack.errors import FormatError, OutputError
 
 TRUTH = "".join(f"{f},1,10,10,20,20,1,1,1\n" for f in range(1, 11))
 RESULT = "".join(f"{f},{5 if f < 6 else 6},10,10,20,20,1,-1,-1,-1\n" for f in range(1, 11))
@@ -55,3 +55,11 @@ def test_json_in_a_file_leaves_the_table_on_stdout(files):
 def test_a_file_that_cannot_be_written_is_an_error(files):
     with pytest.raises(OutputError, match="cannot write"):
         run(files / "run", files / "gt.txt", "--json", files)
+
+
+def test_a_truth_of_other_scans_is_refused(tmp_path):
+    for name, step_s in (("tracks", 4), ("truth", 2)):
+        rows = "".join(f"{k},{step_s * k},1,0,0\n" for k in range(9))
+        (tmp_path / f"{name}.csv").write_text("scan,time_s,track_id,x_m,y_m\n" + rows)
+    with pytest.raises(FormatError, match="scan 8 is at 32 s in the result and at 16 s in the truth"):
+        run(tmp_path / "tracks.csv", tmp_path / "truth.csv")

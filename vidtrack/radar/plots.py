@@ -16,13 +16,21 @@ from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
 from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.feeds.messages import NAN, Kind, Message, Messages
+from vidtrack.radar.feeds.pace import Turns, pace_of
 from vidtrack.radar.plane import Plane
+from vidtrack.radar.rhythm import longest_step
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
 
 MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
 KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
+
+
+ONE_BY_ONE, EVENLY = 0.9, 0.1
+"""Share of plots with their own time from which scans are looked for in turns of the antenna, and how far a step may be
+from a multiple of the usual one, in usual steps, to count as such."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +77,8 @@ class Plots:
 def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots:
     """Read a CSV or Parquet table of plots.
 
-    Rows may come in any order. Without a column `scan`, plots of the same time are one scan. Standard
-    deviations come from columns, else from the settings.
+    Rows may come in any order. Without a column `scan`, plots of the same time are one scan, or, if nearly each has its
+    own time, those of one turn of the antenna. Standard deviations come from columns, else from the settings.
     Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
     rows. With settings.skip_bad_rows bad rows are left out with a warning.
     """
@@ -93,7 +101,7 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
 def _numbered(table: Table) -> Table:
     """The table with a column of scans: those of its times, if it has none and no other column may be meant.
 
-    A gap of several usual steps between two times holds empty scans.
+    A gap of several usual steps between two times holds empty scans, and a pause none.
     """
     scan, time = TIME
     similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
@@ -102,13 +110,57 @@ def _numbered(table: Table) -> Table:
     times, member = np.unique(table.columns[time], return_inverse=True)
     steps = np.diff(times[np.isfinite(times)])
     usual = float(np.median(steps)) if len(steps) else 1.0
-    number = np.concatenate([[0], np.cumsum(np.maximum(1, np.round(steps / usual)))])
+    if _one_by_one(steps, len(member)):
+        turned = _turned(table)
+        if turned is not None:
+            return replace(table, columns=table.columns | {scan: turned})
+        _log.warning(
+            "%s has no column 'scan', and nearly every plot its own time: give the plots of one turn the same scan",
+            table.path,
+        )
+    passed = np.where(steps > longest_step(steps), 1, np.maximum(1, np.round(steps / usual)))
+    number = np.concatenate([[0], np.cumsum(passed)])
     number = np.concatenate([number, np.full(len(times) - len(number), np.nan)])
     _log.warning(
         "%s has no column 'scan': plots of the same time are one scan; %d scans, %.6g s apart",
         table.path, len(steps) + 1, usual,
     )  # fmt: skip
     return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
+
+
+def _one_by_one(steps: Floats, plots: int) -> bool:
+    """Whether nearly each of the plots has its own time, with steps (N,) that are not multiples of the usual one."""
+    if len(steps) < 2 or len(steps) < ONE_BY_ONE * plots:
+        return False
+    passed = steps / np.median(steps)
+    return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
+
+
+def _turned(table: Table) -> Floats | None:
+    """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times; None: they follow no antenna."""
+    time_s, azimuth = (table.columns.get(name) for name in (TIME[1], POLAR[1]))
+    if time_s is None or azimuth is None:
+        return None
+    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(azimuth))
+    if len(rows) < 2:
+        return None
+    rows = rows[np.argsort(time_s[rows], kind="stable")]
+    polar = (
+        Message(Kind.POLAR, 0, 0, t, NAN, a)
+        for t, a in zip(time_s[rows].tolist(), np.radians(azimuth[rows]).tolist(), strict=True)
+    )
+    plots = Messages.of(list(polar))
+    pace = pace_of(plots, None)
+    if not isinstance(pace, Turns):
+        return None
+    turn = np.floor(pace.progress(plots))
+    scan = np.zeros(len(time_s))
+    scan[rows] = turn - turn.min()
+    _log.warning(
+        "%s has no column 'scan': azimuths and times follow an antenna, its turns are scans; %d scans, %.6g s apart",
+        table.path, scan.max() + 1, pace.period_s,
+    )  # fmt: skip
+    return scan
 
 
 def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:
@@ -133,6 +185,11 @@ def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plot
 def _measured(table: Table) -> list[str]:
     """The measurement columns in the order of z; polar columns if the file has both kinds."""
     unknown = [name for name in table.names if name not in KNOWN] or table.names
+    if not set(TIME) & set(table.names):
+        time = TIME[1]
+        raise PlotFormatError(
+            f"{table.path} has no column {time!r}, which plots need; {nearest(time, unknown)}; 'scan' may be left out"
+        )
     for name in TIME:
         if name not in table.columns:
             raise PlotFormatError(f"{table.path} has no column {name!r}; {nearest(name, unknown)}")

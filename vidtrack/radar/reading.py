@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 from vidtrack.config.radar import RadarSettings
 from vidtrack.radar.feeds.recording import is_feed, read_recording
 from vidtrack.radar.plots import Plots, read_plots
+from vidtrack.radar.rhythm import rhythm
+
+_log = logging.getLogger(__name__)
 
 
 def read(path: str | Path, settings: RadarSettings) -> Plots:
     """The plots of a table (CSV, Parquet) or a recording (ASTERIX, NMEA, AIS).
 
-    Raises the errors of `read_plots` and `read_recording`.
+    A warning tells of pauses, in which all tracks end. Raises the errors of `read_plots` and `read_recording`.
     """
-    return read_recording(path, settings) if is_feed(path) else read_plots(path, settings)
+    plots = read_recording(path, settings) if is_feed(path) else read_plots(path, settings)
+    pauses = rhythm(plots.scan, plots.time_s)
+    for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
+        others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""
+        _log.warning(
+            "%s: the time jumps from %.10g to %.10g s%s; all tracks end there: is the clock right?",
+            path, begin_s, end_s, others,
+        )  # fmt: skip
+    return plots

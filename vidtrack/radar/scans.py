@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,6 +12,7 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
 from vidtrack.radar.plots import Plots
+from vidtrack.radar.rhythm import Rhythm, rhythm
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
 from vidtrack.radar.sweep import Sweep
 from vidtrack.scan import Scan
@@ -75,6 +76,11 @@ class Measurements:
         """Number of scans, empty ones included."""
         return int(self.scan[-1] - self.scan[0]) + 1
 
+    @property
+    def rhythm(self) -> Rhythm:
+        """How the scans follow each other."""
+        return rhythm(self.scan, self.time_s)
+
     def __iter__(self) -> Iterator[tuple[int, Scan]]:
         """Number and scan, from the first to the last."""
         noise = self.R.mean(axis=0)
@@ -127,6 +133,11 @@ def _polar(plots: Plots, settings: RadarSettings) -> Sensor:
     return RangeAzimuthElevation(settings.position, plots.doppler)
 
 
+def longest_coast(feeds: Sequence[Measurements]) -> float:
+    """Longest time from scan to scan that is a pause of none of the feeds [s]; no track coasts for longer."""
+    return max((found.rhythm.limit_s for found in feeds), default=np.inf)
+
+
 def clutter_density(found: Measurements) -> float:
     """Plots per scan and unit of measurement space: an upper bound, because targets count as clutter."""
     return len(found.z) / found.count / surveyed(found)
@@ -161,7 +172,7 @@ def _margin(found: Measurements) -> Floats:
 
     An angle turns by that over the usual range; without ranges it may turn by as much as it likes.
     """
-    step = 2 * REACH_SCANS * 2 * found.speed * (found.time_s[-1] - found.time_s[0]) / max(1, found.count - 1)
+    step = 2 * REACH_SCANS * 2 * found.speed * found.rhythm.scan_s
     margin = np.full(found.z.shape[1], step)
     margin[list(found.sensor.angles)] = 2 * np.pi
     if isinstance(found.sensor, RangeAzimuth | RangeAzimuthElevation):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.filters import estimator, motion
-from vidtrack.radar.scans import NONLINEAR, Measurements
+from vidtrack.radar.scans import NONLINEAR, Measurements, longest_coast
 from vidtrack.scan import Scan
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.formation.groups import Formation, GroupTracker, GroupTracks
@@ -42,7 +42,14 @@ class Groups:
             estimator=estimator(radar, found, seed),
             associate=associate,
             gate=gate(common, radar.euclidean_radius_m, adaptive=True),
-            life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
+            life=life(
+                radar.life,
+                common,
+                common.confirm_hits,
+                common.confirm_window,
+                coast_s=longest_coast([found]),
+                coast_scans=radar.coast_scans,
+            ),
             picture=NoPicture(),
             stations=[Station(rates)],
         )

@@ -30,7 +30,7 @@ from vidtrack.output.threaded import Threaded
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.own_threshold import GATE, controller
 from vidtrack.radar.reading import read
-from vidtrack.radar.scans import Measurements, extent, measurements, surveyed
+from vidtrack.radar.scans import Measurements, extent, longest_coast, measurements, surveyed
 from vidtrack.run.groups import Groups
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
@@ -191,7 +191,14 @@ def build_point_tracker(
         associate=rule(common, unresolved=isinstance(sharing, Unresolved)),
         gate=admits,
         threshold=threshold,
-        life=life(radar.life, common, common.confirm_hits, common.confirm_window, coast_scans=radar.coast_scans),
+        life=life(
+            radar.life,
+            common,
+            common.confirm_hits,
+            common.confirm_window,
+            coast_s=longest_coast(found),
+            coast_scans=radar.coast_scans,
+        ),
         picture=NoPicture(),
         sharing=sharing,
         stations=stations,

@@ -36,5 +36,7 @@ def _stack(tables: Sequence[Table]) -> Table:
         columns = [getattr(table, name) for table in tables]
         return None if any(values is None for values in columns) else np.concatenate(columns)
 
-    columns: dict[str, Any] = {name: column(name) for name in ("frame", "id", "xy", "box", "conf", "cov", "nis")}
+    columns: dict[str, Any] = {
+        name: column(name) for name in ("frame", "id", "xy", "box", "conf", "cov", "nis", "time_s")
+    }
     return replace(tables[0], **columns)

@@ -38,7 +38,8 @@ def evaluate(
     OSPA and GOSPA use 1 - IoU or the distance, `cutoff` (None: 1 for boxes, max_distance for points)
     and `order`; they are means over the frames in which truth or result has a row, and so are their parts.
     NIS and NEES are from `states` (None: result) if it has the columns.
-    Raises FormatError for tables without identities or a truth without rows, ConfigError for bad options.
+    Raises FormatError for tables without identities, a truth without rows, and scan numbers that stand for other times
+    in the truth than in the result; ConfigError for bad options.
     """
     truth = truth.select(truth.conf != 0)
     if not len(truth):
@@ -47,6 +48,7 @@ def evaluate(
         if (table.id < 0).any():
             raise FormatError(f"the {name} has rows without identity (id -1); give tracks, not detections")
 
+    _refuse_other_scans(result, truth)
     if not 0 < iou <= 1:
         raise ConfigError(f"iou is {iou}; it must be above 0 and at most 1")
     if max_distance is None:
@@ -74,6 +76,24 @@ def evaluate(
         **_set_distances(matchup, cutoff, order),
         **_consistency(states, truth, matchup if states is result else match(states), threshold),
     }
+
+
+def _refuse_other_scans(result: Table, truth: Table) -> None:
+    """Raise FormatError where most of the common scan numbers are of other times; the clocks may begin differently."""
+    if result.time_s is None or truth.time_s is None:
+        return
+    scan, in_result, in_truth = np.intersect1d(result.frame, truth.frame, return_indices=True)
+    if len(scan) < 2:
+        return
+    ours, theirs = result.time_s[in_result], truth.time_s[in_truth]
+    off = ours - theirs
+    step_s = max(np.median(np.diff(ours)), np.median(np.diff(theirs)))
+    if np.median(np.abs(off - np.median(off))) > step_s / 2:
+        k = int(np.abs(off - off[0]).argmax())
+        raise FormatError(
+            f"scan {scan[k]} is at {ours[k]:.10g} s in the result and at {theirs[k]:.10g} s in the truth, which "
+            "numbers other scans, such as those of a whole network of radars; give the truth at the scans of the result"
+        )
 
 
 def _counts(matchup: Matchup) -> dict[str, int]:

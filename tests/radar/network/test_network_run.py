@@ -193,6 +193,21 @@ def test_a_recording_of_two_radars_is_split_by_their_codes(sites, caplog):
     assert "not" not in "".join(one for one in caplog.messages if "tracked are" in one)
 
 
+def test_the_plots_of_one_radar_are_not_those_of_two(biased, sites):
+    (biased / "copy.csv").write_bytes((biased / "south.csv").read_bytes())
+    toml = (biased / "radars.toml").read_text() + "[radars.copy]\nx_m = 100\ny_m = 50\nboresight_deg = 7\n"
+    (biased / "copies.toml").write_text(toml)
+    paths = [str(biased / f"{name}.csv") for name in ("north", "south", "copy")]
+    with pytest.raises(vt.ConfigError, match=r"'south' and 'copy' have the same plots .* one radar; leave one of them"):
+        read_feeds(paths, read_radars(biased / "copies.toml"), load().radar)
+    (sites / "echo.ast").write_bytes((sites / "a.ast").read_bytes())
+    (sites / "echo.toml").write_text("[radars.a]\nx_m = 0\ny_m = 0\n[radars.echo]\nx_m = 0\ny_m = 0\n")
+    with pytest.raises(vt.ConfigError, match=r"same plots \(8 of 8\)"):
+        read_feeds(
+            [str(sites / f"{name}.ast") for name in ("a", "echo")], read_radars(sites / "echo.toml"), load().radar
+        )
+
+
 def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):
     (sites / "one.toml").write_text("[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n")
     with pytest.raises(vt.ConfigError, match="no radar with sac = 25 and sic = 202"):

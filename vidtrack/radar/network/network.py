@@ -6,6 +6,7 @@ import heapq
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
 
 _log = logging.getLogger(__name__)
+MOSTLY = 0.5
+"""Share of the plots of the smaller of two feeds; with more of them in the other feed the two are of one radar."""
 _OWN = ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s", "scan_s", "sac", "sic")
 """Settings that a radar's table may have; else those of the run hold."""
 
@@ -143,7 +146,8 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     """The feeds of tables and recordings: the file NAME.csv, NAME.ast, ... has the plots of the radar NAME.
 
     A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
-    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one.
+    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, and for two
+    radars with the same plots.
     """
     feeds = [feed for path in paths for feed in _feeds(Path(path), radars, settings)]
     names = [feed.placed.name for feed in feeds]
@@ -153,7 +157,28 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     if len(feeds) > 1 and any(not feed.plots.polar for feed in feeds):
         cartesian = next(feed.placed.name for feed in feeds if not feed.plots.polar)
         raise ConfigError(f"the plots of radar {cartesian!r} have x and y; several radars need range_m and azimuth_deg")
+    for one, other in combinations(feeds, 2):
+        _refuse_same(one, other)
     return feeds
+
+
+def _refuse_same(one: Feed, other: Feed) -> None:
+    """Raise ConfigError if most plots of a feed are another's: echoes of one radar would confirm its false plots."""
+    measured = [_as_measured(feed) for feed in (one, other)]
+    fewer = min(map(len, measured))
+    same = int((np.unique(np.concatenate(measured), axis=0, return_counts=True)[1] > 1).sum())
+    if same > MOSTLY * fewer:
+        raise ConfigError(
+            f"radars {one.placed.name!r} and {other.placed.name!r} have the same plots ({same} of {fewer}), so they "
+            "are one radar; leave one of them out"
+        )
+
+
+def _as_measured(feed: Feed) -> Floats:
+    """(N, 4) time, range and direction of each different plot as the radar measured it, not turned to north."""
+    azimuth = feed.plots.z[:, 1] - feed.placed.turned
+    direction = np.column_stack([np.cos(azimuth), np.sin(azimuth)]).round(9) + 0.0  # no -0, which is another row
+    return np.unique(np.column_stack([feed.plots.time_s, feed.plots.z[:, 0], direction]), axis=0)
 
 
 def _feeds(path: Path, radars: Radars, settings: RadarSettings) -> list[Feed]:
@@ -181,8 +206,7 @@ def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
     if plots.polar:
         plots.z[:, 1] = wrap(plots.z[:, 1] + placed.turned)
     found = measurements(plots, settings)
-    length_s = (plots.time_s[-1] - plots.time_s[0]) / max(1, found.count - 1)
-    return Feed(placed, plots, settings, found, radar.scan_s or max(float(length_s), 1e-3))
+    return Feed(placed, plots, settings, found, radar.scan_s or max(found.rhythm.scan_s, 1e-3))
 
 
 def _level(plots: Plots, path: Path) -> Plots:

@@ -1,0 +1,43 @@
+"""How regularly scans follow each other: the time of a scan, and pauses that no track outlives."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vidtrack.arrays.types import Floats, Ints, Mask
+
+PAUSE_S, PAUSE_SCANS = 3600.0, 100
+"""A step from one scan to the next that is longer than both, the second in usual steps, is a pause."""
+
+
+class Rhythm(NamedTuple):
+    """The times of scans.
+
+    scan_s   s; mean time of a scan outside of pauses; 0 for a single scan
+    limit_s  s; a longer step is a pause; infinite for a single scan
+    begin_s, end_s   (K,) s; the last scan before each pause, and the first after it
+    """
+
+    scan_s: float
+    limit_s: float
+    begin_s: Floats
+    end_s: Floats
+
+
+def rhythm(scan: Ints, time_s: Floats) -> Rhythm:
+    """The rhythm of scans with these plots (N,): their scans' numbers in order, and times; empty scans count, too."""
+    number, first, size = np.unique(scan, return_index=True, return_counts=True)
+    mean_s = np.add.reduceat(time_s, first) / size
+    scans, step_s = np.diff(number), np.diff(mean_s)
+    limit_s = longest_step(step_s / scans)
+    paused: Mask = step_s > limit_s * scans
+    going_s = time_s[-1] - time_s[0] - step_s[paused].sum()
+    scan_s = going_s / max(1, int(scans[~paused].sum()))
+    return Rhythm(float(scan_s), limit_s, mean_s[:-1][paused], mean_s[1:][paused])
+
+
+def longest_step(step_s: Floats) -> float:
+    """Longest step that is no pause [s], after steps (N,) from scan to scan; infinite without any."""
+    return max(PAUSE_S, PAUSE_SCANS * float(np.median(step_s))) if len(step_s) else np.inf
