@@ -60,6 +60,8 @@ def test_printed_settings_load_as_the_same_settings(tmp_path, explain):
         ("tracker.merged_blobs=false", False),
         ("source.end_s=none", None),
         ("source.end_s=1e2", 100.0),
+        ("radar.resampling=none", "none"),
+        ("radar.model=none", None),
         ("source.mask=a b/mask.png", Path("a b/mask.png")),
         ("detector.disturbance.majority_px=9", 9),
         ('output.lines=["a:1,2,3,4"]', ("a:1,2,3,4",)),

@@ -137,6 +137,16 @@ def test_a_file_may_hold_settings_for_other_inputs_but_none_of_its_own_without_e
     assert load(path, kind=Input.RADAR).radar.particles == 50
 
 
+def test_file_and_command_line_are_judged_together(tmp_path):
+    path = tmp_path / "settings.toml"
+    path.write_text("[radar]\nparticles = 50\n")
+    assert load(path, ["radar.estimator=particle"], kind=Input.RADAR).radar.particles == 50
+    path.write_text('[radar]\nestimator = "particle"\nparticles = 50\n')
+    said = "setting radar.particles has no effect with radar.estimator=ekf; it needs radar.estimator=particle"
+    assert refused(Input.RADAR, "radar.estimator=ekf", file=path) == said
+    assert refused(Input.RADAR, "radar.estimator=ekf", "radar.particles=60", file=path) == said
+
+
 @pytest.mark.parametrize("kind", Input)
 def test_what_config_prints_is_accepted_for_every_input(kind, tmp_path):
     path = tmp_path / "settings.toml"

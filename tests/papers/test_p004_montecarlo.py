@@ -1,11 +1,15 @@
+import csv
+
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from vidtrack.associate.gate import Gate
 from vidtrack.associate.hard import GNN
+from vidtrack.cli.reproduce import command
 from vidtrack.estimate.motion.velocity import ConstantVelocity
-from vidtrack.papers.p004 import reference
-from vidtrack.papers.p004.montecarlo import PAIRS, difference, measure
+from vidtrack.papers.p004 import montecarlo, reference
+from vidtrack.papers.p004.montecarlo import OTHERS, PAIRS, difference, measure
 from vidtrack.papers.p004.scenarios import crossing, nine, shares, wrong_identities
 from vidtrack.papers.p004.simulated import Targets, drive, nearest_target, track, two_points
 
@@ -14,9 +18,9 @@ RUNS = 2000
 
 @pytest.fixture(scope="module")
 def table():
-    *parts, (table, _) = measure(RUNS, 1, PAIRS)
-    assert len(parts) == len(reference.CROSSING)
-    return table
+    *_, (table, _) = measure(RUNS, 1, PAIRS)
+    assert {outcome.runs for outcome in table.values()} == {RUNS}
+    return {scenario: outcome.shares for scenario, outcome in table.items()}
 
 
 @pytest.mark.parametrize("scenario", reference.CROSSING)
@@ -25,6 +29,35 @@ def test_shares_agree_with_the_reference_within_four_standard_errors(table, scen
     theirs = np.array(reference.CROSSING[scenario][pair])
     assert table[scenario][pair].sum() == pytest.approx(1)
     assert np.abs(difference(table[scenario][pair], RUNS, theirs)).max() < 4
+
+
+def test_a_stopped_run_leaves_its_last_batch(tmp_path, monkeypatch):
+    def stopped(targets, method, distance):
+        if len(done) == 2 * len(PAIRS + OTHERS) + 3:
+            raise KeyboardInterrupt
+        done.append(method)
+        return shares(targets, method, distance)
+
+    done: list[str] = []
+    monkeypatch.setattr(montecarlo, "BATCH", 20)
+    monkeypatch.setattr(montecarlo, "shares", stopped)
+    result = CliRunner().invoke(command, ["004-montecarlo", "--runs", "100", "-o", str(tmp_path / "out")])
+    assert result.exit_code != 0
+    assert "004-montecarlo up to here is in" in result.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "004-montecarlo.csv").open()))
+    assert {(row["scenario"], row["runs"]) for row in rows} == {(next(iter(reference.CROSSING)), "40")}
+    assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".csv", ".png"}
+
+
+def test_batches_change_nothing(monkeypatch):
+    *_, (whole, wrong) = measure(90, 7, PAIRS)
+    monkeypatch.setattr(montecarlo, "BATCH", 40)
+    *_, (table, counts) = measure(90, 7, PAIRS)
+    for scenario, outcome in whole.items():
+        for pair, ours in outcome.shares.items():
+            np.testing.assert_allclose(table[scenario].shares[pair], ours)
+    for pair, count in wrong.items():
+        np.testing.assert_array_equal(counts[pair], count)
 
 
 def test_with_isotropic_noise_the_confidence_region_is_the_minimum_distance_exactly():

@@ -73,7 +73,6 @@ def test_table_and_file(tmp_path):
         (("--snr-db", 10, "--cells", 0), "--cells is 0"),
         (("--snr-db", 10, "--cells", 10, "--pfa-max", 2), "--pfa-max is 2"),
         (("--snr-db", 10, "--cells", 10, "--gate", 0), "gate is 0"),
-        (("--snr-db", 10, "--cells", 10, "--weibull", "1,1"), "Rayleigh clutter"),
         (("--snr-db", 10, "--filter", "psn", "--weibull", "-1,2"), "shape is -1"),
         (("--snr-db", 10, "--filter", "psn", "--cell", -1), "cell volume is -1"),
     ],
@@ -89,3 +88,18 @@ def test_clutter_that_is_no_pair_of_numbers_is_refused(text):
     outcome = CliRunner().invoke(command, ["--snr-db", "10", "--filter", "psn", "--weibull", text])
     assert outcome.exit_code == 2
     assert f"'{text}' is not two numbers B,C" in outcome.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("--cells", "10", "--cell", "0.1"), "--cell"),
+        (("--cells", "10", "--q", "0.2"), "--q"),
+        (("--cells", "10", "--weibull", "1,1"), "--weibull"),
+        (("--filter", "psn", "--cells", "10"), "--cells"),
+    ],
+)
+def test_options_without_effect_on_the_filter_are_refused(arguments, option):
+    outcome = CliRunner().invoke(command, ["--snr-db", "10", *arguments])
+    assert outcome.exit_code == 2
+    assert f"{option} has no effect with --filter" in outcome.output

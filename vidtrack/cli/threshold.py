@@ -12,6 +12,8 @@ from vidtrack.cli.radar_problem import ProblemOptions, problem_options
 
 Numbers = dict[str, float | bool | None]
 
+_UNUSED = {"pda": ("q", "cell", "weibull"), "psn": ("cells",)}
+"""Options without effect on the threshold of a filter."""
 LEAST_CELLS, MOST_CELLS = 1e-3, 1e12
 
 MEANING = {
@@ -54,14 +56,15 @@ def command(options: ThresholdOptions) -> None:
     """The P_FA that lets a filter learn most of a Swerling I target.
 
     pda: P_FA that maximises the information reduction factor q2 for --cells resolution cells in the gate, in closed
-    form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter; --q, --cell and --weibull play no part. The closed form
+    form (p_fa) and exactly (p_fa_exact), for Rayleigh clutter; --q, --cell and --weibull are refused. The closed form
     is for a --gate of 4; with another gate only the exact optimum is given. Where the closed form does not hold (SNR
     of 1.96 dB or less) or gives --pfa-max or more, p_fa is --pfa-max and clamped is true. psn: P_FA that minimises
-    the predicted steady-state error of a probabilistic strongest neighbour filter.
+    the predicted steady-state error of a probabilistic strongest neighbour filter; --cells is refused.
     """
     from vidtrack.errors import ConfigError
 
     start_log(options.verbose, options.quiet)
+    _refuse_unused(options.kind)
     folder = options.folder("threshold")
     snr = options.snr()
     if not 0 < options.pfa_max <= 1:
@@ -69,6 +72,14 @@ def command(options: ThresholdOptions) -> None:
     numbers = _of_pda(options, snr) if options.kind == "pda" else _of_psn(options, snr)
     if deliver(numbers, options.json_to, folder and folder / "threshold.json", options.quiet):
         _print_table(numbers, f"{options.kind} filter at {options.snr_db:g} dB")
+
+
+def _refuse_unused(kind: str) -> None:
+    """Raise UsageError for options on the command line that have no effect with this filter."""
+    context = click.get_current_context()
+    for name in _UNUSED[kind]:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name} has no effect with --filter {kind}; leave it out")
 
 
 def _of_psn(options: ThresholdOptions, snr: float) -> Numbers:
@@ -98,8 +109,6 @@ def _of_pda(options: ThresholdOptions, snr: float) -> Numbers:
         raise ConfigError(
             f"--cells is {cells}; give the number of resolution cells in the gate, {LEAST_CELLS:g}..{MOST_CELLS:g}"
         )
-    if options.weibull is not None:
-        raise ConfigError("the threshold of pda holds for Rayleigh clutter; leave --weibull")
     if not LEAST_GATE <= options.gate <= MOST_GATE:
         raise ConfigError(f"gate is {options.gate:g}; it must lie in {LEAST_GATE:g}..{MOST_GATE:g}")
     exact = float(optimum(snr, cells, options.pfa_max, gate=options.gate))

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from vidtrack.config.group import read_toml
 from vidtrack.config.inputs import Input, is_own, needs, needs_one_of, reads
@@ -30,21 +31,21 @@ def load(
     base  nested settings between the defaults and the file
     kind  of the input: settings without effect on it are refused; None: unknown, nothing is refused
 
-    A file may contain groups for other kinds of input, and settings at their defaults.
+    A file may contain groups for other kinds of input, and settings at their defaults. Whether a setting has an effect
+    is judged by all settings together.
     Raises ConfigError for an unreadable file, an unknown key, a bad value, or a setting without effect.
     """
     filed = {} if path is None else read_toml(Path(path), "settings")
     assigned = [_split(one) if isinstance(one, str) else one for one in assignments]
     tree = merged(base or {}, filed)
-    if kind is not None and filed:
-        alone, usual = parse(tree), Settings()
-        own = (name for name in _leaves(filed) if is_own(kind, name))
-        _refuse_idle(kind, alone, [name for name in own if value_of(alone, name) != value_of(usual, name)])
     for name, value in assigned:
         _assign(tree, name.split("."), value)
     settings = parse(tree)
     if kind is not None:
-        _refuse_idle(kind, settings, [name for name, _ in assigned])
+        usual = Settings()
+        own = (name for name in _leaves(filed) if is_own(kind, name))
+        unusual = [name for name in own if value_of(settings, name) != value_of(usual, name)]
+        _refuse_idle(kind, settings, dict.fromkeys([*unusual, *(name for name, _ in assigned)]))
     return settings
 
 
@@ -123,7 +124,13 @@ def _split(assignment: str) -> tuple[str, Any]:
     name, equals, text = assignment.partition("=")
     if not equals or not name.strip():
         raise ConfigError(f"--set {assignment!r}: write it as group.name=value")
-    return name.strip(), _value(text.strip())
+    name, text = name.strip(), text.strip()
+    return name, text if text in _choices(name) else _value(text)
+
+
+def _choices(name: str) -> tuple[Any, ...]:
+    """The names among which a setting is chosen; none for another setting, a group, and an unknown name."""
+    return next((get_args(info.annotation) for known, info in _fields() if known == name), ())
 
 
 def _value(text: str) -> Any:
@@ -159,10 +166,15 @@ def _complaint(detail: Any) -> str:
     return f"setting {name} = {detail['input']!r}: {message[0].lower()}{message[1:]}"
 
 
-def names(group: type[BaseModel] = Settings, prefix: str = "") -> Iterable[str]:
+def names() -> Iterator[str]:
     """Dotted names of all settings and groups."""
+    return (name for name, _ in _fields())
+
+
+def _fields(group: type[BaseModel] = Settings, prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    """All settings and groups, each with its dotted name."""
     for name, info in group.model_fields.items():
-        yield prefix + name
+        yield prefix + name, info
         kind = info.annotation
         if isinstance(kind, type) and issubclass(kind, BaseModel):
-            yield from names(kind, f"{prefix}{name}.")
+            yield from _fields(kind, f"{prefix}{name}.")

@@ -19,7 +19,7 @@ class Experiment:
     title: str
 
     def results(self, runs: int | None = None, seed: int = 0) -> Iterator[Result]:
-        """Run the experiment: the result, in long experiments also those of the parts that are done.
+        """Run the experiment: the result, before it in long experiments those of what is done by then.
 
         runs  Monte Carlo runs or simulated videos; None: as many as the claim needs
         """

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vidtrack.output.folder import writing
+from vidtrack.output.folder import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,10 +30,10 @@ class Result:
     verdict: str
 
     def write(self, folder: Path, name: str) -> None:
-        """Write NAME.png and NAME.csv into an existing folder. Raises StoppedEarly if writing fails."""
-        with writing(folder / f"{name}.png"):
-            self.figure.savefig(folder / f"{name}.png")
-        with writing(folder / f"{name}.csv"), (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+        """Write NAME.png and NAME.csv into an existing folder, each at once. Raises StoppedEarly if writing fails."""
+        with replacing(folder / f"{name}.png") as new:
+            self.figure.savefig(new, format="png")
+        with replacing(folder / f"{name}.csv") as new, new.open("w", newline="", encoding="utf-8") as file:
             table = csv.DictWriter(file, list(self.rows[0]))
             table.writeheader()
             table.writerows({key: _text(value) for key, value in row.items()} for row in self.rows)

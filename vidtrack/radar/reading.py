@@ -6,19 +6,30 @@ import logging
 from pathlib import Path
 
 from vidtrack.config.radar import RadarSettings
+from vidtrack.errors import ConfigError
 from vidtrack.radar.feeds.recording import is_feed, read_recording
 from vidtrack.radar.plots import Plots, read_plots
 from vidtrack.radar.rhythm import rhythm
 
 _log = logging.getLogger(__name__)
 
+OF_RECORDINGS = ("scan_s", "sac", "sic")
+"""Settings without effect on a table, in which scans are numbered and the radar is one."""
+
 
 def read(path: str | Path, settings: RadarSettings) -> Plots:
     """The plots of a table (CSV, Parquet) or a recording (ASTERIX, NMEA, AIS).
 
-    A warning tells of pauses, in which all tracks end. Raises the errors of `read_plots` and `read_recording`.
+    A warning tells of pauses, in which all tracks end. Raises the errors of `read_plots` and `read_recording`, and
+    ConfigError for settings of recordings with a table.
     """
-    plots = read_recording(path, settings) if is_feed(path) else read_plots(path, settings)
+    feed = is_feed(path)
+    plots = read_recording(path, settings) if feed else read_plots(path, settings)
+    idle = [] if feed else [name for name in OF_RECORDINGS if getattr(settings, name) is not None]
+    if idle:
+        raise ConfigError(
+            "\n".join(f"setting radar.{name} has no effect on a table, {path}; leave it out" for name in idle)
+        )
     pauses = rhythm(plots.scan, plots.time_s)
     for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
         others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""

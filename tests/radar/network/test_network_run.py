@@ -216,6 +216,18 @@ def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):
     assert len(feed.plots) == 8
 
 
+def test_settings_of_recordings_need_one_whose_radar_does_not_have_them(sites, biased):
+    radars = read_radars(sites / "radars.toml")
+    for assignment in ("radar.sac=25", "radar.sic=201"):
+        with pytest.raises(vt.ConfigError, match=r"radar.si?a?c has no effect here: .* no si?a?c in"):
+            read_feeds([str(sites / "a.ast")], radars, load(assignments=[assignment]).radar)
+    (feed,) = read_feeds([str(sites / "a.ast")], radars, load(assignments=["radar.scan_s=4"]).radar)
+    assert len(feed.plots) == 8
+    with pytest.raises(vt.ConfigError, match=r"radar.scan_s has no effect here"):
+        read_feeds([str(biased / "north.csv")], read_radars(biased / "radars.toml"),
+                   load(assignments=["radar.scan_s=4"]).radar)  # fmt: skip
+
+
 def test_positions_are_no_plots_of_a_radar(sites):
     (sites / "c.ast").write_bytes(b"".join(track(100.0 + 4 * k, 50.0, 8.0, 1) for k in range(6)))
     (sites / "c.toml").write_text("[radars.c]\nlatitude = 50\nlongitude = 8\n")

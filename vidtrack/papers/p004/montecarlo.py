@@ -7,6 +7,7 @@ frames or always separate, along the axes or rotated by 45 degrees. A second exp
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -26,35 +27,51 @@ if TYPE_CHECKING:
 RUNS = 10_000
 RUNS_PER_NINE = 20
 """Crossings for each run of nine targets, which takes longer."""
+BATCH = 1000
+"""Crossings after which there is a result, so that a killed process leaves one."""
 
 Pair = tuple[str, Distance]
 PAIRS: tuple[Pair, ...] = tuple((method, distance) for distance in DISTANCES for method in ("nn", "gnn"))
 """Pairs in the reference."""
 OTHERS: tuple[Pair, ...] = tuple((name, "mahalanobis") for name in ("generalized-nn", "pda", "jpda", "split", "mht"))
-Table = dict[str, dict[Pair, Floats]]
 WORDS = {"euclidean": "minimum distance", "decoupled": "region, eq. (8)", "mahalanobis": "region, full S"}
 
 
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Shares (4,) of the runs of one scenario, by pair, and how many runs they stand on."""
+
+    runs: int
+    shares: dict[Pair, Floats]
+
+
+Table = dict[str, Outcome]
+
+
 def reproduce(runs: int | None, seed: int) -> Iterator[Result]:
-    """Simulate all scenarios and methods with `runs` crossings each; a result after each scenario."""
-    runs = RUNS if runs is None else runs
-    for table, wrong in measure(runs, seed):
-        yield Result(_figure(table, wrong), _rows(table, wrong, runs), _verdict(table, runs))
+    """Simulate all scenarios and methods with `runs` crossings each; a result after each batch of them."""
+    for table, wrong in measure(RUNS if runs is None else runs, seed):
+        yield Result(_figure(table, wrong), _rows(table, wrong), _verdict(table))
 
 
 def measure(
     runs: int, seed: int, pairs: tuple[Pair, ...] = PAIRS + OTHERS
 ) -> Iterator[tuple[Table, dict[Pair, Floats]]]:
-    """Shares (4,) of each scenario and pair, and wrong identities (runs,) of nine targets for each pair, so far."""
+    """Outcomes of each scenario, and wrong identities (runs,) of nine targets for each pair, so far."""
     rng = np.random.default_rng(seed)
     table: Table = {}
     for scenario in reference.CROSSING:
         turn = np.pi / 4 if "45" in scenario else 0.0
-        targets = crossing(runs, turn, "never" not in scenario, rng)
-        table[scenario] = {pair: shares(targets, *pair) for pair in pairs}
-        yield table, {}
-    targets = nine(-(-runs // RUNS_PER_NINE), rng)
-    yield table, {pair: wrong_identities(targets, *pair) for pair in pairs}
+        count, before = dict.fromkeys(pairs, np.zeros(4)), 0
+        for done, targets in crossing(runs, turn, "never" not in scenario, rng).batches(BATCH):
+            count = {pair: count[pair] + shares(targets, *pair) * (done - before) for pair in pairs}
+            table[scenario] = Outcome(done, {pair: ended / done for pair, ended in count.items()})
+            before = done
+            yield table, {}
+    wrong = dict.fromkeys(pairs, np.zeros(0))
+    for _, targets in nine(-(-runs // RUNS_PER_NINE), rng).batches(BATCH // RUNS_PER_NINE):
+        wrong = {pair: np.append(wrong[pair], wrong_identities(targets, *pair)) for pair in pairs}
+        yield table, wrong
 
 
 def difference(ours: Floats, runs: int, theirs: Floats) -> Floats:
@@ -63,16 +80,17 @@ def difference(ours: Floats, runs: int, theirs: Floats) -> Floats:
     return (ours - theirs) / np.sqrt(pooled * (1 - pooled) * (1 / runs + 1 / reference.RUNS))
 
 
-def _rows(table: Table, wrong: dict[Pair, Floats], runs: int) -> list[Row]:
+def _rows(table: Table, wrong: dict[Pair, Floats]) -> list[Row]:
     rows: list[Row] = []
-    for scenario, result in table.items():
-        for pair, ours in result.items():
+    for scenario, outcome in table.items():
+        runs = outcome.runs
+        for pair, ours in outcome.shares.items():
             columns = [ours, _se(ours, runs)]
             if pair in reference.CROSSING[scenario]:
                 theirs = np.array(reference.CROSSING[scenario][pair])
                 columns += [theirs, _se(theirs, reference.RUNS), difference(ours, runs, theirs)]
-            for outcome, numbers in zip(reference.CLASSES, np.transpose(columns).tolist(), strict=True):
-                rows.append(_row(scenario, pair, outcome, runs, *numbers))
+            for kind, numbers in zip(reference.CLASSES, np.transpose(columns).tolist(), strict=True):
+                rows.append(_row(scenario, pair, kind, runs, *numbers))
     for pair, count in wrong.items():  # the reference's starting points are unknown: no difference is formed
         ours_and_se = float(count.mean()), float(count.std() / np.sqrt(len(count)))
         rows.append(
@@ -92,35 +110,35 @@ def _se(share: Floats, runs: int) -> Floats:
     return np.sqrt(share * (1 - share) / runs)
 
 
-def _verdict(table: Table, runs: int) -> str:
+def _verdict(table: Table) -> str:
     first = next(iter(table.values()))
-    fail = {pair: f"{1 - shares[0]:.1%}" for pair, shares in first.items()}
+    fail = {pair: f"{1 - shares[0]:.1%}" for pair, shares in first.shares.items()}
     off = {
-        (scenario, pair, outcome): d
-        for scenario, result in table.items()
-        for pair, ours in result.items()
+        (scenario, pair, kind): d
+        for scenario, outcome in table.items()
+        for pair, ours in outcome.shares.items()
         if pair in PAIRS
-        for outcome, d in zip(
-            reference.CLASSES, difference(ours, runs, np.array(reference.CROSSING[scenario][pair])), strict=True
+        for kind, d in zip(
+            reference.CLASSES, difference(ours, outcome.runs, np.array(reference.CROSSING[scenario][pair])), strict=True
         )
     }
     far = {key: d for key, d in off.items() if abs(d) > 4}
     text = (
-        f"of {runs} crossings merged for 8 frames, minimum distance fails in {fail['gnn', 'euclidean']} and the "
+        f"of {first.runs} crossings merged for 8 frames, minimum distance fails in {fail['gnn', 'euclidean']} and the "
         f"confidence region in {fail['gnn', 'mahalanobis']} with gnn, in {fail['nn', 'euclidean']} and "
         f"{fail['nn', 'mahalanobis']} with nn, in {fail['jpda', 'mahalanobis']} with jpda and in "
         f"{fail['mht', 'mahalanobis']} with mht; {len(off) - len(far)} of {len(off)} shares are within 4 standard "
         f"errors of the reference"
     )
-    low = ", ".join(sorted({outcome for (_, _, outcome), d in far.items() if d < 0}))
-    high = ", ".join(sorted({outcome for (_, _, outcome), d in far.items() if d > 0}))
+    low = ", ".join(sorted({kind for (_, _, kind), d in far.items() if d < 0}))
+    high = ", ".join(sorted({kind for (_, _, kind), d in far.items() if d > 0}))
     return text + (f", some lower ({low})" if low else "") + (f", some higher ({high})" if high else "") + "."
 
 
 def _figure(table: Table, wrong: dict[Pair, Floats]) -> Figure:
     drawing, panels = style.figure(3, 2, panel=(4.8, 3.8))
-    for ax, (scenario, result) in zip(panels, table.items(), strict=False):
-        _failures(ax, result, reference.CROSSING[scenario])
+    for ax, (scenario, outcome) in zip(panels, table.items(), strict=False):
+        _failures(ax, outcome.shares, reference.CROSSING[scenario])
         style.title(ax, scenario)
     if wrong:
         _wrong(panels[4], wrong)

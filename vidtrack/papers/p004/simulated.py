@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,14 @@ class Targets:
     z: Floats
     run: Ints
     seen: Mask
+
+    def batches(self, size: int) -> Iterator[tuple[int, Targets]]:
+        """Yields the targets of `size` runs at a time, each with the number of runs up to its end."""
+        runs = int(self.run.max()) + 1
+        for first in range(0, runs, size):
+            end = min(first + size, runs)
+            own = (first <= self.run) & (self.run < end)
+            yield end, Targets(self.truth[:, own], self.z[:, own], self.run[own] - first, self.seen[:, own])
 
 
 def drive(

@@ -15,12 +15,12 @@ from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.coordinates import wrap
-from vidtrack.radar.feeds.recording import is_feed, senders
+from vidtrack.radar.feeds.recording import is_feed, read_recording, senders
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
-from vidtrack.radar.plots import Plots
-from vidtrack.radar.reading import read
+from vidtrack.radar.plots import Plots, read_plots
+from vidtrack.radar.reading import OF_RECORDINGS
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
 from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
@@ -146,10 +146,16 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     """The feeds of tables and recordings: the file NAME.csv, NAME.ast, ... has the plots of the radar NAME.
 
     A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
+<<<<<<< HEAD
     Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, and for two
     radars with the same plots.
+=======
+    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, and for settings of
+    recordings that are for none of these.
+>>>>>>> sets
     """
     feeds = [feed for path in paths for feed in _feeds(Path(path), radars, settings)]
+    _refuse_idle(feeds, radars, settings)
     names = [feed.placed.name for feed in feeds]
     for name in names:
         if names.count(name) > 1:
@@ -162,6 +168,7 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     return feeds
 
 
+<<<<<<< HEAD
 def _refuse_same(one: Feed, other: Feed) -> None:
     """Raise ConfigError if most plots of a feed are another's: echoes of one radar would confirm its false plots."""
     measured = [_as_measured(feed) for feed in (one, other)]
@@ -181,6 +188,23 @@ def _as_measured(feed: Feed) -> Floats:
     return np.unique(np.column_stack([feed.plots.time_s, feed.plots.z[:, 0], direction]), axis=0)
 
 
+=======
+def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings) -> None:
+    """Raise ConfigError for settings of recordings, if there is none or its radar's table says the same."""
+    recorded = [feed.placed.radar for feed in feeds if feed.plots.losses]
+    given = [name for name in OF_RECORDINGS if getattr(settings, name) is not None]
+    idle = [name for name in given if all(getattr(radar, name) is not None for radar in recorded)]
+    if idle:
+        raise ConfigError(
+            "\n".join(
+                f"setting radar.{name} has no effect here: it is for recordings of radars that have no {name} in "
+                f"{radars.path}; leave it out"
+                for name in idle
+            )
+        )
+
+
+>>>>>>> sets
 def _feeds(path: Path, radars: Radars, settings: RadarSettings) -> list[Feed]:
     """The feeds of one file; its damaged records are counted with the first."""
     codes = senders(path) if path.stem not in radars.names and is_feed(path) else []
@@ -198,7 +222,7 @@ def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
     known = {name: getattr(radar, name) for name in _OWN}
     own = {name: value for name, value in known.items() if value is not None}
     settings = settings.model_copy(update={"position": placed.xyz, **own})
-    plots = _level(read(path, settings), path)
+    plots = _level(read_recording(path, settings) if is_feed(path) else read_plots(path, settings), path)
     if plots.plane is not None and not plots.polar:
         raise ConfigError(
             f"{path} has positions; a radar of --radars needs ranges and azimuths (CAT 048, CAT 001, TTM)"
