@@ -146,13 +146,8 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     """The feeds of tables and recordings: the file NAME.csv, NAME.ast, ... has the plots of the radar NAME.
 
     A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
-<<<<<<< HEAD
-    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, and for two
-    radars with the same plots.
-=======
-    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, and for settings of
-    recordings that are for none of these.
->>>>>>> sets
+    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, for two radars with the
+    same plots, and for settings of recordings that are for none of these.
     """
     feeds = [feed for path in paths for feed in _feeds(Path(path), radars, settings)]
     _refuse_idle(feeds, radars, settings)
@@ -168,7 +163,6 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     return feeds
 
 
-<<<<<<< HEAD
 def _refuse_same(one: Feed, other: Feed) -> None:
     """Raise ConfigError if most plots of a feed are another's: echoes of one radar would confirm its false plots."""
     measured = [_as_measured(feed) for feed in (one, other)]
@@ -188,7 +182,6 @@ def _as_measured(feed: Feed) -> Floats:
     return np.unique(np.column_stack([feed.plots.time_s, feed.plots.z[:, 0], direction]), axis=0)
 
 
-=======
 def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings) -> None:
     """Raise ConfigError for settings of recordings, if there is none or its radar's table says the same."""
     recorded = [feed.placed.radar for feed in feeds if feed.plots.losses]
@@ -204,7 +197,6 @@ def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings)
         )
 
 
->>>>>>> sets
 def _feeds(path: Path, radars: Radars, settings: RadarSettings) -> list[Feed]:
     """The feeds of one file; its damaged records are counted with the first."""
     codes = senders(path) if path.stem not in radars.names and is_feed(path) else []
