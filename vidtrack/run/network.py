@@ -57,7 +57,7 @@ def network_pipeline(
         "plots": sum(len(feed.plots) for feed in network.feeds),
         "bad_rows": sum(feed.plots.bad_rows for feed in network.feeds),
         **_losses(network),
-        "truncated": False,
+        "truncated": any(feed.plots.losses.get("truncated") for feed in network.feeds),
         "origin": origin,
     }
 

@@ -77,7 +77,8 @@ def radar_pipeline(path: str, settings: Settings, extras: Extras, seed: int) -> 
     found = measurements(plots, settings.radar)
     refuse_link(settings.output, "radar runs")
     tracker = build_radar_tracker(settings, found, explain=extras.explain, seed=seed)
-    account: dict[str, Any] = {"plots": len(plots), "bad_rows": plots.bad_rows, **plots.losses, "truncated": False}
+    account: dict[str, Any] = {"plots": len(plots), "bad_rows": plots.bad_rows, **plots.losses}
+    account["truncated"] = bool(plots.losses.get("truncated"))
     if plots.plane is not None:
         account["origin"] = [plots.plane.latitude, plots.plane.longitude, plots.plane.height]
 

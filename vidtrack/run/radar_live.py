@@ -86,7 +86,7 @@ def feed_pipeline(
 
 
 def received(feed: UdpFeed, stream: ScanStream, stopped: Callable[[], bool]) -> Iterator[tuple[int, Scan]]:
-    """The scans of a feed as they are over; when stopped, those that were over then."""
+    """The scans of a feed as they are over; when stopped, also the one that waits for its end."""
     last_heard, silent = monotonic(), True
     while not stopped():
         datagrams = feed.poll(WAIT_S)
@@ -99,7 +99,9 @@ def received(feed: UdpFeed, stream: ScanStream, stopped: Callable[[], bool]) -> 
             yield from stream.over(silent=True)
         if datagrams:
             yield from stream.over()
-    yield from stream.over(silent=stream.period_s is None)
+    for datagram in feed.poll(0):
+        stream.hear(datagram)
+    yield from stream.over(silent=True)
 
 
 def _again(first: tuple[int, Scan], scans: Iterator[tuple[int, Scan]]) -> Iterator[tuple[int, Scan]]:

@@ -86,6 +86,23 @@ def test_every_truncation_of_a_capture_is_read_without_a_crash():
             assert len(list(payloads(whole[:end]))) <= len(PAYLOADS)
 
 
+@pytest.mark.parametrize("capture", [pcap, pcapng])
+def test_an_end_within_a_packet_is_told(capture):
+    frames = [ETHERNET + ipv4(payload) for payload in PAYLOADS]
+    whole, shorter = capture(frames), len(capture(frames[:2]))
+    for end in range(shorter, len(whole) + 1):
+        losses = Losses()
+        assert list(packets.payloads(whole[:end], losses)) == PAYLOADS[: 2 + (end == len(whole))]
+        assert (losses.truncated, losses.damaged) == (int(shorter < end < len(whole)), 0)
+
+
+def test_a_size_that_goes_beyond_the_end_does_not_hide_the_packets_after_it():
+    whole, losses = pcap([ETHERNET + ipv4(payload) for payload in PAYLOADS]), Losses()
+    wrong = whole[:24] + struct.pack("<IIII", 0, 0, 5000, 5000) + whole[40:]
+    assert list(packets.payloads(wrong, losses)) == PAYLOADS[1:]
+    assert (losses.truncated, losses.damaged) == (0, 1)
+
+
 FRAMES = [ETHERNET + ipv4(f"payload number {k}".encode()) for k in range(6)]
 
 

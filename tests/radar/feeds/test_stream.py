@@ -164,16 +164,17 @@ def test_a_feed_is_tracked_until_it_is_stopped(tmp_path, blocks, group):
         sender.start()
         for step in run:
             if step.index == 12:
+                sender.join()
                 seen.set()
-        sender.join()
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert (summary["scans"], summary["plots"], summary["damaged"], summary["tracks"]) == (13, 65, 1, 5)
+    assert (summary["scans"], summary["plots"], summary["damaged"], summary["tracks"]) == (14, 70, 1, 5)
     assert not summary["interrupted"]
     assert run.name == f"{group}-{port}"
 
 
 def test_a_feed_of_another_radar_is_said_to_be_one(tmp_path, blocks, monkeypatch):
-    monkeypatch.setattr(UdpFeed, "poll", lambda self, wait_s: blocks)
+    received = iter([blocks])
+    monkeypatch.setattr(UdpFeed, "poll", lambda self, wait_s: next(received, []))
     settings = Settings().model_copy(update={"radar": RadarSettings(sac=1, sic=1)})
     asked = iter([False, True])
     with (

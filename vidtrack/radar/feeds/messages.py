@@ -100,6 +100,7 @@ class Losses:
     duplicates  plots that came twice
     late        plots of scans that had been closed
     resets      times that a clock was set back
+    truncated   1 if a capture ends within a packet
     """
 
     damaged: int = 0
@@ -107,6 +108,7 @@ class Losses:
     duplicates: int = 0
     late: int = 0
     resets: int = 0
+    truncated: int = 0
 
     def __str__(self) -> str:
         said = [f"{count} {what}" for what, count in self.as_dict().items() if count]

@@ -35,8 +35,8 @@ _UDP = 17
 def payloads(content: bytes, losses: Losses) -> Iterator[bytes]:
     """The payloads of all UDP datagrams of a capture, of all blocks of a FINAL recording, or else the whole content.
 
-    What a capture holds beside UDP is passed over, and so are fragments of datagrams. A cut end is left out. After a
-    damaged header it goes on with the next sound one; `losses` counts each such place.
+    What a capture holds beside UDP is passed over, and so are fragments of datagrams. A packet that the end cuts off is
+    left out. After a damaged header it goes on with the next sound one; `losses` counts each such place, and the cut.
     """
     if content[:4] in _PCAP:
         frames = _pcap(content, _PCAP[content[:4]], losses)
@@ -64,12 +64,18 @@ def _pcap(content: bytes, order: str, losses: Losses) -> Iterator[tuple[int, byt
     at = 24
     while at + _PCAP_HEAD <= len(content):
         _, fraction, size, whole = head.unpack_from(content, at)
-        if fraction < _PARTS and max(size, whole) <= _LONGEST:
+        sound = fraction < _PARTS and max(size, whole) <= _LONGEST
+        if sound and at + _PCAP_HEAD + size <= len(content):
             yield link, content[at + _PCAP_HEAD : at + _PCAP_HEAD + size]
             at += _PCAP_HEAD + size
+            continue
+        at = places.after(at + 1)
+        if sound and at == len(content):
+            losses.truncated = 1
         else:
             losses.damaged += 1
-            at = places.after(at + 1)
+    if at < len(content):
+        losses.truncated = 1
 
 
 class _Places:
@@ -136,6 +142,8 @@ def _pcapng(content: bytes, losses: Losses) -> Iterator[tuple[int, bytes]]:
             at = places[order].after(at + 4)
             continue
         kind, size = struct.unpack_from(f"{order}II", content, at)
+        if at + size > len(content):
+            break
         body = content[at + 8 : at + size - 4]
         if kind == 1 and len(body) >= 2:
             links.append(struct.unpack_from(f"{order}H", body)[0])
@@ -146,6 +154,8 @@ def _pcapng(content: bytes, losses: Losses) -> Iterator[tuple[int, bytes]]:
         elif kind == 3 and links:
             yield links[0], body[4:]
         at += size
+    if at < len(content):
+        losses.truncated = 1
 
 
 def _is_block(content: bytes, order: str, at: int) -> bool:
