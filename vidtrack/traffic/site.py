@@ -16,6 +16,7 @@ from pydantic import model_validator as whole
 
 from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
+from vidtrack.traffic.epsg import metric_system
 from vidtrack.traffic.polyline import crosses_itself
 
 _NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
@@ -62,6 +63,11 @@ def _outline(points: tuple[Point, ...]) -> tuple[Point, ...]:
     return points
 
 
+def _metric(epsg: int) -> int:
+    metric_system(epsg)
+    return epsg
+
+
 class Camera(Group):
     """The picture, and the time of its first one."""
 
@@ -93,7 +99,7 @@ class Calibration(Group):
     """m above the road, to compare with what the points say; None: not known"""
     geographic: bool = False
     """`ground` holds longitudes and latitudes"""
-    epsg: int | None = Field(None, gt=0)
+    epsg: Annotated[int, Field(gt=0), AfterValidator(_metric)] | None = None
     """metric coordinate system of `ground`, or the one that longitudes and latitudes are brought into"""
     distortion: tuple[float, float] | None = None
     """k1, k2 of the lens (Brown-Conrady, on normalised coordinates); None: straight lines are straight"""
@@ -290,8 +296,8 @@ def read_site(path: str | Path) -> Site:
     """The site in a TOML file.
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest), or a value that cannot be meant:
-    points outside the picture, lines and polygons that cross themselves, unknown gates and legs, names that a
-    spreadsheet or a browser could take for more than a name.
+    points outside the picture, a coordinate system that is not metric, lines and polygons that cross themselves,
+    unknown gates and legs, names that a spreadsheet or a browser could take for more than a name.
     """
     path = Path(path)
     return parse_site(read_toml_text(path, "site"), path)

@@ -225,13 +225,6 @@ def test_longitude_and_latitude():
     assert np.allclose(np.diff(at[:, 1]), np.diff(LOOKED_AT[:, 1]), rtol=2e-3)
 
 
-@pytest.mark.parametrize(("epsg", "words"), [(1, "no such coordinate system"), (4326, "does not measure in metres")])
-def test_a_system_that_does_not_do_is_refused(epsg, words):
-    pytest.importorskip("pyproj")
-    with pytest.raises(ConfigError, match=words):
-        calibrated(site_of(CAMERA.picture(POINTS), 9 + POINTS / 1e5, geographic=True, epsg=epsg))
-
-
 def test_the_account_tells_near_from_far_and_a_wrong_height():
     rng = np.random.default_rng(6)
     report = examined(noisy(rng, camera_height_m=8.0)).report
