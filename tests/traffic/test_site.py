@@ -101,6 +101,8 @@ BAD = {
     "ground beyond the Earth": ("[12, 0],", "[1e300, 0],", "the point (1e+300, 0) in ground is farther away"),
     "unknown role": ('role = "entry"', 'role = "in"', "'entry', 'exit', 'both' or 'neutral'"),
     "bounds": ("[3.2, 5.4]", "[5.4, 3.2]", "write the shortest length, then the longest"),
+    "classes that overlap": ("[3.2, 5.4]", "[3.2, 5.4]\nvan = [4, 6]", "car, 3.2 to 5.4 m, and van, 4 to 6 m, overlap"),
+    "a class of its own name": ("car = [3.2", "unknown = [3.2", "[classes]: unknown is the class of vehicles of which"),
     "no width": ("width = 1280\n", "", "site.width is missing"),
     "no interval": ("interval_s = 300", "interval_s = 0", "greater than 0"),
     "geographic without a system": ("camera_height_m = 8.0", "geographic = true", "geographic needs epsg"),

@@ -6,6 +6,8 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 
+UNKNOWN = "unknown"
+"""The class of a vehicle of which none is sure."""
 _LEAST_SIGMA_M = 0.01
 """m; to which lengths are known at best"""
 

@@ -17,6 +17,7 @@ from pydantic import model_validator as whole
 from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.epsg import metric_system
+from vidtrack.traffic.lengths import UNKNOWN
 from vidtrack.traffic.polyline import crosses_itself
 
 _NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
@@ -239,6 +240,20 @@ class Site(Group):
                 raise ValueError(f"the point {_written((x, y))} of {name} lies outside the {size} picture")
         return parts
 
+    @field_validator("classes")
+    @classmethod
+    def _apart(cls, classes: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        if UNKNOWN in classes:
+            raise ValueError(f"{UNKNOWN} is the class of vehicles of which none is sure; take another name")
+        ordered = sorted(classes.items(), key=lambda one: one[1])
+        for (name, (low, high)), (other, (low2, high2)) in pairwise(ordered):
+            if low2 < high:
+                raise ValueError(
+                    f"{name}, {low:g} to {high:g} m, and {other}, {low2:g} to {high2:g} m, overlap; a length is of one "
+                    "class"
+                )
+        return classes
+
     @whole(mode="after")
     def _known_names(self) -> Site:
         for name, section in self.sections.items():
@@ -361,7 +376,7 @@ def _complaint(detail: Any) -> str:
     if detail["type"] == "missing":
         return f"{key} is missing"
     message = detail["msg"].removeprefix("Value error, ")
-    if key in ("", "calibration", "gates", "zones"):  # the whole of a section was given: the message names the place
+    if key in ("", "calibration", "gates", "zones", "classes"):  # a whole section: the message names the place
         return f"[{key}]: {message}" if key else message
     if key == "site.start":
         return f"{key} = {detail['input']}: write date, time and zone, for example 2026-06-01T07:00:00+02:00"

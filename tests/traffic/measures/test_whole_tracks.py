@@ -45,6 +45,15 @@ def test_a_site_s_own_classes_are_by_length(tmp_path):
     assert min(row["class_probability"] for row in rows) > 0.9
 
 
+def test_classes_that_a_length_does_not_decide_are_unknown(tmp_path):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    length = measured(runs, site(CALIBRATED)).tables["crossings"]["length_m"][0].as_py()
+    close = site(CALIBRATED, classes={"short": (2.0, length + 0.01), "long": (length + 0.01, 9.0)})
+    beyond = site(CALIBRATED, classes={"long": (9.0, 12.0)})
+    for one in (close, beyond):
+        assert set(measured(runs, one).tables["crossings"]["class"].to_pylist()) == {"unknown"}
+
+
 @pytest.mark.parametrize("factor", [1.0, 2.0])
 def test_the_report_says_when_vehicles_come_out_too_large(tmp_path, factor):
     tracks = [straight(track, 3.0 * track, 20, 200 + 5 * track, 120.0, 4.0) for track in range(1, 15)]

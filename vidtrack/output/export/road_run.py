@@ -16,11 +16,10 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.output.export.whole_tracks import WholeTracks
-from vidtrack.traffic.lengths import length_sums, mean_length
+from vidtrack.traffic.lengths import UNKNOWN, length_sums, mean_length
 from vidtrack.traffic.measures.rows import EDGE_COLUMNS
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
-from vidtrack.traffic.vehicles.classes import UNKNOWN
 
 _BATCH = 1 << 16
 """Rows in memory at a time."""
