@@ -51,7 +51,7 @@ def command(options: CalibrateOptions) -> int:
     With --run also what the traffic says: how large its vehicles come out, whether the lanes of a road converge, and
     whether straight paths bend as by a lens.
 
-    The exit code is 1 when the points contradict each other, or the traffic contradicts them.
+    The exit code is 1 when the points contradict each other, or camera_height_m or the traffic contradicts them.
     """
     from vidtrack.cli.by_traffic import doubts
     from vidtrack.errors import ConfigError

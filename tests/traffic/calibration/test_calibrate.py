@@ -1,6 +1,7 @@
 """Calibration: known cameras are found, errors have the covariance they are given, bad points are named."""
 
 import logging
+import re
 
 import numpy as np
 import pytest
@@ -237,5 +238,10 @@ def test_the_account_tells_near_from_far_and_a_wrong_height():
     assert 0 < near["speed_sigma_percent"] < 5
     assert report["camera"]["height_m"] == pytest.approx(8, abs=4 * report["camera"]["height_sigma_m"])
     assert not report["warnings"]
-    (warning,) = examined(noisy(rng, camera_height_m=26.2)).report["warnings"]
+    assert not report["contradiction"]
+    wrong = examined(noisy(rng, camera_height_m=26.2)).report
+    (warning,) = wrong["warnings"]
     assert "camera_height_m = 26.2, but the points put the camera" in warning
+    sigma = re.search(r"standard deviation 0\.0*(\d+) m", warning)
+    assert len(sigma[1]) == 2  # digits
+    assert wrong["contradiction"]
