@@ -81,7 +81,10 @@ def command(options: CalibrateOptions) -> int:
         _print(result.report)
     if folder is not None:
         click.echo(folder)
-    return 1 if result.report["contradiction"] or against else 0
+    contradicted = bool(result.report["contradiction"] or against)
+    if contradicted and options.quiet:
+        click.echo(f"vidtrack: {options.site}: {'; '.join(result.report['warnings'])}", err=True)
+    return int(contradicted)
 
 
 def first_picture(source: str) -> Image:
