@@ -57,6 +57,7 @@ def command(options: CalibrateOptions) -> int:
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_folder
     from vidtrack.traffic.calibration.account import examined
+    from vidtrack.traffic.calibration.sections import section_doubts
     from vidtrack.traffic.measures.by_traffic import by_traffic
     from vidtrack.traffic.site import read_site
 
@@ -68,6 +69,7 @@ def command(options: CalibrateOptions) -> int:
     if background is not None:
         drawn = drawn.scaled(background.shape[1], background.shape[0])
     result = examined(drawn)
+    result.report["warnings"] += section_doubts(drawn, result.ground)
     against = []
     if options.run:
         result.report["traffic"] = told = by_traffic(options.run, drawn)

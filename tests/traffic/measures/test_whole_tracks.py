@@ -70,3 +70,12 @@ def test_runs_of_earlier_versions_have_the_speeds_of_their_rows(tmp_path):
     assert found.report["scale"] is None
     assert np.allclose(found.tables["crossings"]["speed_kmh"].to_numpy(), 43.2)
     assert found.tables["crossings"]["class"].to_pylist() == [None] * 3
+
+
+@pytest.mark.parametrize(("length_m", "said"), [(20.0, False), (21.0, False), (10.0, True), (90.0, True)])
+def test_a_section_that_is_not_as_long_as_the_calibration_says_is_told(tmp_path, length_m, said):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    lengths = site(CALIBRATED, sections={"main": {"from": "middle", "to": "east", "length_m": length_m}})
+    told = measured(runs, lengths).report["sections"]
+    assert len(told) == said
+    assert not said or "the calibration the gates are 18.0 to" in told[0]
