@@ -17,7 +17,7 @@ from pydantic import model_validator as whole
 from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.epsg import metric_system
-from vidtrack.traffic.lengths import UNKNOWN
+from vidtrack.traffic.lengths import apart, bounds
 from vidtrack.traffic.polyline import crosses_itself
 
 _NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
@@ -38,6 +38,7 @@ Name = Annotated[str, AfterValidator(_plain)]
 Point = tuple[float, float]
 Positive = Annotated[float, Field(gt=0)]
 Segment = tuple[Point, Point]
+Bounds = Annotated[tuple[float, float], AfterValidator(bounds)]
 
 
 def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -199,12 +200,6 @@ class Report(Group):
     """s"""
 
 
-def _bounds(bounds: tuple[float, float]) -> tuple[float, float]:
-    if not 0 <= bounds[0] < bounds[1]:
-        raise ValueError("write the shortest length, then the longest, in metres")
-    return bounds
-
-
 class Site(Group):
     """Everything that is known of a site. Frozen; all picture coordinates refer to `camera.width` x `camera.height`."""
 
@@ -214,7 +209,7 @@ class Site(Group):
     zones: dict[Name, Zone] = Field({})
     sections: dict[Name, Section] = Field({})
     movements: Movements = Movements()
-    classes: dict[Name, Annotated[tuple[float, float], AfterValidator(_bounds)]] = Field({})
+    classes: Annotated[dict[Name, Bounds], AfterValidator(apart)] = Field({})
     report: Report = Report()
 
     @property
@@ -239,20 +234,6 @@ class Site(Group):
                 size = f"{camera.width} x {camera.height}"
                 raise ValueError(f"the point {_written((x, y))} of {name} lies outside the {size} picture")
         return parts
-
-    @field_validator("classes")
-    @classmethod
-    def _apart(cls, classes: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-        if UNKNOWN in classes:
-            raise ValueError(f"{UNKNOWN} is the class of vehicles of which none is sure; take another name")
-        ordered = sorted(classes.items(), key=lambda one: one[1])
-        for (name, (low, high)), (other, (low2, high2)) in pairwise(ordered):
-            if low2 < high:
-                raise ValueError(
-                    f"{name}, {low:g} to {high:g} m, and {other}, {low2:g} to {high2:g} m, overlap; a length is of one "
-                    "class"
-                )
-        return classes
 
     @whole(mode="after")
     def _known_names(self) -> Site:
