@@ -211,6 +211,10 @@ def test_calibrate_says_which_pair_is_wrong(road):
     code, out, _ = vidtrack("calibrate", "site.toml", "--json", "-", cwd=road)
     assert code == 1
     assert json.loads(out)["wrong"] == [4]
+    code, out, err = vidtrack("calibrate", "site.toml", "-q", cwd=road)
+    assert (code, out) == (1, "")
+    assert err.startswith("vidtrack: site.toml: pair 4 of the calibration")
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -51,12 +51,13 @@ def command(options: CalibrateOptions) -> int:
     With --run also what the traffic says: how large its vehicles come out, whether the lanes of a road converge, and
     whether straight paths bend as by a lens.
 
-    The exit code is 1 when the points contradict each other, or the traffic contradicts them.
+    The exit code is 1 when the points contradict each other, or camera_height_m or the traffic contradicts them.
     """
     from vidtrack.cli.by_traffic import doubts
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_folder
     from vidtrack.traffic.calibration.account import examined
+    from vidtrack.traffic.calibration.sections import section_doubts
     from vidtrack.traffic.measures.by_traffic import by_traffic
     from vidtrack.traffic.site import read_site
 
@@ -68,6 +69,7 @@ def command(options: CalibrateOptions) -> int:
     if background is not None:
         drawn = drawn.scaled(background.shape[1], background.shape[0])
     result = examined(drawn)
+    result.report["warnings"] += section_doubts(drawn, result.ground)
     against = []
     if options.run:
         result.report["traffic"] = told = by_traffic(options.run, drawn)
@@ -81,7 +83,10 @@ def command(options: CalibrateOptions) -> int:
         _print(result.report)
     if folder is not None:
         click.echo(folder)
-    return 1 if result.report["contradiction"] or against else 0
+    contradicted = bool(result.report["contradiction"] or against)
+    if contradicted and options.quiet:
+        click.echo(f"vidtrack: {options.site}: {'; '.join(result.report['warnings'])}", err=True)
+    return int(contradicted)
 
 
 def first_picture(source: str) -> Image:

@@ -86,7 +86,7 @@ def command(options: MeasureOptions) -> None:
         write_json(found.report, options.json_to)
     if not options.quiet:
         click.echo(_told(found.report), err=True)
-        for doubt in doubts(found.report):
+        for doubt in doubts(found.report) + found.report["sections"]:
             click.echo(f"vidtrack: {doubt}", err=True)
     if options.json_to != "-":
         click.echo(folder)

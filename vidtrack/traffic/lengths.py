@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 
+UNKNOWN = "unknown"
+"""The class of a vehicle of which none is sure."""
 _LEAST_SIGMA_M = 0.01
 """m; to which lengths are known at best"""
 
@@ -31,3 +35,23 @@ def class_of(length: Floats, classes: dict[str, tuple[float, float]]) -> list[st
         number[(length >= low) & (length < high)] = k
     names = [*classes, None]
     return [names[k] for k in number.tolist()]
+
+
+def bounds(of_class: tuple[float, float]) -> tuple[float, float]:
+    """The same low and high length [m] of a class. Raises ValueError where these are no lengths in that order."""
+    if not 0 <= of_class[0] < of_class[1]:
+        raise ValueError("write the shortest length, then the longest, in metres")
+    return of_class
+
+
+def apart(classes: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """The same classes of a site. Raises ValueError where two overlap, or one has the name of none."""
+    if UNKNOWN in classes:
+        raise ValueError(f"{UNKNOWN} is the class of vehicles of which none is sure; take another name")
+    ordered = sorted(classes.items(), key=lambda one: one[1])
+    for (name, (low, high)), (other, (low2, high2)) in pairwise(ordered):
+        if low2 < high:
+            raise ValueError(
+                f"{name}, {low:g} to {high:g} m, and {other}, {low2:g} to {high2:g} m, overlap; let them touch"
+            )
+    return classes

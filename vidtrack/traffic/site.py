@@ -16,6 +16,8 @@ from pydantic import model_validator as whole
 
 from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
+from vidtrack.traffic.epsg import metric_system
+from vidtrack.traffic.lengths import apart, bounds
 from vidtrack.traffic.polyline import crosses_itself
 
 _NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
@@ -36,6 +38,7 @@ Name = Annotated[str, AfterValidator(_plain)]
 Point = tuple[float, float]
 Positive = Annotated[float, Field(gt=0)]
 Segment = tuple[Point, Point]
+Bounds = Annotated[tuple[float, float], AfterValidator(bounds)]
 
 
 def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -60,6 +63,11 @@ def _outline(points: tuple[Point, ...]) -> tuple[Point, ...]:
     if crosses_itself(np.array(_distinct(points)), closed=True):
         raise ValueError("the polygon crosses itself; list its corners in order around it")
     return points
+
+
+def _metric(epsg: int) -> int:
+    metric_system(epsg)
+    return epsg
 
 
 class Camera(Group):
@@ -93,7 +101,7 @@ class Calibration(Group):
     """m above the road, to compare with what the points say; None: not known"""
     geographic: bool = False
     """`ground` holds longitudes and latitudes"""
-    epsg: int | None = Field(None, gt=0)
+    epsg: Annotated[int, Field(gt=0), AfterValidator(_metric)] | None = None
     """metric coordinate system of `ground`, or the one that longitudes and latitudes are brought into"""
     distortion: tuple[float, float] | None = None
     """k1, k2 of the lens (Brown-Conrady, on normalised coordinates); None: straight lines are straight"""
@@ -192,12 +200,6 @@ class Report(Group):
     """s"""
 
 
-def _bounds(bounds: tuple[float, float]) -> tuple[float, float]:
-    if not 0 <= bounds[0] < bounds[1]:
-        raise ValueError("write the shortest length, then the longest, in metres")
-    return bounds
-
-
 class Site(Group):
     """Everything that is known of a site. Frozen; all picture coordinates refer to `camera.width` x `camera.height`."""
 
@@ -207,7 +209,7 @@ class Site(Group):
     zones: dict[Name, Zone] = Field({})
     sections: dict[Name, Section] = Field({})
     movements: Movements = Movements()
-    classes: dict[Name, Annotated[tuple[float, float], AfterValidator(_bounds)]] = Field({})
+    classes: Annotated[dict[Name, Bounds], AfterValidator(apart)] = Field({})
     report: Report = Report()
 
     @property
@@ -290,8 +292,8 @@ def read_site(path: str | Path) -> Site:
     """The site in a TOML file.
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest), or a value that cannot be meant:
-    points outside the picture, lines and polygons that cross themselves, unknown gates and legs, names that a
-    spreadsheet or a browser could take for more than a name.
+    points outside the picture, a coordinate system that is not metric, lines and polygons that cross themselves,
+    unknown gates and legs, names that a spreadsheet or a browser could take for more than a name.
     """
     path = Path(path)
     return parse_site(read_toml_text(path, "site"), path)
@@ -355,7 +357,7 @@ def _complaint(detail: Any) -> str:
     if detail["type"] == "missing":
         return f"{key} is missing"
     message = detail["msg"].removeprefix("Value error, ")
-    if key in ("", "calibration", "gates", "zones"):  # the whole of a section was given: the message names the place
+    if key in ("", "calibration", "gates", "zones", "classes"):  # a whole section: the message names the place
         return f"[{key}]: {message}" if key else message
     if key == "site.start":
         return f"{key} = {detail['input']}: write date, time and zone, for example 2026-06-01T07:00:00+02:00"

@@ -42,6 +42,18 @@ def test_a_site_can_be_given(tmp_path):
     assert (tmp_path / "out" / "tracks.geojson").is_file()
 
 
+def test_metres_of_another_calibration_are_not_exported(tmp_path):
+    run = write_run(tmp_path, *usual_ways())
+    (run / "site.toml").write_text(SITE.replace("epsg = 25832", ""))
+    site, out = tmp_path / "other.toml", tmp_path / "out"
+    site.write_text(SITE.replace("[560030, 5800060]", "[560030, 5800070]"))
+    with pytest.raises(Error, match="is not the one that") as refused:
+        export(run, "--as", "geojson", "--site", site, "-o", out, "-q")
+    assert refused.value.exit_code == 2
+    site.write_text(SITE.replace("epsg", "camera_height_m = 8.0\nepsg") + "bus = [15, 20]\n")
+    export(run, "--as", "geojson", "--site", site, "-o", out, "-q")
+
+
 def without_metres(folder):
     return write_run(folder, way(1, range(5)), columns=VIDEO)
 

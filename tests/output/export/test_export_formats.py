@@ -262,8 +262,6 @@ def contents(path):
         ("geojson", SITE.replace("epsg = 25832", ""), "needs places on the globe"),
         ("mf-json", SITE.replace("epsg = 25832", ""), "needs places on the globe"),
         ("mf-json", SITE.replace("start = 2026-06-01T07:00:00+02:00", ""), "needs dates"),
-        ("geojson", SITE.replace("25832", "999999"), "no such coordinate system"),
-        ("geoparquet", SITE.replace("25832", "999999"), "no such coordinate system"),
     ],
 )
 def test_what_a_format_needs_is_asked_for(tmp_path, name, site, words):

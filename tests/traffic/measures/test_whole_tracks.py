@@ -45,6 +45,15 @@ def test_a_site_s_own_classes_are_by_length(tmp_path):
     assert min(row["class_probability"] for row in rows) > 0.9
 
 
+def test_classes_that_a_length_does_not_decide_are_unknown(tmp_path):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    length = measured(runs, site(CALIBRATED)).tables["crossings"]["length_m"][0].as_py()
+    close = site(CALIBRATED, classes={"short": (2.0, length + 0.01), "long": (length + 0.01, 9.0)})
+    beyond = site(CALIBRATED, classes={"long": (9.0, 12.0)})
+    for one in (close, beyond):
+        assert set(measured(runs, one).tables["crossings"]["class"].to_pylist()) == {"unknown"}
+
+
 @pytest.mark.parametrize("factor", [1.0, 2.0])
 def test_the_report_says_when_vehicles_come_out_too_large(tmp_path, factor):
     tracks = [straight(track, 3.0 * track, 20, 200 + 5 * track, 120.0, 4.0) for track in range(1, 15)]
@@ -61,3 +70,12 @@ def test_runs_of_earlier_versions_have_the_speeds_of_their_rows(tmp_path):
     assert found.report["scale"] is None
     assert np.allclose(found.tables["crossings"]["speed_kmh"].to_numpy(), 43.2)
     assert found.tables["crossings"]["class"].to_pylist() == [None] * 3
+
+
+@pytest.mark.parametrize(("length_m", "said"), [(20.0, False), (21.0, False), (10.0, True), (90.0, True)])
+def test_a_section_that_is_not_as_long_as_the_calibration_says_is_told(tmp_path, length_m, said):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    lengths = site(CALIBRATED, sections={"main": {"from": "middle", "to": "east", "length_m": length_m}})
+    told = measured(runs, lengths).report["sections"]
+    assert len(told) == said
+    assert not said or "the calibration the gates are 18.0 to" in told[0]

@@ -6,7 +6,8 @@ from driven import BIKE, CAMERA, CAR, GROUND, LORRY, VAN, WALKER, arc, edges_of,
 from pinhole import POINTS, site_of
 
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.vehicles.classes import UNKNOWN, named, named_by_length
+from vidtrack.traffic.lengths import UNKNOWN
+from vidtrack.traffic.vehicles.classes import named, named_by_length
 from vidtrack.traffic.vehicles.vehicles import Vehicles
 
 DRIVES = {
@@ -88,7 +89,7 @@ def test_a_site_s_bounds_of_length_come_first():
     names, probability = named_by_length(*length, {"small": (0.0, 3.0), "large": (3.0, 9.0)})
     assert names == ["large"]
     assert probability[0] > 0.9
-    assert named_by_length(*length, {"small": (0.0, 3.0)})[0] == [None]
+    assert named_by_length(*length, {"small": (0.0, 3.0)})[0] == [UNKNOWN]
 
 
 def test_a_track_that_goes_over_to_another_vehicle_has_the_speeds_of_both():

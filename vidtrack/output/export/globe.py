@@ -10,6 +10,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import ConfigError
+from vidtrack.traffic.epsg import metric_system
 from vidtrack.traffic.site import Site
 
 if TYPE_CHECKING:
@@ -22,16 +23,11 @@ _NEAR_DEG = 6.0
 
 
 def system_of(site: Site) -> pyproj.CRS | None:
-    """The coordinate system of the site's metres; None where they have no place on the map. Raises ConfigError."""
-    import pyproj
-
+    """The coordinate system of the site's metres; None where they have no place on the map."""
     calibration = site.calibration
     if calibration is None or calibration.epsg is None or not calibration.picture:
         return None
-    try:
-        return pyproj.CRS.from_epsg(calibration.epsg)
-    except pyproj.exceptions.CRSError:
-        raise ConfigError(f"calibration.epsg = {calibration.epsg}: no such coordinate system") from None
+    return metric_system(calibration.epsg)
 
 
 def to_globe(site: Site, name: str) -> Callable[[Floats], Floats]:

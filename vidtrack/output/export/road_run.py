@@ -16,11 +16,10 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.output.export.whole_tracks import WholeTracks
-from vidtrack.traffic.lengths import length_sums, mean_length
+from vidtrack.traffic.lengths import UNKNOWN, length_sums, mean_length
 from vidtrack.traffic.measures.rows import EDGE_COLUMNS
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
-from vidtrack.traffic.vehicles.classes import UNKNOWN
 
 _BATCH = 1 << 16
 """Rows in memory at a time."""
@@ -155,12 +154,17 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
 
     site  its site.toml; None: as it was when the run began
 
-    Raises ConfigError for a run without metres or a site that is not there, FormatError for a folder that is no
-    finished run, and SourceError where no vehicle was inside the calibration.
+    Raises ConfigError for a run without metres, a site that is not there or has other metres, FormatError for a folder
+    that is no finished run, and SourceError where no vehicle was inside the calibration.
     """
     summary = _summary(folder)
     _check_columns(folder)
     drawn = read_site(_site_of(summary, folder) if site is None else site)
+    if site is not None and (folder / SITE_COPY).is_file() and not _same_metres(drawn, read_site(folder / SITE_COPY)):
+        raise ConfigError(
+            f"the calibration in {site} is not the one that {folder} was tracked with, whose metres would be exported; "
+            "only epsg may differ: track the video again with this site, or leave --site out"
+        )
     whole = WholeTracks(_of_size(drawn, summary))
     look = _FirstLook()
     edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= _column_names(folder) else ()
@@ -175,6 +179,19 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
     return RoadRun(
         folder, drawn, summary.get("fps"), vehicles, look.low, look.high - look.low, look.rows, look.positions
     )
+
+
+def _same_metres(one: Site, other: Site) -> bool:
+    """Whether two sites have the same picture and calibration, so that points of the picture have the same metres."""
+
+    def told(site: Site) -> tuple[object, ...]:
+        calibration = site.calibration
+        if calibration is None:
+            return ()
+        without = {"camera_height_m": None} | ({} if calibration.geographic else {"epsg": None})
+        return site.camera.width, site.camera.height, calibration.model_copy(update=without)
+
+    return told(one) == told(other)
 
 
 class _FirstLook:

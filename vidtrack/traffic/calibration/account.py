@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtri
 
 from vidtrack.arrays.types import Floats
 from vidtrack.traffic.calibration.calibrate import checked, doubts, pairs_of, road_plane, solved
@@ -14,8 +16,9 @@ from vidtrack.traffic.calibration.straight_road import straight_road
 from vidtrack.traffic.footprint import velocity
 from vidtrack.traffic.site import Site
 
-_HEIGHT_SIGMAS, _HEIGHT_SHARE = 3.0, 0.1
-"""A stated height of the camera contradicts the points when it is off by both of these."""
+_HEIGHT_FALSE_ALARM, _HEIGHT_SHARE = 1e-4, 0.1
+"""A stated height of the camera contradicts the points when errors alone put it that far off as rarely as that, and it
+is off by more than that share."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,7 @@ def examined(site: Site) -> Account:
     picture = np.array(calibration.picture)
     fitted = ground.pixels(pairs.plane.back(pairs.X))
     found = camera(ground)
+    height = height_doubt(found, calibration.camera_height_m)
     columns = {
         "residual_px": check.residual_px,
         "residual_m": check.residual_m,
@@ -58,10 +62,10 @@ def examined(site: Site) -> Account:
         "chi2": check.chi2,
         "degrees_of_freedom": check.spare,
         "wrong": [i + 1 for i in check.wrong],
-        "contradiction": check.contradiction,
+        "contradiction": check.contradiction or bool(height),
         "camera": found,
         "places": places(ground, picture),
-        "warnings": doubts(site, check) + height_doubt(found, calibration.camera_height_m),
+        "warnings": doubts(site, check) + height,
     }
     return Account(ground, report, picture, fitted)
 
@@ -72,6 +76,7 @@ def _without_map(site: Site) -> Account:
     assert calibration is not None
     fit = straight_road(site)
     found = camera(fit.ground)
+    height = height_doubt(found, calibration.camera_height_m)
     picture = np.array([point for _, point in calibration.points()])
     report = {
         "site": site.camera.name,
@@ -79,10 +84,10 @@ def _without_map(site: Site) -> Account:
         "chi2": fit.chi2,
         "degrees_of_freedom": fit.spare,
         "wrong": [],
-        "contradiction": fit.contradiction,
+        "contradiction": fit.contradiction or bool(height),
         "camera": found,
         "places": places(fit.ground, picture),
-        "warnings": fit.doubts() + height_doubt(found, calibration.camera_height_m),
+        "warnings": fit.doubts() + height,
     }
     return Account(fit.ground, report, picture, picture)
 
@@ -131,12 +136,13 @@ def height_doubt(found: dict[str, float] | None, stated_m: float | None) -> list
     """A word about a stated height of the camera that the points contradict."""
     if found is None or stated_m is None:
         return []
-    off = abs(found["height_m"] - stated_m)
-    if off <= _HEIGHT_SIGMAS * found["height_sigma_m"] or off <= _HEIGHT_SHARE * stated_m:
+    off, sigma = abs(found["height_m"] - stated_m), found["height_sigma_m"]
+    if off**2 <= chdtri(1, _HEIGHT_FALSE_ALARM) * sigma**2 or off <= _HEIGHT_SHARE * stated_m:
         return []
+    decimals = max(1, 1 - math.floor(math.log10(sigma))) if sigma > 0 else 1
     return [
-        f"camera_height_m = {stated_m:g}, but the points put the camera {found['height_m']:.1f} m above the road "
-        f"(standard deviation {found['height_sigma_m']:.1f} m); check both, and the unit of ground"
+        f"camera_height_m = {stated_m:g}, but the points put the camera {found['height_m']:.{decimals}f} m above the "
+        f"road (standard deviation {sigma:.{decimals}f} m); check both, and the unit of ground"
     ]
 
 

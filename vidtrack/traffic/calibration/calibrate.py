@@ -16,6 +16,7 @@ from vidtrack.traffic.calibration.homography import Fit, Normal, by_k, by_point,
 from vidtrack.traffic.calibration.hull import hull
 from vidtrack.traffic.calibration.lens import lens_of
 from vidtrack.traffic.calibration.straight_road import straight_road
+from vidtrack.traffic.epsg import metric_system
 from vidtrack.traffic.site import Calibration, Site
 
 _log = logging.getLogger(__name__)
@@ -77,22 +78,13 @@ class Check:
 
 
 def metres_of(calibration: Calibration) -> Floats:
-    """(N, 2) ground points in metres. Raises ConfigError for a coordinate system that is not known or not metric."""
+    """(N, 2) ground points in metres. Raises ConfigError where they are not in the region of their system."""
     ground = np.array(calibration.ground, float)
     if not calibration.geographic or calibration.epsg is None:
         return ground
     import pyproj
 
-    try:
-        system = pyproj.CRS.from_epsg(calibration.epsg)
-    except pyproj.exceptions.CRSError:
-        raise ConfigError(f"calibration.epsg = {calibration.epsg}: no such coordinate system") from None
-    if not system.is_projected or system.axis_info[0].unit_name != "metre":
-        raise ConfigError(
-            f"calibration.epsg = {calibration.epsg}: {system.name} does not measure in metres on a plane; "
-            "take a projected system of the region, for example 25832"
-        )
-    to_metres = pyproj.Transformer.from_crs(4326, system, always_xy=True)
+    to_metres = pyproj.Transformer.from_crs(4326, metric_system(calibration.epsg), always_xy=True)
     metres = np.column_stack(to_metres.transform(ground[:, 0], ground[:, 1]))
     if not np.isfinite(metres).all():
         raise ConfigError(f"calibration.ground lies outside the region of calibration.epsg = {calibration.epsg}")

@@ -14,6 +14,7 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.calibration.sections import section_doubts
 from vidtrack.traffic.measures.by_traffic import by_stretches, contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
@@ -70,7 +71,9 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     passed, ways = passing.passed(), passing.ways(len(lives.track))
     del stretches, passing  # which are large
     pa.default_memory_pool().release_unused()  # what the tables were read into
-    return _Figures(day, site, gates, ground, reader, passed, ways, lives, staying, meeting, vehicles).measures()
+    return _Figures(
+        day, site, drawn[sizes[0]], gates, ground, reader, passed, ways, lives, staying, meeting, vehicles
+    ).measures()
 
 
 class _Figures:
@@ -80,6 +83,7 @@ class _Figures:
         self,
         day: Day,
         site: Site,
+        drawn: Site,
         gates: Gates,
         ground: Ground | None,
         reader: Reader,
@@ -90,7 +94,7 @@ class _Figures:
         meeting: Meeting,
         vehicles: Vehicles,
     ) -> None:
-        self.day, self.site, self.gates, self.ground = day, site, gates, ground
+        self.day, self.site, self.drawn, self.gates, self.ground = day, site, drawn, gates, ground
         self.staying, self.meeting = staying, meeting
         self.lives, self.ways = lives, ways
         self.metres = ground is not None
@@ -153,6 +157,7 @@ class _Figures:
                 {"from": a, "to": b, "trips": count} for (a, b), count in sorted(impossible.items())
             ],
             **self.against,
+            "sections": [] if self.ground is None else section_doubts(self.drawn, self.ground),
             "appeared": int(self.trips.appeared.sum()),
             "vanished": int(self.trips.vanished.sum()),
         }

@@ -8,9 +8,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.traffic.lengths import class_of
+from vidtrack.traffic.lengths import UNKNOWN, class_of
 
-UNKNOWN = "unknown"
 CLASSES = ("motorcycle or bicycle", "person", "car", "van", "lorry or bus")
 SURE = 0.8
 """Probability from which on a class is named."""
@@ -65,16 +64,16 @@ def named(found: Classified) -> tuple[list[str | None], Floats]:
     return [names[k] for k in number.tolist()], np.where(np.isnan(found.size[:, 0]), np.nan, best)
 
 
-def named_by_length(
-    length: Floats, sigma: Floats, bounds: dict[str, tuple[float, float]]
-) -> tuple[list[str | None], Floats]:
-    """(T,) the class of each vehicle by a site's bounds, the first that holds its length; (T,) its probability.
+def named_by_length(length: Floats, sigma: Floats, bounds: dict[str, tuple[float, float]]) -> tuple[list[str], Floats]:
+    """(T,) the class of each vehicle by a site's bounds, UNKNOWN where none is sure; (T,) its probability.
 
-    length, sigma (T,) m; NaN where they are not known
+    length, sigma (T,) m; NaN where they are not known: a length alone has a class, and no probability
     """
     names = class_of(length, bounds)
     low, high = np.array([bounds.get(name or "", (np.nan, np.nan)) for name in names]).reshape(-1, 2).T
-    return names, np.asarray(ndtr((high - length) / sigma) - ndtr((low - length) / sigma))
+    inside = np.asarray(ndtr((high - length) / sigma) - ndtr((low - length) / sigma))
+    vague = (inside < SURE).tolist()
+    return [UNKNOWN if name is None or unsure else name for name, unsure in zip(names, vague, strict=True)], inside
 
 
 def classified(information: Floats, vector: Floats, speed: Floats) -> Classified:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.traffic.lengths import class_of
-from vidtrack.traffic.vehicles.classes import SURE, UNKNOWN, Classified, classified, named, named_by_length
+from vidtrack.traffic.lengths import UNKNOWN, class_of
+from vidtrack.traffic.vehicles.classes import Classified, classified, named, named_by_length
 
 _LEAST_SIGMA_M = 0.01
 
@@ -33,7 +33,8 @@ def whole_tracks(found: Classified | None, length: Floats, bounds: dict[str, tup
         return Named(length, class_of(length, bounds), np.full(len(length), np.nan))
     length = np.where(np.isnan(found.size[:, 0]), length, found.size[:, 0])
     if bounds:
-        return Named(length, *named_by_length(length, found.sigma[:, 0], bounds))
+        names, probability = named_by_length(length, found.sigma[:, 0], bounds)
+        return Named(length, [*names], probability)
     return Named(length, *named(found))
 
 
@@ -63,8 +64,7 @@ class Naming:
 
     def _class_of(self, mean: Floats, information: Floats, speed: Floats) -> list[str]:
         if self._classes:
-            found, sure = named_by_length(mean, 1 / np.sqrt(information), self._classes)
-            return [name if name and p >= SURE else UNKNOWN for name, p in zip(found, sure.tolist(), strict=True)]
+            return named_by_length(mean, 1 / np.sqrt(information), self._classes)[0]
         about = np.zeros((len(mean), 3, 3))
         about[:, 0, 0] = information
         vector = np.column_stack([information * mean, np.zeros((len(mean), 2))])
