@@ -13,23 +13,17 @@ from vidtrack.radar.rhythm import rhythm
 
 _log = logging.getLogger(__name__)
 
-OF_RECORDINGS = ("scan_s", "sac", "sic")
-"""Settings without effect on a table, in which scans are numbered and the radar is one."""
-
 
 def read(path: str | Path, settings: RadarSettings) -> Plots:
     """The plots of a table (CSV, Parquet) or a recording (ASTERIX, NMEA, AIS).
 
     A warning tells of pauses, in which all tracks end. Raises the errors of `read_plots` and `read_recording`, and
-    ConfigError for settings of recordings with a table.
+    ConfigError for radar.scan_s with a table.
     """
     feed = is_feed(path)
     plots = read_recording(path, settings) if feed else read_plots(path, settings)
-    idle = [] if feed else [name for name in OF_RECORDINGS if getattr(settings, name) is not None]
-    if idle:
-        raise ConfigError(
-            "\n".join(f"setting radar.{name} has no effect on a table, {path}; leave it out" for name in idle)
-        )
+    if settings.scan_s is not None and not feed:
+        raise ConfigError(f"setting radar.scan_s has no effect on a table, {path}; leave it out")
     pauses = rhythm(plots.scan, plots.time_s)
     for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
         others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""

@@ -20,7 +20,6 @@ from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
 from vidtrack.radar.plots import Plots, read_plots
-from vidtrack.radar.reading import OF_RECORDINGS
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
 from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
@@ -147,7 +146,7 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
 
     A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
     Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, for two radars with the
-    same plots, and for settings of recordings that are for none of these.
+    same plots, and for radar.scan_s if it is for none of these.
     """
     feeds = [feed for path in paths for feed in _feeds(Path(path), radars, settings)]
     _refuse_idle(feeds, radars, settings)
@@ -183,17 +182,12 @@ def _as_measured(feed: Feed) -> Floats:
 
 
 def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings) -> None:
-    """Raise ConfigError for settings of recordings, if there is none or its radar's table says the same."""
+    """Raise ConfigError for radar.scan_s if there is no recording of a radar whose table does not say it."""
     recorded = [feed.placed.radar for feed in feeds if feed.plots.losses]
-    given = [name for name in OF_RECORDINGS if getattr(settings, name) is not None]
-    idle = [name for name in given if all(getattr(radar, name) is not None for radar in recorded)]
-    if idle:
+    if settings.scan_s is not None and all(radar.scan_s is not None for radar in recorded):
         raise ConfigError(
-            "\n".join(
-                f"setting radar.{name} has no effect here: it is for recordings of radars that have no {name} in "
-                f"{radars.path}; leave it out"
-                for name in idle
-            )
+            "setting radar.scan_s has no effect here: it is for recordings of radars that have no scan_s in "
+            f"{radars.path}; leave it out"
         )
 
 
