@@ -1,6 +1,7 @@
 """What stands at the axes and scales of a report's pictures."""
 
 import re
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from matplotlib.text import Text
 
 from vidtrack.output.report import pictures
+from vidtrack.output.report.style import drawing, time_axis
+from vidtrack.traffic.clock import Clock
 from vidtrack.traffic.report.paths import Heat
 
 
@@ -38,3 +41,20 @@ def test_the_scale_of_a_heat_map_has_plain_numbers_and_its_whole_name(monkeypatc
     assert bottom >= 0
     assert right <= figure.bbox.width
     assert top <= figure.bbox.height
+
+
+@pytest.mark.parametrize("zero", [None, datetime(2026, 6, 1, 17, 38, tzinfo=UTC)])
+@pytest.mark.parametrize(
+    ("span", "unit"),
+    [(0.4, "h:min:s"), (2.4, "h:min:s"), (7.0, "h:min:s"), (26.0, "h:min:s"), (300.0, "h:min"), (57600.0, "h:min")],
+)
+def test_an_axis_of_time_has_ticks_and_a_name_with_its_unit(span, unit, zero):
+    with drawing(2.0) as (figure, axes):
+        time_axis(axes[0, 0], Clock(zero), np.array([0.93, 0.93 + span]))
+        figure.canvas.draw()
+        labels = axes[0, 0].get_xticklabels()
+        boxes = np.array([label.get_window_extent().extents for label in labels])
+    assert 2 <= len(labels) == len({label.get_text() for label in labels}) <= 9
+    assert (boxes[:-1, 2] < boxes[1:, 0]).all()
+    what = "time since the first picture" if zero is None else "time of day"
+    assert axes[0, 0].get_xlabel() == f"{what}, {unit}"
