@@ -9,6 +9,11 @@ as if they were tracks: what is missed then is missed by the geometry.
 A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
 same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
 Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
+
+A queue is found by those of the same leg at an overlapping time; that with most vehicles tells how many there were. One
+that overlaps with none is false. In the events only vehicles before the stop line queue, in the measures all that stand
+on their way in from a leg. Vehicles that stand in the first picture are not seen before they move, so queues are also
+told without those that begin there.
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ import argparse
 import csv
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -59,7 +65,7 @@ def paired(truth: list[tuple], found: list[tuple]) -> list[tuple[int, int]]:
     return [(i, j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1e3]
 
 
-def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dict[str, object]:
+def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dict[str, Any]:
     """Conflicts: how many there were, were found, and were right; errors of the post-encroachment times [s]."""
     true = [event for event in events if event["event"] == "conflict"]
     states = {(int(row["target_id"]), int(row["frame"])): row for row in rows_of(clip / "road_truth.csv")}
@@ -80,6 +86,26 @@ def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dic
     return {"close": len(true), "said": len(rows), "met": len(pairs), "pet": pet, "pet_sigma": sigma}
 
 
+def queues(events: list[dict[str, str]], rows: list[dict]) -> dict[str, Any]:
+    """Queues of the events: when each began [s], and by how many vehicles the measured one differs; how many are false.
+
+    NaN: no queue was measured there just then.
+    """
+    true = [event for event in events if event["event"] == "queue"]
+    spans = [(event["from_leg"], float(event["time_s"]), float(event["end_s"])) for event in true]
+    others = [(row["leg"], row["begin_s"], row["end_s"]) for row in rows]
+    meet = np.array([[a == d and b <= f and e <= c for d, e, f in others] for a, b, c in spans], bool)
+    meet = meet.reshape(len(spans), len(others))
+    vehicles = np.array([row["vehicles"] for row in rows], float)
+    most = np.where(meet, vehicles, -np.inf).max(axis=1, initial=-np.inf)
+    there = np.array([float(event["vehicles"]) for event in true])
+    return {
+        "queued_s": np.array([begin for _, begin, _ in spans]),
+        "queue_off": np.where(most > 0, most - there, np.nan),
+        "false_queues": int((~meet.any(axis=0)).sum()),
+    }
+
+
 def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
     """Whether a track lies on the vehicle of an event at that time, with an IoU of 0.3 or more."""
     boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)
@@ -97,7 +123,7 @@ def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
     return False
 
 
-def score(clip: Path, run: Path) -> dict[str, float]:
+def score(clip: Path, run: Path) -> dict[str, Any]:
     """Crossings and movements: how many there were, were found, and were right; errors of speed [km/h]."""
     events = rows_of(clip / "road_events.csv")
     found = measured([str(run)], read_site(clip / "site.toml")).tables
@@ -130,10 +156,11 @@ def score(clip: Path, run: Path) -> dict[str, float]:
         "off": np.array(off),
         "sigma": np.array(sigma),
         **conflicts(clip, events, found["conflicts"].to_pylist()),
+        **queues(events, found["queues"].to_pylist()),
     }
 
 
-def told(name: str, results: list[dict[str, float]]) -> str:
+def told(name: str, results: list[dict[str, Any]]) -> str:
     counts = ("true", "found", "hit", "movements", "trips", "right", "untracked", "close", "said", "met")
     total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
     off, sigma, pet, pet_sigma = (
@@ -154,6 +181,15 @@ def told(name: str, results: list[dict[str, float]]) -> str:
     )
 
 
+def told_queues(name: str, results: list[dict[str, Any]]) -> str:
+    begin, off = (np.concatenate([result[key] for result in results]) for key in ("queued_s", "queue_off"))
+    counts = [
+        f"{len(ours)} | {np.isfinite(ours).sum()} | {(ours == 0).sum()} | {(np.abs(ours) <= 1).sum()}"
+        for ours in (off, off[begin > 0])
+    ]
+    return f"| {name} | {' | '.join(counts)} | {sum(result['false_queues'] for result in results)} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", nargs="+", type=Path)
@@ -164,18 +200,26 @@ def main() -> None:
         f"| clip | crossings | {of} | movements | {of} | {speed} | missed without a track | conflicts | {of} | {pet} |"
     )
     exact, real = [], []
+    lines = []
     with tempfile.TemporaryDirectory() as folder:
         for number, clip in enumerate(clips):
             perfect = Path(folder, str(number))
             exact_run(clip, perfect)
             exact.append(score(clip, perfect))
             print(told(f"{clip.name}, exact", exact[-1:]))
+            lines.append(told_queues(f"{clip.name}, exact", exact[-1:]))
             if (clip / "run").is_dir():
                 real.append(score(clip, clip / "run"))
                 print(told(clip.name, real[-1:]))
+                lines.append(told_queues(clip.name, real[-1:]))
     print(told("all, exact", exact))
+    lines.append(told_queues("all, exact", exact))
     if real:
         print(told("all", real))
+        lines.append(told_queues("all", real))
+    counts = "found | same number | within one"
+    print(f"\n| clip | queues | {counts} | not from the first picture on | {counts} | false |")
+    print(*lines, sep="\n")
 
 
 if __name__ == "__main__":

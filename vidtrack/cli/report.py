@@ -28,7 +28,11 @@ Examples:
 )
 @click.argument("measures", type=click.Path(path_type=Path))
 @common("Folder for the report.  [default: runs/MEASURES-report]")
-@click.option("--picture", metavar="IMAGE|VIDEO", help="Draw the arrows over this, or over its first picture.")
+@click.option(
+    "--picture",
+    metavar="IMAGE|VIDEO",
+    help="Draw the arrows over this, or its first picture.  [default: the runs' scene]",
+)
 @receives(ReportOptions)
 def command(options: ReportOptions) -> None:
     """Turning movements, peak hour, speeds, queues and checks of MEASURES, a folder that `vidtrack measure` wrote.

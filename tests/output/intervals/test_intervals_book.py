@@ -49,7 +49,7 @@ def test_the_tables_of_a_day(tmp_path):
     assert (first["count"], first["coverage"], first["flow_per_h"]) == ("3", "1", "180")
     assert float(first["time_mean_speed_kmh"]) == pytest.approx(3.6 * 20)
     assert float(first["space_mean_speed_kmh"]) == pytest.approx(3.6 * 3 / sum(1 / v for v in speeds), abs=1e-3)
-    assert float(first["v85_kmh"]) == pytest.approx(3.6 * np.quantile(speeds, 0.85))
+    assert first["v85_kmh"] == ""  # of three speeds there is none
     assert (first["count_car"], first["count_lorry"]) == ("3", "0")
     assert sorted({row["begin_utc"][11:16] for row in minutes}) == ["09:59", "10:00", "10:01"]
     assert [row["coverage"] for row in minutes[:3]] == ["0.5", "1", "0.5"]

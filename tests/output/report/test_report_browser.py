@@ -68,3 +68,21 @@ def test_no_table_is_cut_on_a_telephone(tmp_path):
         assert sum(int(leg.rpartition(": ")[2]) for leg in legs) == int(whole)
         tab.send("Emulation.setEmulatedMedia", media="print")
         assert tab.js(sheets) == 1
+
+
+def test_words_in_pictures_can_be_read_on_a_telephone(tmp_path):
+    """Pictures scroll sideways in their own place, and the page does not."""
+    write_day(tmp_path / "day", np.ones((4, 12)), speeds=np.arange(40), legs=MOVEMENTS)
+    out = tmp_path / "report"
+    out.mkdir()
+    write_report(out, read_findings(tmp_path / "day"), None)
+    narrowest = "Math.min(...[...document.images].map((one) => one.getBoundingClientRect().width))"
+    scrolls = "[...document.querySelectorAll('.picture')].every((one) => one.scrollWidth > one.clientWidth)"
+    with browser(tmp_path) as tab:
+        tab.open((out / "report.html").as_uri())
+        tab.size(390, 844)
+        assert tab.js(narrowest) >= 640
+        assert tab.js(scrolls)
+        assert tab.js("document.documentElement.scrollWidth") <= 390
+        tab.size(1280, 844)
+        assert not tab.js(scrolls)

@@ -220,3 +220,21 @@ def test_from_a_run_to_its_report(tmp_path, monkeypatch):
         gate: (looked_at[gate]["counted"], looked_at[gate]["corrected"]) for gate in ("north_in", "south_out", "all")
     }
     assert found == {"north_in": ("1", "2"), "south_out": ("1", "0"), "all": ("2", "2")}
+
+
+def test_the_scene_of_the_newest_run_lies_under_the_arrows(tmp_path):
+    """Where no picture is given: of the last run that has a whole one of the site's shape."""
+    runs = [{"folder": str(tmp_path / f"run{n}"), "begin_s": 0.0, "end_s": 900.0, "run": n} for n in range(6)]
+    for run in runs:
+        Path(run["folder"]).mkdir()
+    found = write_day(tmp_path / "day", [4], runs=runs)
+    scenes = {n: np.full((360, 640, 3), 80 * n, np.uint8) for n in (0, 1)} | {2: np.zeros((500, 500, 3), np.uint8)}
+    for n, picture in scenes.items():
+        cv2.imwrite(str(tmp_path / f"run{n}" / "scene.jpg"), picture)
+    for n, content in ((3, b"no picture"), (4, b"")):
+        (tmp_path / f"run{n}" / "scene.jpg").write_bytes(content)
+    other, given = report(found), tmp_path / "given"
+    assert "Without the scene" not in words(other)
+    given.mkdir()
+    write_report(given, read_findings(found), scenes[1])
+    assert (other / "origin_destination.png").read_bytes() == (given / "origin_destination.png").read_bytes()

@@ -129,7 +129,6 @@ def test_figures_are_those_of_their_definitions(events):
             if count:
                 assert found.time_mean[w, k] == pytest.approx(v[mine].mean())
                 assert found.space_mean[w, k] == pytest.approx(1 / np.mean(1 / v[mine]))
-                assert found.v85[w, k] == pytest.approx(np.quantile(v[mine], 0.85))
                 assert found.own[w, k] == pytest.approx(0.3 / np.sqrt(count))  # averages away
                 assert found.shared[w, k] == pytest.approx(0.2)  # does not
                 steps = np.arange(-10, 60, 0.005)
@@ -139,6 +138,21 @@ def test_figures_are_those_of_their_definitions(events):
                 assert np.isnan(found.time_mean[w, k])
                 assert found.occupancy[w, k] == 0
         assert np.isnan(found.count[w, 3])
+
+
+def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():
+    """Both ways of one gate: the fewest of 23 vehicles, whose fastest bounds the percentile, and one fewer."""
+    way = np.append(np.zeros(23, int), np.ones(22, int))
+    n, yes = len(way), np.ones(45, bool)
+    speed = np.linspace(5, 20, n)
+    passed = Passed(
+        np.zeros(n), way // 2, np.arange(n), way, *np.ones((4, n)), yes, ~yes,
+        speed, *np.ones((2, n)), np.zeros(n), ~yes,
+    )  # fmt: skip
+    found = figures(passed, np.ones(n), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=2)
+    assert found.v85[0, 0] == pytest.approx(np.quantile(speed[:23], 0.85))
+    assert np.isnan(found.v85[1, 0])
+    assert np.isfinite(found.time_mean).all()
 
 
 def test_metres_are_computed_where_the_run_has_none(tmp_path):

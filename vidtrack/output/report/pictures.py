@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import FancyArrowPatch, Polygon
 from matplotlib.path import Path as Curve
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from vidtrack.arrays.types import Floats
 from vidtrack.output.report.style import BLUE, GREY, INK, PALE, SIGNAL, WIDTH, drawing, png
@@ -85,8 +85,11 @@ def heat_map(heat: Heat, gates: Gates, metres: bool) -> bytes:
         axis.set_xlabel(f"x, {unit}")
         axis.set_ylabel(f"y, {unit}")
         side = heat.x[1] - heat.x[0]
-        label = f"vehicle-seconds in {side:.2g} x {side:.2g} {unit}"
-        figure.colorbar(drawn, ax=axis, shrink=0.8, label=label, format=FuncFormatter(lambda s, _: f"{s:g}"))
+        label = f"vehicle-seconds\nin {side:.2g} x {side:.2g} {unit}"
+        plain = FuncFormatter(lambda s, _: f"{s:g}")
+        ticks = LogLocator(subs=(1.0, 2.0, 5.0))
+        scale = figure.colorbar(drawn, ax=axis, shrink=0.8, label=label, ticks=ticks, format=plain)
+        scale.minorticks_off()  # their labels would be TeX
         return png(figure)
 
 

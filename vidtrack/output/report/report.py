@@ -11,6 +11,7 @@ from vidtrack.output.folder import replacing
 from vidtrack.output.report import charts, pictures
 from vidtrack.output.report.page import Page, rendered
 from vidtrack.output.report.sheets import write_sheets
+from vidtrack.output.scene import newest_scene
 from vidtrack.traffic.report.close import close_of
 from vidtrack.traffic.report.findings import Findings
 from vidtrack.traffic.report.legs import legs_of
@@ -25,11 +26,13 @@ from vidtrack.video.frame import Image
 def write_report(folder: Path, found: Findings, scene: Image | None, reviewed: Reviewed | None = None) -> None:
     """Write report.html, NAME.png and NAME.csv of all that the tables allow.
 
-    scene     (H, W, 3) a picture of the site, under the arrows; None: arrows on white
+    scene     (H, W, 3) a picture of the site, under the arrows; None: the scene of the newest run that has one
     reviewed  what somebody found who looked at the crossings, shown beside the counts; None: nobody did
 
     Raises ConfigError for a site that cannot be drawn, StoppedEarly on a full disk.
     """
+    if scene is None:
+        scene = newest_scene((Path(run["folder"]) for run in found.report["runs"]), found.site)
     sheet = sheet_of(found, turns(drawn(found.site)))
     peak = peak_hour(sheet.total, found.coverage >= WATCHED, found.edges)
     paths, gone = _paths(found, sheet)

@@ -39,8 +39,12 @@ _LOOK: dict[Any, Any] = {
     "text.parse_math": False,  # a $ in a name is a $
     "axes.unicode_minus": False,
 }
-_STEPS = np.array([5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 14400, 21600, 43200, 86400])
-_TICKS = 8
+_STEPS = np.array(
+    [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 14400, 21600, 43200, 86400]
+)
+_MINUTE_S = 60.0
+_TICKS, _TICKS_WITH_SECONDS = 8, 6
+"""Most steps along an axis; fewer of the longer labels"""
 
 
 @contextmanager
@@ -64,16 +68,26 @@ def png(figure: Figure) -> bytes:
 
 
 def time_axis(axes: Axes, clock: Clock, edges: Floats) -> None:
-    """Times of day below, at full steps of the clock."""
+    """Times of day below, at full steps of the clock, and in the axis' name what they are."""
     zero = 0.0
     if clock.zero is not None:
         zero = clock.zero.hour * 3600 + clock.zero.minute * 60 + clock.zero.second + clock.zero.microsecond * 1e-6
     span = edges[-1] - edges[0]
-    step = float(_STEPS[np.searchsorted(_STEPS[:-1], span / _TICKS)])
+    fits = span <= _STEPS * np.where(_STEPS < _MINUTE_S, _TICKS_WITH_SECONDS, _TICKS)
+    step = float(_STEPS[fits][0] if fits.any() else _STEPS[-1])
     ticks = np.arange(np.ceil((edges[0] + zero) / step - 1e-6), np.floor((edges[-1] + zero) / step + 1e-6) + 1) * step
     axes.set_xticks(ticks - zero)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda t, _: clock.label(t)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda t, _: _time_label(clock, t, step)))
+    what = "time since the first picture" if clock.zero is None else "time of day"
+    axes.set_xlabel(f"{what}, {'h:min' if step >= _MINUTE_S else 'h:min:s'}")
     axes.set_xlim(edges[0], edges[-1])
+
+
+def _time_label(clock: Clock, t: float, step: float) -> str:
+    """To what a step of the axis needs: minutes, seconds or tenths of a second."""
+    if step >= _MINUTE_S:
+        return clock.label(t)
+    return clock.moment(t) if step < 1 else clock.moment(t).rpartition(".")[0]
 
 
 def whole_numbers(axes: Axes) -> None:

@@ -13,6 +13,8 @@ from vidtrack.traffic.measures.passing import Passed
 
 _SIGMAS = 1.96
 """of the bounds: 95 %"""
+V85_LEAST = 23
+"""Vehicles; of fewer not even the fastest is an upper bound of the 85th percentile: 1 - 0.85^22 is below 0.975."""
 
 
 def edges_of(spans: Floats, interval_s: float, utc: datetime | None, zone: tzinfo | None) -> Floats:
@@ -42,7 +44,8 @@ class Figures:
 
     count, low, high    vehicles that passed while somebody watched; bounds of all in the interval, 95 %
     flow                vehicles/h
-    time_mean, space_mean, v85   m/s
+    time_mean, space_mean   m/s
+    v85                 m/s; from V85_LEAST speeds on
     own, shared         m/s; standard deviations of time_mean: by the vehicles' own errors, by the calibration
     occupancy           share of the watched time in which a vehicle stands on the gate
     density             vehicles/km
@@ -109,10 +112,8 @@ def figures(passed: Passed, confidence: Floats, length: Floats, edges: Floats, w
         occupied = _occupied(cell, passed.t, length / passed.speed, cells) / seconds
         density = flow / (3.6 * space_mean)
     density[count == 0] = 0
-    table = (
-        count, np.maximum(low, 0), high, flow, time_mean, space_mean, _quantile(at, v, cells, 0.85), own, shared,
-        occupied, density,
-    )  # fmt: skip
+    v85 = np.where(n >= V85_LEAST, _quantile(at, v, cells, 0.85), np.nan)
+    table = count, np.maximum(low, 0), high, flow, time_mean, space_mean, v85, own, shared, occupied, density
     return Figures(*(np.where(np.isnan(seen), np.nan, values).reshape(ways, bins) for values in table))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import bdtr, ndtri
 
 from vidtrack.arrays.types import Floats
+from vidtrack.traffic.measures.intervals import V85_LEAST
 from vidtrack.traffic.report.findings import Findings
 
 SHARE = 0.85
@@ -20,7 +21,7 @@ class Speeds:
     """Speeds at a gate in a direction, km/h.
 
     speed      (N,) of the vehicles
-    v85, low, high   85th percentile and its bounds, 95 %; the bounds are NaN for fewer than 23 vehicles
+    v85, low, high   85th percentile and its bounds, 95 %; NaN for fewer than V85_LEAST vehicles
     own, shared      root mean square of the vehicles' own errors; error of all of them together, by the calibration
     """
 
@@ -53,20 +54,20 @@ def speeds_of(found: Findings) -> list[Speeds]:
 
 
 def v85_of(speed: Floats, own: float, shared: float) -> tuple[float, float, float]:
-    """The 85th percentile of speeds (N,), and its bounds, 95 %.
+    """The 85th percentile of speeds (N,), and its bounds, 95 %; NaN for fewer than V85_LEAST.
 
     own     standard deviation of each speed's own error
     shared  standard deviation of the error of all together
 
     Two of the ordered speeds bound the percentile of all vehicles, by the binomial distribution (David and Nagaraja
-    2003, 7.1), with N of 23 or more; the shared error adds to both distances in quadrature. Own errors widen the
+    2003, 7.1); the shared error adds to both distances in quadrature. Own errors widen the
     distribution of the speeds: the lower bound is lowered by what they add to the percentile of a normal one.
     """
     ordered, n = np.sort(speed), len(speed)
+    if n < V85_LEAST:
+        return np.nan, np.nan, np.nan
     v85 = float(np.quantile(ordered, SHARE))
     below = bdtr(np.arange(n, dtype=float), n, SHARE)  # that at most k speeds are below the percentile
-    if below[-1] < 1 - _TAIL:  # not even the largest speed is a bound
-        return v85, np.nan, np.nan
     low = ordered[max(int(np.searchsorted(below, _TAIL, side="right")) - 1, 0)]
     high = ordered[int(np.searchsorted(below, 1 - _TAIL))]
     sampled = np.array([v85 - low, high - v85])
