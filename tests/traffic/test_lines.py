@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from synthetic_steps import make_tracks
 
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.lines import LineCounter, parse_line, parse_lines, refuse_outside, segments
+from vidtrack.traffic.lines import LineCounter, parse_line, parse_lines, segments
 
 GATE = "gate:100,0,100,200"
 
@@ -157,12 +157,6 @@ def test_a_line_outside_the_picture_is_warned_of(caplog):
     with caplog.at_level(logging.WARNING):
         parse_lines(["in:0,5,9,5", "out:0,50,9,50"], 320, 40)
     assert [record.args[0] for record in caplog.records] == ["out"]
-
-
-def test_a_line_with_an_end_outside_the_picture_is_refused_of_a_file():
-    refuse_outside([parse_line("whole:0,40,320,40")], 320, 40)
-    with pytest.raises(ConfigError, match="outside the 320 x 40 picture"):
-        refuse_outside([parse_line("a:0,20,1979,20")], 320, 40)
 
 
 @pytest.mark.parametrize("name", ["=cmd|' /C calc'!A0", "+1", "-a", "@SUM(A1)", "\tx"])

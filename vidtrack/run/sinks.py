@@ -24,7 +24,7 @@ from vidtrack.output.tables import TrackTable
 from vidtrack.output.thinned import Thinned
 from vidtrack.output.threaded import Threaded
 from vidtrack.run.run import Extras
-from vidtrack.traffic.lines import Line, LineCounter, parse_lines, refuse_outside
+from vidtrack.traffic.lines import Line, LineCounter, parse_lines
 from vidtrack.traffic.metres import UsedSite, used_site
 from vidtrack.video.frame import Image
 from vidtrack.video.stats import SourceStats
@@ -85,12 +85,8 @@ class FileSource(Protocol):
 
 
 def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
-    """A counter for the lines in the settings, in a picture of this size [px]; None without lines.
-
-    Raises ConfigError for a bad line, or one outside the picture.
-    """
+    """A counter for the lines in the settings, in a picture of this size [px]; None without lines."""
     lines = parse_lines(settings.output.lines, width, height)
-    refuse_outside(lines, width, height)
     return LineCounter(lines) if lines else None
 
 

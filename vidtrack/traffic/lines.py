@@ -89,17 +89,6 @@ def parse_lines(texts: Sequence[str], width: int, height: int) -> list[Line]:
     return lines
 
 
-def refuse_outside(lines: Sequence[Line], width: int, height: int) -> None:
-    """Raise ConfigError for a line with an end outside the width x height picture, as for the gates of a site."""
-    for line in lines:
-        for x, y in ((line.x1, line.y1), (line.x2, line.y2)):
-            if not (-0.5 <= x <= width and -0.5 <= y <= height):
-                raise ConfigError(
-                    f"line {line.name}: its end ({x:g}, {y:g}) lies outside the {width} x {height} picture; end it at "
-                    "the border"
-                )
-
-
 @dataclass(frozen=True, slots=True)
 class Crossing:
     """A counted crossing: interpolated time, first frame on the new side."""
