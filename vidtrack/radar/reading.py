@@ -24,6 +24,12 @@ def read(path: str | Path, settings: RadarSettings) -> Plots:
     plots = read_recording(path, settings) if feed else read_plots(path, settings)
     if settings.scan_s is not None and not feed:
         raise ConfigError(f"setting radar.scan_s has no effect on a table, {path}; leave it out")
+    warn_of_pauses(plots, path)
+    return plots
+
+
+def warn_of_pauses(plots: Plots, path: str | Path) -> None:
+    """A warning says when the time jumps so far that all tracks end."""
     pauses = rhythm(plots.scan, plots.time_s)
     for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
         others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""
@@ -31,4 +37,3 @@ def read(path: str | Path, settings: RadarSettings) -> Plots:
             "%s: the time jumps from %.10g to %.10g s%s; all tracks end there: is the clock right?",
             path, begin_s, end_s, others,
         )  # fmt: skip
-    return plots

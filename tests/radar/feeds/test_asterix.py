@@ -114,19 +114,19 @@ def turning(*begins_s):
     """Blocks of ten turns of 4 s with twelve plots each, from each of these times on."""
     return [
         part
-        for begin_s in begins_s
+        for number, begin_s in enumerate(begins_s)
         for turn in range(10)
         for north_s in [begin_s + 4 * turn]
         for part in (
             mark(north_s, turn_s=4.0),
-            *(block(plot(north_s + (k + 0.5) / 3, 20000 + 5 * north_s, 30 * k + 15)) for k in range(12)),
+            *(block(plot(north_s + (k + 0.5) / 3, 20000 + 5 * north_s + 500 * number, 30 * k + 15)) for k in range(12)),
         )
     ]
 
 
 @pytest.mark.parametrize("back_s", [12, 20, 29, 60])
 def test_an_antenna_that_is_turned_back_in_time_has_had_its_clock_set(tmp_path, back_s):
-    plots = seconds(recorded(tmp_path, *turning(1000, 1040 - back_s)))
+    plots = seconds(recorded(tmp_path, *turning(1000, 1040.25 - back_s)))
     assert plots.losses["resets"] == 1
     assert (np.diff(plots.time_s) >= 0).all()
     assert np.bincount(plots.scan).tolist() == [12] * 10 + [11] + [12] * 9
@@ -139,6 +139,21 @@ def test_plots_that_come_late_by_part_of_a_turn_are_in_their_scan(tmp_path):
     plots = seconds(recorded(tmp_path, *late))
     assert len(plots) == 120
     assert not any(plots.losses.values())
+
+
+@pytest.mark.parametrize("behind", [20, 60])
+def test_a_second_feed_that_is_late_is_no_clock_that_was_set_back(tmp_path, behind):
+    """The first feed is out in the middle third, where only late copies come."""
+    blocks = turning(1000)
+    n = len(blocks)
+    first = [[part] * (not n // 3 <= k < n // 2) for k, part in enumerate(blocks)]
+    late = [blocks[k - behind : k - behind + 1] if k >= behind else [] for k in range(n)]
+    both = [part for pair in zip(first, late, strict=True) for parts in pair for part in parts]
+    plots = seconds(recorded(tmp_path, *both, *blocks[n - behind :]))
+    assert plots.losses["resets"] == 0
+    assert plots.losses["duplicates"] > 50
+    assert np.unique(plots.time_s).tolist() == plots.time_s.tolist()
+    assert plots.time_s[-1] == pytest.approx(seconds(recorded(tmp_path, *blocks)).time_s[-1])
 
 
 def test_several_radars_are_refused_until_one_is_chosen(tmp_path):

@@ -139,6 +139,22 @@ def plots_of(messages: Messages, scan: Ints, settings: RadarSettings, plane: Pla
     return Plots(scan, messages.time_s, z, sigma, polar, 2, doppler, None, bad_rows=losses.damaged)
 
 
+def first_copies(messages: Messages, losses: Losses) -> Messages:
+    """Without the plots and marks that came before to the digit, as from a second feed of one radar that is late.
+
+    A late copy must not look like a clock that was set back, so this comes before the times are read.
+    """
+    rows = np.flatnonzero(~_named(messages) & np.isfinite(messages.time_s))
+    some = messages.only(rows)
+    digits = np.nan_to_num(np.column_stack([some.kind, some.source, some.category, some.time_s, some.u, some.v]))
+    again = np.ones(len(rows), bool)
+    again[np.unique(digits, axis=0, return_index=True)[1]] = False
+    losses.duplicates += int((again & ~some.marks).sum())
+    kept = np.ones(len(messages), bool)
+    kept[rows[again]] = False
+    return messages.only(kept)
+
+
 def _named(messages: Messages) -> Mask:
     return np.asarray(messages.target != NO_TARGET)
 

@@ -16,7 +16,15 @@ from vidtrack.radar.feeds import asterix, nmea
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
 from vidtrack.radar.feeds.pace import paced
 from vidtrack.radar.feeds.packets import payloads
-from vidtrack.radar.feeds.plots import Choice, choose, plots_of, stray_senders, warn_of_assumed_errors, warn_of_others
+from vidtrack.radar.feeds.plots import (
+    Choice,
+    choose,
+    first_copies,
+    plots_of,
+    stray_senders,
+    warn_of_assumed_errors,
+    warn_of_others,
+)
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
 
@@ -123,7 +131,7 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     losses.damaged += choice.damaged
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
-    found = paced(choice.of(messages), settings.scan_s, losses)
+    found = paced(first_copies(choice.of(messages), losses), settings.scan_s, losses)
     if found is None:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
     messages, pace = found

@@ -20,6 +20,7 @@ from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
 from vidtrack.radar.plots import Plots, read_plots
+from vidtrack.radar.reading import warn_of_pauses
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
 from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
@@ -209,6 +210,7 @@ def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
     own = {name: value for name, value in known.items() if value is not None}
     settings = settings.model_copy(update={"position": placed.xyz, **own})
     plots = _level(read_recording(path, settings) if is_feed(path) else read_plots(path, settings), path)
+    warn_of_pauses(plots, path)
     if plots.plane is not None and not plots.polar:
         raise ConfigError(
             f"{path} has positions; a radar of --radars needs ranges and azimuths (CAT 048, CAT 001, TTM)"
