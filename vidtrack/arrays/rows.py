@@ -1,4 +1,4 @@
-"""Sparse entries sorted by row, rows found by name, and values of each row."""
+"""Sparse entries sorted by row, rows found by name, values of each row, and room for more rows."""
 
 from __future__ import annotations
 
@@ -36,6 +36,11 @@ def replaced(value: np.ndarray, rows: Ints, other: np.ndarray, at: Ints) -> np.n
     copy = value.copy()
     copy[rows] = other[at]
     return copy
+
+
+def room(rows: int, needed: int) -> int:
+    """Rows to make room for in a table that has too few for those needed: a quarter more, since a day's are large."""
+    return max(needed, 5 * rows // 4)
 
 
 @kernel

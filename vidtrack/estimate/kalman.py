@@ -14,6 +14,7 @@ from vidtrack.decision import Decision
 from vidtrack.estimate.kernels import mixture_update, projection, propagation
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.sensor import POSITION, Sensor
+from vidtrack.estimate.smoother import linearised_cross
 from vidtrack.scan import Scan
 
 
@@ -65,8 +66,7 @@ class KalmanBank:
 
     def cross(self, dt: float) -> Floats:
         """(T, n, n) P J', with the derivative J of the motion at the means."""
-        J = self.model.jacobian(dt, self.x, self.model.transition(dt, self.x))
-        return self.P @ np.swapaxes(J, 1, 2)
+        return linearised_cross(self.model, dt, self.x, self.P)
 
     def predict(self, dt: float) -> None:
         self.x, self.P = self.ahead(dt)

@@ -16,6 +16,7 @@ from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
+from vidtrack.estimate.smoother import linearised_cross
 from vidtrack.scan import Scan
 
 BLOCK = 50_000
@@ -87,8 +88,7 @@ class ParticleBank:
 
     def cross(self, dt: float) -> Floats:
         """(T, n, n) P J', with the derivative J of the motion at the means, without the particles' spread."""
-        J = self.model.jacobian(dt, self.x, self.model.transition(dt, self.x))
-        return self.P @ np.swapaxes(J, 1, 2)
+        return linearised_cross(self.model, dt, self.x, self.P)
 
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         moved = self.particles.copy()

@@ -5,6 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.estimate.motion.model import Motion
+
+
+def linearised_cross(model: Motion, dt: float, x: Floats, P: Floats) -> Floats:
+    """(T, n, n) P J', the covariance of states x (T, n), P (T, n, n) with themselves dt seconds later.
+
+    J is the derivative of the motion at x.
+    """
+    J = model.jacobian(dt, x, model.transition(dt, x))
+    return P @ np.swapaxes(J, 1, 2)
 
 
 def smoothing_gain(cross: Floats, prior_P: Floats) -> Floats:

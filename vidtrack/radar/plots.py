@@ -28,9 +28,10 @@ MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
 KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
 
 
-ONE_BY_ONE, EVENLY = 0.9, 0.1
-"""Share of plots with their own time from which scans are looked for in turns of the antenna, and how far a step may be
-from a multiple of the usual one, in usual steps, to count as such."""
+ONE_BY_ONE = 0.9
+"""Share of plots with their own time from which scans are looked for in turns of the antenna."""
+EVENLY = 0.1
+"""Usual steps; how far a step may be from a multiple of the usual one to count as such."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,19 +17,19 @@ _log = logging.getLogger(__name__)
 def read(path: str | Path, settings: RadarSettings) -> Plots:
     """The plots of a table (CSV, Parquet) or a recording (ASTERIX, NMEA, AIS).
 
-    A warning tells of pauses, in which all tracks end. Raises the errors of `read_plots` and `read_recording`, and
-    ConfigError for radar.scan_s with a table.
+    Raises the errors of `read_any`, and ConfigError for radar.scan_s with a table.
     """
-    feed = is_feed(path)
-    plots = read_recording(path, settings) if feed else read_plots(path, settings)
-    if settings.scan_s is not None and not feed:
+    if settings.scan_s is not None and not is_feed(path):
         raise ConfigError(f"setting radar.scan_s has no effect on a table, {path}; leave it out")
-    warn_of_pauses(plots, path)
-    return plots
+    return read_any(path, settings)
 
 
-def warn_of_pauses(plots: Plots, path: str | Path) -> None:
-    """A warning says when the time jumps so far that all tracks end."""
+def read_any(path: str | Path, settings: RadarSettings) -> Plots:
+    """The same, whatever is set for recordings. A warning says when the time jumps so far that all tracks end.
+
+    Raises the errors of `read_plots` and `read_recording`.
+    """
+    plots = read_recording(path, settings) if is_feed(path) else read_plots(path, settings)
     pauses = rhythm(plots.scan, plots.time_s)
     for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
         others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""
@@ -37,3 +37,4 @@ def warn_of_pauses(plots: Plots, path: str | Path) -> None:
             "%s: the time jumps from %.10g to %.10g s%s; all tracks end there: is the clock right?",
             path, begin_s, end_s, others,
         )  # fmt: skip
+    return plots

@@ -5,11 +5,12 @@ from __future__ import annotations
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.filters import estimator, motion
-from vidtrack.radar.scans import NONLINEAR, Measurements, longest_coast
+from vidtrack.radar.scans import NONLINEAR, Measurements
+from vidtrack.run.radar_life import radar_life
 from vidtrack.scan import Scan
 from vidtrack.tracking.deferred.forest import ForestRule
 from vidtrack.tracking.formation.groups import Formation, GroupTracker, GroupTracks
-from vidtrack.tracking.methods import gate, life, rule
+from vidtrack.tracking.methods import gate, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.station import Station
@@ -42,14 +43,7 @@ class Groups:
             estimator=estimator(radar, found, seed),
             associate=associate,
             gate=gate(common, radar.euclidean_radius_m, adaptive=True),
-            life=life(
-                radar.life,
-                common,
-                common.confirm_hits,
-                common.confirm_window,
-                coast_s=longest_coast([found]),
-                coast_scans=radar.coast_scans,
-            ),
+            life=radar_life(settings, [found]),
             picture=NoPicture(),
             stations=[Station(rates)],
         )

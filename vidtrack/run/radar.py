@@ -30,12 +30,13 @@ from vidtrack.output.threaded import Threaded
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.own_threshold import GATE, controller
 from vidtrack.radar.reading import read
-from vidtrack.radar.scans import Measurements, extent, longest_coast, measurements, surveyed
+from vidtrack.radar.scans import Measurements, extent, measurements, surveyed
 from vidtrack.run.groups import Groups
+from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
 from vidtrack.tracking.clutter import ClutterMap, EvenBox, EvenClutter
-from vidtrack.tracking.methods import gate, life, rule
+from vidtrack.tracking.methods import gate, rule
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.rates import Rates
@@ -192,14 +193,7 @@ def build_point_tracker(
         associate=rule(common, unresolved=isinstance(sharing, Unresolved)),
         gate=admits,
         threshold=threshold,
-        life=life(
-            radar.life,
-            common,
-            common.confirm_hits,
-            common.confirm_window,
-            coast_s=longest_coast(found),
-            coast_scans=radar.coast_scans,
-        ),
+        life=radar_life(settings, found),
         picture=NoPicture(),
         sharing=sharing,
         stations=stations,

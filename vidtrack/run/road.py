@@ -19,12 +19,13 @@ from vidtrack.output.summary import Summary
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.network.network import Feed, Network, Turn, read_feeds
 from vidtrack.radar.network.radars import Radars, read_radars
-from vidtrack.radar.scans import longest_coast, surveyed
+from vidtrack.radar.scans import surveyed
 from vidtrack.run.radar import radar_sinks
+from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, look_ahead, video_steps
-from vidtrack.tracking.methods import gate, life, rule
+from vidtrack.tracking.methods import gate, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.station import Station, Visibility
@@ -151,14 +152,7 @@ def build_road_tracker(
         estimator=estimator(radar, feeds[0].found, seed) if feeds else KalmanBank,
         associate=rule(common),
         gate=gate(common, radar.euclidean_radius_m, adaptive=True),
-        life=life(
-            radar.life,
-            common,
-            common.confirm_hits,
-            common.confirm_window,
-            coast_s=longest_coast([feed.found for feed in feeds]),
-            coast_scans=radar.coast_scans,
-        ),
+        life=radar_life(settings, [feed.found for feed in feeds]),
         picture=NoPicture(),
         stations=stations,
         explain=explain,

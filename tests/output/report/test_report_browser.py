@@ -17,11 +17,17 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium (Debian's package chromium)")
 
 
-def test_every_picture_shows_and_nothing_is_wider_than_the_screen(tmp_path):
+@pytest.fixture
+def out(tmp_path):
+    """The folder of a report."""
     write_day(tmp_path / "day", np.ones((4, 12)), speeds=np.arange(40), legs=MOVEMENTS)
-    out = tmp_path / "report"
-    out.mkdir()
-    write_report(out, read_findings(tmp_path / "day"), None)
+    folder = tmp_path / "report"
+    folder.mkdir()
+    write_report(folder, read_findings(tmp_path / "day"), None)
+    return folder
+
+
+def test_every_picture_shows_and_nothing_is_wider_than_the_screen(tmp_path, out):
     page = (out / "report.html").read_text(encoding="utf-8")
     look = (
         "<script>addEventListener('load', () => { const images = [...document.images];"
@@ -44,12 +50,8 @@ def test_every_picture_shows_and_nothing_is_wider_than_the_screen(tmp_path):
     assert width <= 500
 
 
-def test_no_table_is_cut_on_a_telephone(tmp_path):
+def test_no_table_is_cut_on_a_telephone(tmp_path, out):
     """The sheet stands there leg by leg, all of it on a wider screen and on paper."""
-    write_day(tmp_path / "day", np.ones((4, 12)), speeds=np.arange(40), legs=MOVEMENTS)
-    out = tmp_path / "report"
-    out.mkdir()
-    write_report(out, read_findings(tmp_path / "day"), None)
     hidden = "[...document.querySelectorAll('.wide')].filter((one) => one.scrollWidth > one.clientWidth).length"
     sheets = "[...document.querySelectorAll('.sheet')].filter((one) => one.checkVisibility()).length"
     with browser(tmp_path) as tab:
@@ -70,12 +72,8 @@ def test_no_table_is_cut_on_a_telephone(tmp_path):
         assert tab.js(sheets) == 1
 
 
-def test_words_in_pictures_can_be_read_on_a_telephone(tmp_path):
+def test_words_in_pictures_can_be_read_on_a_telephone(tmp_path, out):
     """Pictures scroll sideways in their own place, and the page does not."""
-    write_day(tmp_path / "day", np.ones((4, 12)), speeds=np.arange(40), legs=MOVEMENTS)
-    out = tmp_path / "report"
-    out.mkdir()
-    write_report(out, read_findings(tmp_path / "day"), None)
     narrowest = "Math.min(...[...document.images].map((one) => one.getBoundingClientRect().width))"
     scrolls = "[...document.querySelectorAll('.picture')].every((one) => one.scrollWidth > one.clientWidth)"
     with browser(tmp_path) as tab:

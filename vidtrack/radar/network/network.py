@@ -15,12 +15,12 @@ from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.coordinates import wrap
-from vidtrack.radar.feeds.recording import is_feed, read_recording, senders
+from vidtrack.radar.feeds.recording import is_feed, senders
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
-from vidtrack.radar.plots import Plots, read_plots
-from vidtrack.radar.reading import warn_of_pauses
+from vidtrack.radar.plots import Plots
+from vidtrack.radar.reading import read_any
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
 from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
@@ -158,21 +158,21 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     if len(feeds) > 1 and any(not feed.plots.polar for feed in feeds):
         cartesian = next(feed.placed.name for feed in feeds if not feed.plots.polar)
         raise ConfigError(f"the plots of radar {cartesian!r} have x and y; several radars need range_m and azimuth_deg")
-    for one, other in combinations(feeds, 2):
-        _refuse_same(one, other)
+    _refuse_same(feeds)
     return feeds
 
 
-def _refuse_same(one: Feed, other: Feed) -> None:
+def _refuse_same(feeds: Sequence[Feed]) -> None:
     """Raise ConfigError if most plots of a feed are another's: echoes of one radar would confirm its false plots."""
-    measured = [_as_measured(feed) for feed in (one, other)]
-    fewer = min(map(len, measured))
-    same = int((np.unique(np.concatenate(measured), axis=0, return_counts=True)[1] > 1).sum())
-    if same > MOSTLY * fewer:
-        raise ConfigError(
-            f"radars {one.placed.name!r} and {other.placed.name!r} have the same plots ({same} of {fewer}), so they "
-            "are one radar; leave one of them out"
-        )
+    measured = [(feed.placed.name, _as_measured(feed)) for feed in feeds] if len(feeds) > 1 else []
+    for (one, own), (other, others) in combinations(measured, 2):
+        fewer = min(len(own), len(others))
+        same = int((np.unique(np.concatenate([own, others]), axis=0, return_counts=True)[1] > 1).sum())
+        if same > MOSTLY * fewer:
+            raise ConfigError(
+                f"radars {one!r} and {other!r} have the same plots ({same} of {fewer}), so they are one radar; leave "
+                "one of them out"
+            )
 
 
 def _as_measured(feed: Feed) -> Floats:
@@ -209,8 +209,7 @@ def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
     known = {name: getattr(radar, name) for name in _OWN}
     own = {name: value for name, value in known.items() if value is not None}
     settings = settings.model_copy(update={"position": placed.xyz, **own})
-    plots = _level(read_recording(path, settings) if is_feed(path) else read_plots(path, settings), path)
-    warn_of_pauses(plots, path)
+    plots = _level(read_any(path, settings), path)
     if plots.plane is not None and not plots.polar:
         raise ConfigError(
             f"{path} has positions; a radar of --radars needs ranges and azimuths (CAT 048, CAT 001, TTM)"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.gates import Gates
@@ -134,13 +135,13 @@ class Passing:
             return
         tracks = int(rows.track.max()) + 1
         if tracks > len(self._state):
-            more = max(tracks, 5 * len(self._state) // 4)
+            more = room(len(self._state), tracks)
             self._state, self._far = _longer(self._state, more, np.nan), _longer(self._far, more, 0.0)
             self._last, self._way = _longer(self._last, more, -1), _longer(self._way, more, np.nan)
         row = 0
         while row < len(rows):
             if self._count + len(self._frame) > len(self._whole):
-                more = 5 * len(self._whole) // 4 + 64 * len(self._frame)
+                more = room(len(self._whole), len(self._whole) + 64 * len(self._frame))
                 self._real, self._whole = _longer(self._real, more, 0.0), _longer(self._whole, more, 0)
             row, self._count = _look(
                 row, self._count, rows.t, rows.xy, rows.sigma, rows.v, rows.speed_sigma, rows.speed_shared,

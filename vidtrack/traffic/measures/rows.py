@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet as pq
 
+from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError, FormatError
@@ -158,7 +159,7 @@ class Reader:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         rows = _on_road(ground, column, track, t, seen, merged, edge)
         if len(self._latest) < len(self._numbers):
-            more = max(len(self._numbers), 5 * len(self._latest) // 4) - len(self._latest)
+            more = room(len(self._latest), len(self._numbers)) - len(self._latest)
             self._latest = np.vstack([self._latest, np.full((more, 5), np.nan)])
         _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
         return rows

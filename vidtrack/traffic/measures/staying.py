@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
@@ -65,7 +66,7 @@ class Staying:
             return
         tracks = int(rows.track.max()) + 1
         if tracks > len(self._last_t):
-            more = max(tracks, 5 * len(self._last_t) // 4) - len(self._last_t)
+            more = room(len(self._last_t), tracks) - len(self._last_t)
             self._last_t = np.append(self._last_t, np.full(more, np.nan))
             self._open = np.vstack([self._open, np.full((more, self._zones + 1), -1)])
         unknown = np.full(len(rows), np.nan)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.traffic.lengths import length_sums, mean_length
@@ -118,13 +119,13 @@ class Stretches:
     def _make_room(self, tracks: int, rows: int) -> None:
         """For tracks (K), and for as many stretches as these rows can begin."""
         if tracks > len(self._current):
-            more = max(tracks, 5 * len(self._current) // 4) - len(self._current)  # half a KB each: not twice as many
+            more = room(len(self._current), tracks) - len(self._current)
             self._state = np.concatenate([self._state, np.full((more * _STATES, 9), np.nan)])
             self._since = np.concatenate([self._since, np.full((more, self._since.shape[1]), np.nan)])
             self._current = np.concatenate([self._current, np.full(more, -1)])
         stretches = self._count + rows
         if stretches > len(self._track):
-            more = max(stretches, 5 * len(self._track) // 4) - len(self._track)
+            more = room(len(self._track), stretches) - len(self._track)
             unknown = np.full((more, 9), np.nan)
             self._head, self._tail = np.vstack([self._head, unknown]), np.vstack([self._tail, unknown])
             self._track = np.concatenate([self._track, np.full(more, -1)])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 
@@ -58,7 +59,7 @@ class Knotting:
             return
         tracks = int(track.max()) + 1
         if tracks > len(self._open):
-            more = max(tracks, 5 * len(self._open) // 4) - len(self._open)
+            more = room(len(self._open), tracks) - len(self._open)
             self._open = np.vstack([self._open, np.full((more, COLUMNS), np.nan)])
         who, done = np.empty(len(track), np.int64), np.empty((len(track), 6))
         count = _gather(track, t, xy, edge, self._open, who, done)
