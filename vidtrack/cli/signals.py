@@ -24,6 +24,17 @@ def terminate(number: int, frame: FrameType | None) -> None:
     raise Terminated
 
 
+@contextmanager
+def _out_of_kernels() -> Iterator[None]:
+    """A compiled call makes a SystemError of what a signal's handler raises within it: here it is itself again."""
+    try:
+        yield
+    except SystemError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt | Terminated):
+            raise error.__cause__ from None
+        raise
+
+
 def stoppable(items: Iterable[Item]) -> Iterator[Item]:
     """Yields the items; the first signal is raised after the current item, a second one at once."""
     caught: list[int] = []
@@ -35,20 +46,25 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
 
     before: dict[int, Any] = {}
     try:
-        for item in items:
-            if not before:  # before the first item, which may take long, signals act at once
-                before = {number: signal.signal(number, note) for number in _WATCHED}
-            yield item
-            if caught:
-                raise KeyboardInterrupt if caught[0] == signal.SIGINT else Terminated
+        with _out_of_kernels():
+            for item in items:
+                if not before:  # before the first item, which may take long, signals act at once
+                    before = {number: signal.signal(number, note) for number in _WATCHED}
+                yield item
+                if caught:
+                    raise KeyboardInterrupt if caught[0] == signal.SIGINT else Terminated
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def stopping(stop: Callable[[], None]) -> Iterator[None]:
-    """The first signal calls `stop`; a second signal, or a time-out after the first, interrupts the main thread."""
+def stopping(stop: Callable[[], None], late: Callable[[], object] = interrupt_main) -> Iterator[None]:
+    """The first signal calls `stop`; a second one interrupts the main thread.
+
+    late  is called by another thread if the block has not ended soon after the first signal; by default it interrupts
+          the main thread
+    """
     stopped, over = Event(), Event()
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -56,15 +72,16 @@ def stopping(stop: Callable[[], None]) -> Iterator[None]:
             raise KeyboardInterrupt
         stopped.set()
         stop()
-        Thread(target=interrupt, name="patience", daemon=True).start()
+        Thread(target=wait, name="patience", daemon=True).start()
 
-    def interrupt() -> None:
+    def wait() -> None:
         if not over.wait(_PATIENCE_S):
-            interrupt_main()
+            late()
 
     before = {number: signal.signal(number, note) for number in _WATCHED}
     try:
-        yield
+        with _out_of_kernels():
+            yield
     finally:
         over.set()
         for number, handler in before.items():

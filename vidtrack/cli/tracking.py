@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args
@@ -139,26 +140,42 @@ def smooth_option(default: str) -> Callable[[Function], Function]:
 def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") -> None:
     """Complete a run over a file and print its outcome; `none` is the text without tracks."""
     from vidtrack.cli.progress import progress, report_outcome
-    from vidtrack.cli.signals import Terminated, stoppable
+    from vidtrack.cli.signals import stoppable
 
-    with run:
-        try:
-            for _ in stoppable(progress(run, run.count, run.name, quiet, unit)):
-                pass  # the run has passed the step to its sinks
-        except (KeyboardInterrupt, Terminated):
-            click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
-            raise
+    with run, _broken_off(run):
+        for _ in stoppable(progress(run, run.count, run.name, quiet, unit)):
+            pass  # the run has passed the step to its sinks
     report_outcome(run.folder, quiet, none)
     click.echo(run.folder)
 
 
 def finish_feed(run: Run, stop: Callable[[], None], quiet: bool) -> None:
-    """Complete a run over what comes from the network; Ctrl-C and SIGTERM call `stop`, which is its normal end."""
+    """Complete a run over what comes from the network; Ctrl-C and SIGTERM call `stop`, which is its normal end.
+
+    What was heard is tracked to the end, however long kernels are compiled for it: it does not come again. A second
+    signal breaks it off.
+    """
     from vidtrack.cli.progress import progress, report_outcome
     from vidtrack.cli.signals import stopping
 
-    with run, stopping(stop):
+    def late() -> None:
+        if not quiet:
+            click.echo("vidtrack: tracking what was heard before; Ctrl-C again ends it at once", err=True)
+
+    with run, _broken_off(run), stopping(stop, late):
         for _ in progress(run, run.count, run.name, quiet, "scan"):
             pass  # the run has passed the step to its sinks
     report_outcome(run.folder, quiet, "no tracks")
     click.echo(run.folder)
+
+
+@contextmanager
+def _broken_off(run: Run) -> Iterator[None]:
+    """Say where the results are when a signal breaks off a run."""
+    from vidtrack.cli.signals import Terminated
+
+    try:
+        yield
+    except (KeyboardInterrupt, Terminated):
+        click.echo(f"vidtrack: the results up to here are in {run.folder}", err=True)
+        raise

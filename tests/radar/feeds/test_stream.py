@@ -1,13 +1,17 @@
 """Scans from payloads as they come, and from the network."""
 
+import csv
 import json
+import signal
 import socket
 import threading
+import time
 
 import numpy as np
 import pytest
 from asterix_records import RADAR, block, mark, plot, sweeps
 
+from vidtrack.cli.tracking import finish_feed
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, PlotFormatError, SourceError
@@ -16,6 +20,7 @@ from vidtrack.radar.feeds.stream import KEPT_S, MOST_EMPTY, ScanStream
 from vidtrack.radar.feeds.udp import UdpFeed
 from vidtrack.radar.reading import read
 from vidtrack.radar.scans import measurements
+from vidtrack.run import radar_live
 from vidtrack.run.radar_live import run_feed
 
 SETTINGS = RadarSettings()
@@ -170,6 +175,38 @@ def test_a_feed_is_tracked_until_it_is_stopped(tmp_path, blocks, group):
     assert (summary["scans"], summary["plots"], summary["damaged"], summary["tracks"]) == (14, 70, 1, 5)
     assert not summary["interrupted"]
     assert run.name == f"{group}-{port}"
+
+
+def interrupted_feed(folder, blocks, monkeypatch, times):
+    """A feed whose first scan takes long, as one does that waits for the compiler, while Ctrl-C is pressed."""
+    received, stop = iter([blocks]), threading.Event()
+    monkeypatch.setattr(UdpFeed, "poll", lambda self, wait_s: next(received, []))
+    monkeypatch.setattr("vidtrack.cli.signals._PATIENCE_S", 0.01)
+    build = radar_live.build_radar_tracker
+
+    def slow(*of, **named):
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(0.1)
+        return build(*of, **named)
+
+    monkeypatch.setattr(radar_live, "build_radar_tracker", slow)
+    finish_feed(run_feed(f"udp://127.0.0.1:{free_port()}", Settings(), stop.is_set, folder), stop.set, quiet=False)
+
+
+def test_ctrl_c_while_the_first_scan_is_compiled_leaves_all_results(tmp_path, blocks, monkeypatch, capsys):
+    interrupted_feed(tmp_path / "run", blocks, monkeypatch, times=1)
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["scans"], summary["plots"], summary["interrupted"]) == (14, 70, False)
+    assert {row["scan"] for row in csv.DictReader((tmp_path / "run" / "tracks.csv").open())} >= {"12", "13"}
+    assert "Ctrl-C again ends it at once" in capsys.readouterr().err
+
+
+def test_a_second_ctrl_c_ends_a_feed_at_once(tmp_path, blocks, monkeypatch, capsys):
+    with pytest.raises(KeyboardInterrupt):
+        interrupted_feed(tmp_path / "run", blocks, monkeypatch, times=2)
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["interrupted"]
+    assert f"the results up to here are in {tmp_path / 'run'}" in capsys.readouterr().err
 
 
 def test_a_feed_of_another_radar_is_said_to_be_one(tmp_path, blocks, monkeypatch):

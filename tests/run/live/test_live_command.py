@@ -19,7 +19,7 @@ from patient import start
 
 from vidtrack.cli import cli
 from vidtrack.cli.live import LiveOptions, amount
-from vidtrack.cli.signals import Terminated, stopping
+from vidtrack.cli.signals import Terminated, stoppable, stopping
 from vidtrack.config.load import load
 from vidtrack.errors import OutputError
 from vidtrack.output.repair import read_tracks, repair
@@ -175,6 +175,21 @@ def test_what_does_not_stop_is_interrupted(monkeypatch, number):
     with within(), pytest.raises(KeyboardInterrupt):
         deaf()
     assert told == [1]
+
+
+def test_an_interruption_within_a_compiled_call_is_one():
+    def broken():
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise SystemError("returned a result with an exception set") from error
+
+    with pytest.raises(KeyboardInterrupt), stopping(lambda: None):
+        broken()
+    with pytest.raises(KeyboardInterrupt):
+        list(stoppable(broken() for _ in range(1)))
+    with pytest.raises(SystemError), stopping(lambda: None):
+        raise SystemError("of another kind")
 
 
 @pytest.mark.parametrize("options", [["--video", "no/x.mp4"], ["--rerun", "no/x.rrd"]])
