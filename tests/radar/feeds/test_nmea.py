@@ -103,6 +103,30 @@ def test_a_file_with_many_damaged_lines_is_what_most_of_it_says(tmp_path):
     assert not is_feed(path)
 
 
+FILL = b"\0" * 100_000
+
+
+@pytest.mark.parametrize("before", [b"", FILL, b"x" * 70_000 + b"\r\n"])
+@pytest.mark.parametrize("between", [b"", FILL])
+@pytest.mark.parametrize("after", [b"", FILL])
+def test_what_fills_a_file_does_not_tell_what_it_is(tmp_path, before, between, after):
+    lines = [
+        sentence(f"RATTM,01,{4 + k / 100:.2f},30.0,T,10.0,90.0,T,0.0,0.0,N,T1,T,,1200{k * 3:02}.00,A").encode()
+        for k in range(16)
+    ]
+    path = tmp_path / "ship.nmea"
+    path.write_bytes(b"".join([before, *lines[:8], between, *lines[8:], after]))
+    assert is_feed(path)
+    assert len(read(path, RadarSettings())) == 16
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_text_of_two_octets_a_character_is_no_recording(tmp_path, encoding):
+    path = tmp_path / "ship.nmea"
+    path.write_bytes(sentence("HEHDT,090.0,T").encode(encoding) * 100)
+    assert not is_feed(path)
+
+
 def test_what_stands_between_the_sentences_is_no_damage():
     _, losses = messages("# a comment: $5*00\r\n", "2026-01-01 12:00:00\r\n", "\r\n", "$PSRF103,00,01,00,01*25\r\n")
     assert not losses.damaged

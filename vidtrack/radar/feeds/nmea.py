@@ -28,15 +28,22 @@ _POSITIONS = (1, 2, 3, 9, 18)
 """Types of AIS messages with a position, all of one sentence."""
 _MILLISECONDS = 1e11
 """Time stamps from here on are in milliseconds."""
-_LOOKED_AT = 1 << 16
-"""Octets whose lines tell whether a content is NMEA."""
+_LONGEST = 160
+"""Octets of a line: a sentence has at most 80 characters, and the block of tags before it as many."""
 
 
 def looks_like(content: bytes) -> bool:
-    """Whether most of the beginning, by octets, is lines with a sentence whose checksum is not wrong."""
-    lines = content[:_LOOKED_AT].splitlines()
-    sound = sum(len(line) for line in lines if (found := _SENTENCE.search(line)) and _is_sound(found.group()))
-    return 2 * sound > sum(len(line) for line in lines)
+    """Whether most of it, by octets, is lines with a sentence whose checksum is not wrong.
+
+    NULs, with which recorders fill their files, do not count, nor do the octets of a line beyond the longest.
+    """
+    sound = total = 0
+    for line in content.splitlines():
+        octets = min(len(line) - line.count(b"\0"), _LONGEST)
+        found = _SENTENCE.search(line)
+        total += octets
+        sound += octets if found and _is_sound(found.group()) else 0
+    return 2 * sound > total
 
 
 def _is_sound(sentence: bytes) -> bool:
