@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Collection
 from pathlib import Path
 
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
+from vidtrack.radar.feeds.plots import Code
 from vidtrack.radar.feeds.recording import is_feed, read_recording
 from vidtrack.radar.plots import Plots, read_plots
 from vidtrack.radar.rhythm import rhythm
@@ -24,12 +26,14 @@ def read(path: str | Path, settings: RadarSettings) -> Plots:
     return read_any(path, settings)
 
 
-def read_any(path: str | Path, settings: RadarSettings) -> Plots:
-    """The same, whatever is set for recordings. A warning says when the time jumps so far that all tracks end.
+def read_any(path: str | Path, settings: RadarSettings, known: Collection[Code] = ()) -> Plots:
+    """The same, whatever is set for recordings; `known` as in `read_recording`.
+
+    A warning says when the time jumps so far that all tracks end.
 
     Raises the errors of `read_plots` and `read_recording`.
     """
-    plots = read_recording(path, settings) if is_feed(path) else read_plots(path, settings)
+    plots = read_recording(path, settings, known) if is_feed(path) else read_plots(path, settings)
     pauses = rhythm(plots.scan, plots.time_s)
     for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
         others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""

@@ -175,7 +175,9 @@ def test_a_damaged_code_of_a_sender_is_no_other_radar(tmp_path, caplog):
     assert (len(plots), plots.losses["damaged"]) == (240, 1)
     assert f"{path}: left out: 1 damaged" in caplog.messages
     assert senders(path) == [(25, 201)]
-    assert len(seconds(path, sic=202)) == 1
+    assert senders(path, [(25, 202)]) == [(25, 201), (25, 202)]
+    assert seconds(path, sic=201).losses["damaged"] == 1
+    assert (len(seconds(path, sic=202)), seconds(path, sic=202).losses["damaged"]) == (1, 0)
     with pytest.raises(PlotFormatError, match="2 radars"):
         seconds(recorded(tmp_path, *turning(1000), *[stray] * 4))
 

@@ -193,6 +193,18 @@ def test_a_recording_of_two_radars_is_split_by_their_codes(sites, caplog):
     assert "not" not in "".join(one for one in caplog.messages if "tracked are" in one)
 
 
+@pytest.mark.parametrize("turns", [1, 2])
+def test_a_radar_with_few_plots_in_a_recording_is_one_of_it(sites, turns):
+    own = sites / "few.ast"
+    radar = [(("SAC", 25), ("SIC", sic)) for sic in (201, 202)]
+    blocks = [block(plot(100 + 0.1 * k, 20000 + 40 * k, 9.0 * k % 360, radar[0])) for k in range(400)]
+    some = [block(plot(101.0 + 4 * k, 30000, 45.0, radar[1])) for k in range(turns)]
+    own.write_bytes(b"".join([mark(100.0, turn_s=4.0, radar=radar[0]), *some, *blocks]))
+    feeds = read_feeds([str(own)], read_radars(sites / "radars.toml"), load().radar)
+    assert [(feed.placed.name, len(feed.plots)) for feed in feeds] == [("a", 400), ("b", turns)]
+    assert [feed.plots.losses["damaged"] for feed in feeds] == [0, 0]
+
+
 def test_the_plots_of_one_radar_are_not_those_of_two(biased, sites):
     (biased / "copy.csv").write_bytes((biased / "south.csv").read_bytes())
     toml = (biased / "radars.toml").read_text() + "[radars.copy]\nx_m = 100\ny_m = 50\nboresight_deg = 7\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,11 +28,15 @@ _STRAYS, _STRAY_SHARE = 3, 0.01
 """A sender of at most so many messages, and of at most this share of all, is none: its code is damaged."""
 
 
+Code = tuple[int, int]
+"""SAC and SIC of a radar."""
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """What of a feed is tracked: the messages of one sender (SAC * 256 + SIC), category and kind, and its marks.
 
-    damaged  number of plots of the category whose sender's code is damaged
+    damaged  number of plots of the category in the whole feed whose sender's code is damaged
     """
 
     source: int
@@ -59,8 +64,8 @@ def wanted(messages: Messages, settings: RadarSettings) -> Messages:
     return positions
 
 
-def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
-    """What is tracked of a feed.
+def choose(messages: Messages, settings: RadarSettings, name: str, known: Collection[Code] = ()) -> Choice:
+    """What is tracked of a feed; senders with a known code are radars, however few messages they sent.
 
     Raises PlotFormatError for a feed without positions, or with several radars of which none is chosen.
     """
@@ -69,7 +74,8 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
         raise PlotFormatError(f"{name} holds {nothing_wanted(messages, settings)}")
     category = next(one for one in _CATEGORIES if (positions.category == one).any())
     chosen = positions.only(positions.category == category)
-    stray = np.isin(chosen.source, stray_senders(messages))
+    strays = stray_senders(messages, known)
+    stray = np.isin(chosen.source, strays)
     stray &= not stray.all()
     chosen = chosen.only(~stray)
     sources = Counter(chosen.source.tolist())
@@ -80,13 +86,16 @@ def choose(messages: Messages, settings: RadarSettings, name: str) -> Choice:
             "--set radar.sic=..."
         )
     kind = next(one for one in _KINDS if (chosen.kind == one).any())
-    return Choice(chosen.source[0].item(), category, kind, int(stray.sum()))
+    source = chosen.source[0].item()
+    damaged = ~messages.marks & (messages.category == category) & np.isin(messages.source, strays[strays != source])
+    return Choice(source, category, kind, int(damaged.sum()))
 
 
-def stray_senders(messages: Messages) -> Ints:
-    """(N,) senders of so few messages that a damaged code made them."""
+def stray_senders(messages: Messages, known: Collection[Code] = ()) -> Ints:
+    """(N,) senders of so few messages that a damaged code made them; those with a known code are none."""
     source, count = np.unique(messages.source, return_counts=True)
-    return np.asarray(source[(count <= _STRAYS) & (count <= _STRAY_SHARE * len(messages))])
+    few = source[(count <= _STRAYS) & (count <= _STRAY_SHARE * len(messages))]
+    return np.setdiff1d(few, [sac << 8 | sic for sac, sic in known])
 
 
 def nothing_wanted(messages: Messages, settings: RadarSettings) -> str:

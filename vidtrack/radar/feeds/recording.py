@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter, deque
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -18,6 +19,7 @@ from vidtrack.radar.feeds.pace import paced
 from vidtrack.radar.feeds.packets import payloads
 from vidtrack.radar.feeds.plots import (
     Choice,
+    Code,
     choose,
     first_copies,
     plots_of,
@@ -99,14 +101,14 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
     return Messages.of(found)
 
 
-def senders(path: str | Path) -> list[tuple[int, int]]:
-    """SAC and SIC of each radar whose plots are in a recording of ASTERIX.
+def senders(path: str | Path, known: Collection[Code] = ()) -> list[Code]:
+    """The code of each radar whose plots are in a recording of ASTERIX, of a known one however few they are.
 
     Raises the errors of `read_messages`.
     """
     messages = read_messages(path, Losses())
     plots = messages.only((messages.kind == Kind.POLAR) & (messages.category > 0))
-    sending = np.setdiff1d(plots.source, stray_senders(messages))
+    sending = np.setdiff1d(plots.source, stray_senders(messages, known))
     return [(source >> 8, source & 255) for source in sending.tolist()]
 
 
@@ -118,8 +120,8 @@ def _informed(kind: type[Decoder], content: bytes) -> Decoder:
     return decoder
 
 
-def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
-    """The plots of a recording.
+def read_recording(path: str | Path, settings: RadarSettings, known: Collection[Code] = ()) -> Plots:
+    """The plots of a recording; `known` are the codes of all its radars that are not those of damaged records.
 
     Scans are the turns of the antenna, or periods (see `pace_of`); `time_s` is seconds since midnight of the first day.
     A line in the log says what was left out. Raises the errors of `read_messages`, and PlotFormatError if no plots are
@@ -127,7 +129,7 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     """
     losses, name = Losses(), str(path)
     messages = read_messages(path, losses)
-    choice = choose(messages, settings, name)
+    choice = choose(messages, settings, name, known)
     losses.damaged += choice.damaged
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -15,6 +15,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.feeds.plots import Code
 from vidtrack.radar.feeds.recording import is_feed, senders
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
@@ -194,9 +195,9 @@ def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings)
 
 def _feeds(path: Path, radars: Radars, settings: RadarSettings) -> list[Feed]:
     """The feeds of one file; its damaged records are counted with the first."""
-    codes = senders(path) if path.stem not in radars.names and is_feed(path) else []
+    codes = senders(path, radars.codes) if path.stem not in radars.names and is_feed(path) else []
     placed = [radars.coded(*code) for code in codes] or [radars.named(path.stem)]
-    first, *others = (_read(path, one, settings) for one in placed)
+    first, *others = (_read(path, one, settings, radars.codes) for one in placed)
     return [first, *(replace(feed, plots=_without_damaged(feed.plots)) for feed in others)]
 
 
@@ -204,12 +205,12 @@ def _without_damaged(plots: Plots) -> Plots:
     return replace(plots, bad_rows=0, losses={**plots.losses, "damaged": 0})
 
 
-def _read(path: Path, placed: Placed, settings: RadarSettings) -> Feed:
+def _read(path: Path, placed: Placed, settings: RadarSettings, codes: Collection[Code]) -> Feed:
     radar = placed.radar
     known = {name: getattr(radar, name) for name in _OWN}
     own = {name: value for name, value in known.items() if value is not None}
     settings = settings.model_copy(update={"position": placed.xyz, **own})
-    plots = _level(read_any(path, settings), path)
+    plots = _level(read_any(path, settings, codes), path)
     if plots.plane is not None and not plots.polar:
         raise ConfigError(
             f"{path} has positions; a radar of --radars needs ranges and azimuths (CAT 048, CAT 001, TTM)"

@@ -108,6 +108,12 @@ class Radars:
         """Names of the radars."""
         return [one.name for one in self.placed]
 
+    @property
+    def codes(self) -> list[tuple[int, int]]:
+        """SAC and SIC of the radars that have them."""
+        own = [(one.radar.sac, one.radar.sic) for one in self.placed]
+        return [(sac, sic) for sac, sic in own if sac is not None and sic is not None]
+
     def named(self, name: str) -> Placed:
         """The radar of this name. Raises ConfigError, with the nearest name."""
         for one in self.placed:
