@@ -14,6 +14,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.estimate.sensor import POSITION
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.run.radar import track_plots
+from vidtrack.run.road import build_road_tracker
 from vidtrack.scan import Scan
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
@@ -74,6 +75,13 @@ def test_particles_of_which_one_has_all_the_weight_are_tracked_and_not_smoothed(
     assert sum(len(tracks) > 0 for tracks in scans) > 30
     with pytest.raises(ConfigError, match="cannot be smoothed"):
         next(track_plots(tmp_path / "plots.csv", load(assignments=[*chosen, ("output.smooth", True)])))
+
+
+@pytest.mark.parametrize("chosen", ["radar.estimator=alpha-beta", "radar.resampling=none"])
+def test_beside_a_camera_neither(chosen):
+    settings = load(assignments=["radar.estimator=particle", chosen, "output.smooth=true"])
+    with pytest.raises(ConfigError, match="cannot be smoothed"):
+        build_road_tracker(settings, [], None)
 
 
 @pytest.mark.parametrize(("swing_m", "agile"), [(1200.0, True), (0.0, False)])

@@ -180,9 +180,7 @@ def build_point_tracker(
         raise ConfigError(
             f"the plots have no amplitudes, by which {common.method} chooses; take another method (gnn, jpda, mht)"
         )
-    if settings.output.smooth and not _has_covariances(radar):
-        filter_ = radar.estimator if radar.estimator != "particle" else f"particle with resampling {radar.resampling}"
-        raise ConfigError(f"{filter_} keeps no covariances of its own, and cannot be smoothed; take another estimator")
+    refuse_smoothing(settings)
     if radar.group_link_m is not None or (radar.snr_db is not None and len(found) > 1):
         raise ConfigError("radar.group_link_m and radar.snr_db are for one radar; leave them out")
     sharing = _sharing(radar, [place[:dim] for place in places])
@@ -214,6 +212,14 @@ def _gate_and_threshold(settings: Settings, found: Measurements) -> tuple[Gate, 
     dim, share = found.z.shape[1], common.gate_probability
     width = GATE if share is None else math.sqrt(quantile(share, dim))
     return Gate(gated(dim, width)), controller(radar, found, width)
+
+
+def refuse_smoothing(settings: Settings) -> None:
+    """Raise ConfigError for output.smooth with a filter that does not know its errors."""
+    radar = settings.radar
+    if settings.output.smooth and not _has_covariances(radar):
+        filter_ = radar.estimator if radar.estimator != "particle" else f"particle with resampling {radar.resampling}"
+        raise ConfigError(f"{filter_} keeps no covariances of its own, and cannot be smoothed; take another estimator")
 
 
 def _has_covariances(radar: RadarSettings) -> bool:

@@ -20,7 +20,7 @@ from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.network.network import Feed, Network, Turn, read_feeds
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.radar.scans import surveyed
-from vidtrack.run.radar import radar_sinks
+from vidtrack.run.radar import radar_sinks, refuse_smoothing
 from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.trackers import build_blob_tracker
@@ -127,10 +127,14 @@ def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
 def build_road_tracker(
     settings: Settings, feeds: Sequence[Feed], camera: Camera | None, *, explain: bool = False, seed: int = 0
 ) -> Tracker:
-    """The tracker in metres: a station for each radar, then one for the camera; each may lose sight of a vehicle."""
+    """The tracker in metres: a station for each radar, then one for the camera; each may lose sight of a vehicle.
+
+    Raises ConfigError for settings that exclude each other.
+    """
     radar, common = settings.radar, settings.tracker
     if radar.group_link_m is not None or radar.snr_db is not None:
         raise ConfigError("radar.group_link_m and radar.snr_db are for one radar without a camera; leave them out")
+    refuse_smoothing(settings)
     stations = [
         Station(
             Rates(
