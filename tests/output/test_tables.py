@@ -63,6 +63,17 @@ def test_the_covariance_of_position_and_velocity_can_be_rebuilt():
         assert np.allclose(corr * np.outer(sigma, sigma), wanted, atol=0.01)
 
 
+@pytest.mark.filterwarnings("error")
+def test_without_an_error_there_is_no_correlation():
+    step = make_step(0, [(1, "c", 1, 1), (2, "c", 9, 9)])
+    P = step.tracks.P.copy()
+    P[1] = 0.0
+    known, exact = track_rows([replace(step, tracks=replace(step.tracks, P=P))]).to_pylist()
+    assert (exact["sigma_x_px"], exact["sigma_vy_px_s"]) == (0.0, 0.0)
+    assert {exact[name] for name in exact if name.startswith("corr_")} == {None}
+    assert None not in {known[name] for name in known if name.startswith("corr_")}
+
+
 def test_edges_are_those_of_a_track_s_own_measurement_without_its_rim():
     rows = [(1, "c", 100, 50), (2, "m", 9, 9), (3, "o", 5, 5), (4, "c", 4, 40)]
     box = np.array([[-12.0, -6, 24, 12], [-4, -10, 9, 20]])  # of the tracks 1 and 4
