@@ -39,3 +39,12 @@ def test_nees_is_the_squared_error_in_units_of_the_covariance():
     result = Table(np.arange(4), np.ones(4, int), xy, None, np.ones(4), cov)
     truth = Table(np.arange(4), np.ones(4, int), np.zeros((4, 2)), None, np.ones(4))
     np.testing.assert_allclose(nees(result, truth, np.arange(4), np.arange(4)), [25, 1 + 4, np.nan, np.nan])
+
+
+def test_a_covariance_whose_correlation_is_one_has_no_nees():
+    sigma = np.random.default_rng(0).uniform(0.1, 10, (1000, 2)).round(3)
+    cov = sigma[:, :, None] * sigma[:, None]
+    rows = np.arange(1000)
+    result = Table(rows, np.ones(1000, int), sigma, None, np.ones(1000), cov)
+    truth = Table(rows, np.ones(1000, int), np.zeros((1000, 2)), None, np.ones(1000))
+    assert np.isnan(nees(result, truth, rows, rows)).all()

@@ -49,7 +49,7 @@ def consistency(values: Floats, dim: int, confidence: float = 0.95) -> Consisten
 def nees(result: Table, truth: Table, result_rows: Ints, truth_rows: Ints) -> Floats:
     """Normalised estimation error squared (K,) of the position, e' P^-1 e, of matched rows (K,).
 
-    NaN if the covariance is missing or not positive definite.
+    NaN if the covariance is missing or, as precisely as numbers are, not positive definite.
     """
     value = np.full(len(result_rows), np.nan)
     if result.cov is None:
@@ -58,7 +58,8 @@ def nees(result: Table, truth: Table, result_rows: Ints, truth_rows: Ints) -> Fl
     error = result.xy[result_rows, :axes] - truth.xy[truth_rows, :axes]
     cov = result.cov[result_rows, :axes, :axes]
     usable = np.isfinite(cov.sum(axis=(1, 2)))
-    usable[usable] = np.linalg.eigvalsh(cov[usable])[:, 0] > 0
+    least, *_, most = np.linalg.eigvalsh(cov[usable]).T
+    usable[usable] = least > axes * np.finfo(float).eps * most
     weighted = np.linalg.solve(cov[usable], error[usable][..., None])[..., 0]
     value[usable] = np.einsum("ki,ki->k", error[usable], weighted)
     return value
