@@ -28,6 +28,12 @@ def test_skipped_scan_numbers_are_empty_scans_at_times_between(tmp_path):
     assert all(scan.noise.shape == (2, 2) for _, scan in scans)
 
 
+def test_the_rhythm_of_scans_is_found_once(tmp_path):
+    found = read(tmp_path, "0,0,1000,0,5,0.1", "1,4,1000,1,5,0.1", "3,12,1000,2,5,0.1")
+    assert found.rhythm.scan_s == pytest.approx(4)
+    assert found.rhythm is found.rhythm
+
+
 def test_the_time_of_a_scan_is_the_mean_of_its_plots(tmp_path):
     found = read(tmp_path, "0,1,1000,0,5,0.1", "0,3,1000,90,5,0.1", "1,5,1000,0,5,0.1", "1,7,1000,90,5,0.1")
     assert [scan.t for _, scan in found] == [2, 6]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +50,7 @@ def spans(scan: Ints, time_s: Floats) -> Iterator[Span]:
         yield Span(int(number[k]), float(mean_s[k]), slice(start, end))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Measurements:
     """Plots as input of a tracker, in order of time.
 
@@ -76,7 +77,7 @@ class Measurements:
         """Number of scans, empty ones included."""
         return int(self.scan[-1] - self.scan[0]) + 1
 
-    @property
+    @cached_property
     def rhythm(self) -> Rhythm:
         """How the scans follow each other."""
         return rhythm(self.scan, self.time_s)
