@@ -150,6 +150,33 @@ def test_interacting_copies_of_one_model_are_the_kalman_filter():
     np.testing.assert_allclose(imm.P, kalman.P, rtol=1e-9, atol=1e-12)
 
 
+def test_modes_are_mixed_once_for_the_smoother_and_the_prediction(monkeypatch):
+    asked, noise = [], ConstantVelocity.process_noise
+    monkeypatch.setattr(ConstantVelocity, "process_noise", lambda *of: asked.append(of[0]) or noise(*of))
+
+    def bank():
+        made = IMMBank([QUIET, BRISK], [20.0, 4.0])
+        made.append(np.array([[0.0, 1.0], [5.0, 5.0]]), np.tile(np.eye(2), (2, 1, 1)), np.ones(2))
+        made.predict(1.0)
+        made.update(one_to_one(2), Scan(1.0, np.array([[1.0, 1.0], [5.0, 9.0]]), np.eye(2)), POSITION)
+        return made
+
+    both, alone = bank(), bank()
+    asked.clear()
+    both.cross(2.0)
+    both.predict(2.0)
+    assert asked == [QUIET, BRISK]
+    alone.predict(2.0)
+    for name in ("x", "P", "mode"):
+        np.testing.assert_array_equal(getattr(both, name), getattr(alone, name))
+    for changed in (lambda one: one.forget(np.array([1])), lambda one: one.keep(np.array([1]))):
+        both.cross(2.0)
+        for one in (both, alone):
+            changed(one)
+            one.predict(2.0)
+        np.testing.assert_array_equal(both.x, alone.x)
+
+
 def test_the_modes_tell_who_manoeuvres():
     """Straight on, then 30 m/s^2 across for 3 s."""
     t = np.arange(0, 13, 0.25)

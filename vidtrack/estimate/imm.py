@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.special import logsumexp
@@ -25,6 +25,15 @@ LEAST = 1e-9
 
 USUAL = 2 / 3
 """Share of the usual probabilities in those of modes that nothing shows."""
+
+
+class _Mixed(NamedTuple):
+    """The banks as they are for each mode dt seconds later, and the modes' probabilities (T, r) then, from of_x."""
+
+    dt: float
+    of_x: Floats
+    banks: tuple[KalmanBank, ...]
+    mode: Floats
 
 
 class IMMBank:
@@ -82,6 +91,7 @@ class IMMBank:
         self._expected = self.mode
         self.hits = np.empty(0, np.int64)
         self.scale = np.empty(0)
+        self._known: _Mixed | None = None
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def __len__(self) -> int:
@@ -194,12 +204,19 @@ class IMMBank:
     def _moved(self, dt: float) -> tuple[tuple[KalmanBank, ...], Floats]:
         """The banks after mixing and a prediction by dt seconds, and the probabilities of the modes then."""
         banks, mode = self._mixed(dt)
-        for bank in banks:
+        moved = tuple(copy(bank) for bank in banks)
+        for bank in moved:
             bank.predict(dt)
-        return banks, mode
+        return moved, mode
 
     def _mixed(self, dt: float) -> tuple[tuple[KalmanBank, ...], Floats]:
-        """The banks as they are now for each mode dt seconds later, and the probabilities of the modes then."""
+        """The banks as they are now for each mode dt seconds later, and the probabilities of the modes then.
+
+        The last answer is kept: the smoother asks for it before the prediction.
+        """
+        known = self._known
+        if known is not None and known.dt == dt and known.of_x is self.x:
+            return known.banks, known.mode
         switch = self._switching(dt)
         mode = self.mode @ switch
         banks = []
@@ -209,7 +226,8 @@ class IMMBank:
             mixed = copy(bank)
             mixed.x, mixed.P = _mixture(weight, np.stack([x for x, _ in lifted]), np.stack([P for _, P in lifted]))
             banks.append(mixed)
-        return tuple(banks), mode
+        self._known = _Mixed(dt, self.x, tuple(banks), mode)
+        return self._known.banks, mode
 
     def _switching(self, dt: float) -> Floats:
         """(r, r) transition probabilities of the models over dt seconds."""
