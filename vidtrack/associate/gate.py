@@ -13,7 +13,7 @@ from scipy.special import gammainc, gammaincinv
 from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
-from vidtrack.compiled import inlined, kernel, specialised
+from vidtrack.compiled import inlined, specialised
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kernels import TURN
 from vidtrack.scan import Scan
@@ -316,7 +316,7 @@ def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
     return order
 
 
-@kernel
+@inlined
 def _grown(array: np.ndarray, size: int) -> np.ndarray:
     """A copy with room for `size` elements."""
     wider = np.empty(size, array.dtype)
