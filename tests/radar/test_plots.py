@@ -87,6 +87,16 @@ def test_turns_of_the_antenna_are_scans_where_each_plot_has_its_own_time(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+@pytest.mark.parametrize("jump_s", [3e5, 1e6])
+def test_a_jump_of_the_clock_holds_no_turns_of_the_antenna(tmp_path, caplog, jump_s):
+    rng = np.random.default_rng(0)
+    times = np.sort(rng.uniform(0, 160, 400))
+    rows = [f"{t + jump_s * (t > 80):.4f},{rng.uniform(1e3, 5e4):.1f},{90 * t % 360:.3f}" for t in times]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
+    assert "40 scans, 4" in caplog.text
+
+
 def test_plots_one_by_one_that_follow_no_antenna_are_warned_of(tmp_path, caplog):
     rng = np.random.default_rng(0)
     rows = [f"{t:.4f},{rng.uniform(1e3, 5e4):.1f},{rng.uniform(0, 360):.3f}" for t in np.sort(rng.uniform(0, 160, 400))]

@@ -19,7 +19,7 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import NAN, Kind, Message, Messages
 from vidtrack.radar.feeds.pace import Turns, pace_of
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import longest_step
+from vidtrack.radar.rhythm import closed_up, longest_step
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -154,7 +154,7 @@ def _turned(table: Table) -> Floats | None:
     pace = pace_of(plots, None)
     if not isinstance(pace, Turns):
         return None
-    turn = np.floor(pace.progress(plots))
+    turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
     scan = np.zeros(len(time_s))
     scan[rows] = turn - turn.min()
     _log.warning(

@@ -40,6 +40,15 @@ def rhythm(scan: Ints, time_s: Floats) -> Rhythm:
     return Rhythm(float(scan_s), limit_s, mean_s[:-1][paused], mean_s[1:][paused])
 
 
+def closed_up(scan: Ints, time_s: Floats) -> Ints:
+    """Numbers of scans (N,) that times (N,) told, in any order, without the empty ones that a pause would hold."""
+    number, member, size = np.unique(scan, return_inverse=True, return_counts=True)
+    mean_s = np.bincount(member, time_s) / size
+    scans, step_s = np.diff(number), np.diff(mean_s)
+    idle = np.where(step_s > longest_step(step_s / scans), scans - 1, 0)
+    return np.asarray(scan - np.concatenate([[0], np.cumsum(idle)])[member])
+
+
 def longest_step(step_s: Floats) -> float:
     """Longest step that is no pause [s], after steps (N,) from scan to scan; infinite without any."""
     return max(PAUSE_S, PAUSE_SCANS * float(np.median(step_s))) if len(step_s) else np.inf

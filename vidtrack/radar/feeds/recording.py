@@ -27,6 +27,7 @@ from vidtrack.radar.feeds.plots import (
 )
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
+from vidtrack.radar.rhythm import closed_up
 
 _log = logging.getLogger(__name__)
 _LOOKED_AT = 1 << 20
@@ -136,7 +137,7 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
     messages, pace = found
     plane = plane_of(choice, messages, settings, name)
-    scan = np.floor(pace.progress(messages)).astype(np.int64)
+    scan = closed_up(np.floor(pace.progress(messages)).astype(np.int64), messages.time_s)
     plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
     if str(losses):
         _log.warning("%s: left out: %s", name, losses)
