@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from asterix_records import RADAR, block, mark, plot, sweeps, track
+from asterix_records import RADAR, block, mark, plot, sweeps, track, two_feeds
 
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
@@ -158,13 +158,8 @@ def test_plots_that_come_late_by_part_of_a_turn_are_in_their_scan(tmp_path):
 
 @pytest.mark.parametrize("behind", [20, 60])
 def test_a_second_feed_that_is_late_is_no_clock_that_was_set_back(tmp_path, behind):
-    """The first feed is out in the middle third, where only late copies come."""
     blocks = turning(1000)
-    n = len(blocks)
-    first = [[part] * (not n // 3 <= k < n // 2) for k, part in enumerate(blocks)]
-    late = [blocks[k - behind : k - behind + 1] if k >= behind else [] for k in range(n)]
-    both = [part for pair in zip(first, late, strict=True) for parts in pair for part in parts]
-    plots = seconds(recorded(tmp_path, *both, *blocks[n - behind :]))
+    plots = seconds(recorded(tmp_path, *two_feeds(blocks, behind)))
     assert plots.losses["resets"] == 0
     assert plots.losses["duplicates"] > 50
     assert np.unique(plots.time_s).tolist() == plots.time_s.tolist()

@@ -18,8 +18,8 @@ from vidtrack.radar.feeds.pace import paced
 from vidtrack.radar.feeds.packets import payloads
 from vidtrack.radar.feeds.plots import (
     Choice,
+    FirstCopies,
     choose,
-    first_copies,
     plots_of,
     stray_senders,
     warn_of_assumed_errors,
@@ -132,7 +132,7 @@ def read_recording(path: str | Path, settings: RadarSettings) -> Plots:
     losses.damaged += choice.damaged
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
-    found = paced(first_copies(choice.of(messages), losses), settings.scan_s, losses)
+    found = paced(FirstCopies(losses).of(choice.of(messages)), settings.scan_s, losses)
     if found is None:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
     messages, pace = found
