@@ -53,3 +53,12 @@ def sweeps(table, turn_s=4.0, begin_s=0.0):
             seen_s = north_s + azimuth_deg / 360 * turn_s
             blocks.append(block(plot(seen_s, table["range_m"][row], azimuth_deg)))
     return blocks
+
+
+def two_feeds(blocks, behind):
+    """Blocks as two feeds bring them, the second so many later; the first is out from a third to a half of them."""
+    n = len(blocks)
+    first = [[part] * (not n // 3 <= k < n // 2) for k, part in enumerate(blocks)]
+    late = [blocks[k - behind : k - behind + 1] if k >= behind else [] for k in range(n)]
+    both = [part for pair in zip(first, late, strict=True) for parts in pair for part in parts]
+    return [*both, *blocks[n - behind :]]

@@ -87,6 +87,25 @@ def test_turns_of_the_antenna_are_scans_where_each_plot_has_its_own_time(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+@pytest.mark.parametrize("jump_s", [3e5, 1e6])
+def test_a_jump_of_the_clock_holds_no_turns_of_the_antenna(tmp_path, caplog, jump_s):
+    rng = np.random.default_rng(0)
+    times = np.sort(rng.uniform(0, 160, 400))
+    rows = [f"{t + jump_s * (t > 80):.4f},{rng.uniform(1e3, 5e4):.1f},{90 * t % 360:.3f}" for t in times]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
+    assert "40 scans, 4" in caplog.text
+
+
+@pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])
+def test_a_time_that_cannot_be_one_does_not_hide_the_turns_of_the_antenna(tmp_path, caplog, stray):
+    times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))
+    rows = [f"{stray if k == 200 else f'{t:.4f}'},{1e4 + 37 * k},{90 * t % 360:.3f}" for k, t in enumerate(times)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"), SKIP)
+    assert plots.scan.tolist() == np.floor(np.delete(times, 200) / 4).astype(int).tolist()
+    assert "1 bad row: line 202" in caplog.text
+
+
 def test_plots_one_by_one_that_follow_no_antenna_are_warned_of(tmp_path, caplog):
     rng = np.random.default_rng(0)
     rows = [f"{t:.4f},{rng.uniform(1e3, 5e4):.1f},{rng.uniform(0, 360):.3f}" for t in np.sort(rng.uniform(0, 160, 400))]
@@ -156,6 +175,8 @@ BAD = [
     ("3.5,3.0,1000,10,5,0.1", "scan is 3.5"),
     ("-1,3.0,1000,10,5,0.1", "scan is -1"),
     ("3,soon,1000,10,5,0.1", "'soon'"),
+    ("3,1e300,1000,10,5,0.1", "time_s is 1e+300; over 100,000,000,000 s: wrong units suspected"),
+    ("3,1700000000000,1000,10,5,0.1", "time_s is 1.7e+12; over"),
     ("3,3.0,1000,10,5", "5 cells"),
     ("3,3.0,1000,10,5,0.1,7", "7 cells"),
     ("1,1.0,1010,350,5,0.1", "the plot of line 3 again"),

@@ -168,6 +168,19 @@ def test_a_jump_of_the_clock_ends_the_tracks_and_spoils_nothing_before_it(tmp_pa
     assert "the time jumps from 116 to 1000120 s" in caplog.text
 
 
+@pytest.mark.parametrize("jump_s", [30.0, 300.0, 1e6])
+def test_a_jump_of_the_clock_changes_no_track_before_it(tmp_path, scenario, jump_s):
+    """One long step must not make the usual time of a scan longer, and so the surveyed space larger."""
+    found = []
+    with (scenario("radar-tws") / "plots.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for added_s in (0.0, jump_s):
+        moved = [row | {"time_s": float(row["time_s"]) + added_s * (int(row["scan"]) >= 30)} for row in rows]
+        path = write(tmp_path / "p.csv", *(",".join(map(str, row.values())) for row in moved), header=",".join(rows[0]))
+        found.append([(tracks.id.tolist(), tracks.xy.tolist()) for scan, tracks in track_plots(path) if scan < 30])
+    assert found[0] == found[1]
+
+
 def test_evaluation_knows_the_run(tmp_path, scenario):
     out = run(scenario("radar-crossing"), tmp_path / "out")
     found = scores(out, scenario("radar-crossing"), 1000.0)

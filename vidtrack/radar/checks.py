@@ -18,6 +18,8 @@ AMPLITUDE = "amplitude"
 FARTHEST_M = 1e6
 FASTEST_M_S = 1e5
 WIDEST_DEG = 45.0
+LATEST_S = 1e11
+"""s; three thousand years: times since 1970 in milliseconds are beyond."""
 LONGEST_GAP = 100_000
 
 
@@ -27,6 +29,7 @@ def check_numbers(table: Table, measured: list[str]) -> None:
     sigmas = [f"sigma_{name}" for name in measured if f"sigma_{name}" in columns]
     for name in (*TIME, *measured, *sigmas, *([AMPLITUDE] if AMPLITUDE in columns else [])):
         table.refuse(~np.isfinite(columns[name]), name, "a finite number is needed")
+    table.refuse(_beyond(columns["time_s"]), "time_s", f"over {LATEST_S:,.0f} s: wrong units suspected")
     scan = columns["scan"]
     with np.errstate(invalid="ignore"):
         table.refuse((scan != np.floor(scan)) | (scan < 0) | (scan > 2**53), "scan", "scans are numbered 0, 1, 2, ...")
@@ -38,6 +41,15 @@ def check_numbers(table: Table, measured: list[str]) -> None:
                 table.refuse(columns[name] > WIDEST_DEG, name, f"at most {WIDEST_DEG:g} degrees make sense")
         if AMPLITUDE in columns:
             table.refuse(columns[AMPLITUDE] < 0, AMPLITUDE, "an amplitude is linear and not below zero")
+
+
+def possible_times(time_s: Floats) -> Floats:
+    """The times (N,), NaN in place of those that are refused."""
+    return np.where(_beyond(time_s), np.nan, time_s)
+
+
+def _beyond(time_s: Floats) -> Mask:
+    return np.asarray(np.abs(time_s) > LATEST_S)
 
 
 def _check_measured(table: Table, name: str) -> None:

@@ -14,12 +14,12 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
-from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order
+from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order, possible_times
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import NAN, Kind, Message, Messages
 from vidtrack.radar.feeds.pace import Turns, pace_of
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import longest_step
+from vidtrack.radar.rhythm import closed_up, longest_step
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -108,11 +108,12 @@ def _numbered(table: Table) -> Table:
     similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
     if scan in table.names or time not in table.columns or similar:
         return table
-    times, member = np.unique(table.columns[time], return_inverse=True)
+    time_s = possible_times(table.columns[time])
+    times, member = np.unique(time_s, return_inverse=True)
     steps = np.diff(times[np.isfinite(times)])
     usual = float(np.median(steps)) if len(steps) else 1.0
     if _one_by_one(steps, len(member)):
-        turned = _turned(table)
+        turned = _turned(table, time_s)
         if turned is not None:
             return replace(table, columns=table.columns | {scan: turned})
         _log.warning(
@@ -137,10 +138,10 @@ def _one_by_one(steps: Floats, plots: int) -> bool:
     return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
 
 
-def _turned(table: Table) -> Floats | None:
+def _turned(table: Table, time_s: Floats) -> Floats | None:
     """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times; None: they follow no antenna."""
-    time_s, azimuth = (table.columns.get(name) for name in (TIME[1], POLAR[1]))
-    if time_s is None or azimuth is None:
+    azimuth = table.columns.get(POLAR[1])
+    if azimuth is None:
         return None
     rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(azimuth))
     if len(rows) < 2:
@@ -154,7 +155,7 @@ def _turned(table: Table) -> Floats | None:
     pace = pace_of(plots, None)
     if not isinstance(pace, Turns):
         return None
-    turn = np.floor(pace.progress(plots))
+    turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
     scan = np.zeros(len(time_s))
     scan[rows] = turn - turn.min()
     _log.warning(

@@ -15,7 +15,8 @@ PAUSE_S, PAUSE_SCANS = 3600.0, 100
 class Rhythm(NamedTuple):
     """The times of scans.
 
-    scan_s   s; mean time of a scan outside of pauses; 0 for a single scan
+    scan_s   s; usual time of a scan: the median, which a jump or a silence does not change, or, if times are so
+             coarse that it is 0, the mean outside of pauses; 0 for a single scan
     limit_s  s; a longer step is a pause; infinite for a single scan
     begin_s, end_s   (K,) s; the last scan before each pause, and the first after it
     """
@@ -34,8 +35,18 @@ def rhythm(scan: Ints, time_s: Floats) -> Rhythm:
     limit_s = longest_step(step_s / scans)
     paused: Mask = step_s > limit_s * scans
     going_s = time_s[-1] - time_s[0] - step_s[paused].sum()
-    scan_s = going_s / max(1, int(scans[~paused].sum()))
+    scan_s = np.median(step_s / scans) if len(scans) else 0.0
+    scan_s = scan_s or going_s / max(1, int(scans[~paused].sum()))
     return Rhythm(float(scan_s), limit_s, mean_s[:-1][paused], mean_s[1:][paused])
+
+
+def closed_up(scan: Ints, time_s: Floats) -> Ints:
+    """Numbers of scans (N,) that times (N,) told, in any order, without the empty ones that a pause would hold."""
+    number, member, size = np.unique(scan, return_inverse=True, return_counts=True)
+    mean_s = np.bincount(member, time_s) / size
+    scans, step_s = np.diff(number), np.diff(mean_s)
+    idle = np.where(step_s > longest_step(step_s / scans), scans - 1, 0)
+    return np.asarray(scan - np.concatenate([[0], np.cumsum(idle)])[member])
 
 
 def longest_step(step_s: Floats) -> float:

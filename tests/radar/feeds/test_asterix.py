@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from asterix_records import RADAR, block, mark, plot, sweeps, track
+from asterix_records import RADAR, block, mark, plot, sweeps, track, two_feeds
 
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
@@ -132,6 +132,21 @@ def test_an_antenna_that_is_turned_back_in_time_has_had_its_clock_set(tmp_path, 
     assert np.bincount(plots.scan).tolist() == [12] * 10 + [11] + [12] * 9
 
 
+@pytest.mark.parametrize(("silent_s", "empty"), [(60, 15), (7200, 0), (36000, 0)])
+def test_a_silence_holds_empty_scans_and_a_jump_of_the_clock_none(tmp_path, caplog, silent_s, empty):
+    plots = seconds(recorded(tmp_path, *turning(1000, 1040 + silent_s)))
+    assert np.unique(plots.scan).tolist() == [*range(10), *range(10 + empty, 20 + empty)]
+    assert plots.time_s[-1] == pytest.approx(1080 + silent_s, abs=1)
+    assert ("the time jumps from" in caplog.text) == (not empty)
+
+
+def test_hours_in_which_the_antenna_turns_and_sees_nothing_are_scans(tmp_path, caplog):
+    idle = [mark(1040.0 + 4 * turn, turn_s=4.0) for turn in range(1000)]
+    plots = seconds(recorded(tmp_path, *turning(1000), *idle, *turning(5040)))
+    assert plots.scan[-1] == 1019
+    assert "the time jumps from" not in caplog.text
+
+
 def test_plots_that_come_late_by_part_of_a_turn_are_in_their_scan(tmp_path):
     blocks = turning(1000)
     turns = [blocks[k : k + 13] for k in range(0, len(blocks), 13)]
@@ -143,13 +158,8 @@ def test_plots_that_come_late_by_part_of_a_turn_are_in_their_scan(tmp_path):
 
 @pytest.mark.parametrize("behind", [20, 60])
 def test_a_second_feed_that_is_late_is_no_clock_that_was_set_back(tmp_path, behind):
-    """The first feed is out in the middle third, where only late copies come."""
     blocks = turning(1000)
-    n = len(blocks)
-    first = [[part] * (not n // 3 <= k < n // 2) for k, part in enumerate(blocks)]
-    late = [blocks[k - behind : k - behind + 1] if k >= behind else [] for k in range(n)]
-    both = [part for pair in zip(first, late, strict=True) for parts in pair for part in parts]
-    plots = seconds(recorded(tmp_path, *both, *blocks[n - behind :]))
+    plots = seconds(recorded(tmp_path, *two_feeds(blocks, behind)))
     assert plots.losses["resets"] == 0
     assert plots.losses["duplicates"] > 50
     assert np.unique(plots.time_s).tolist() == plots.time_s.tolist()

@@ -154,6 +154,15 @@ def test_ships_are_tracked_once_a_round(tmp_path):
     np.testing.assert_allclose(plots.z[:, 1], 55.65 * np.arange(12), atol=0.5)
 
 
+def test_a_jump_of_the_clock_holds_no_rounds(tmp_path, caplog):
+    times = [1700000000 + 10 * k + 20000 * (k > 6) for k in range(14)]
+    path = tmp_path / "ships.nmea"
+    path.write_text("".join(f"\\c:{t}*00\\" + ais(lat=53.5, lon=8.1) for t in times))
+    plots = read(path, RadarSettings(geodetic=(53.5, 8.1, 0.0)))
+    assert plots.scan.tolist() == list(range(12))  # the first two after the jump are not believed
+    assert "the time jumps from" in caplog.text
+
+
 def test_without_the_library_the_message_says_what_to_install(monkeypatch):
     one = ais(lat=1, lon=1)
     monkeypatch.setitem(sys.modules, "pyais", None)

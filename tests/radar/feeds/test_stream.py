@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from asterix_records import RADAR, block, mark, plot, sweeps
+from asterix_records import RADAR, block, mark, plot, sweeps, two_feeds
 
 from vidtrack.cli.tracking import finish_feed
 from vidtrack.config.radar import RadarSettings
@@ -63,19 +63,41 @@ def test_what_comes_late_is_counted(blocks):
     assert (stream.losses.late, stream.losses.strayed) == (1, 0)
 
 
+def twelve_a_turn(seed, turns=20):
+    """Blocks of turns of 4 s with twelve plots each."""
+    scan = np.repeat(np.arange(turns), 12)
+    range_m = np.random.default_rng(seed).uniform(20e3, 40e3, len(scan))
+    table = {"scan": scan, "range_m": range_m, "azimuth_deg": np.tile(np.arange(12) * 30.0, turns)}
+    return sweeps(table, begin_s=500.0)
+
+
 def test_a_clock_that_is_set_back_by_some_turns_goes_on():
-    rng = np.random.default_rng(7)
-    scan = np.repeat(np.arange(20), 12)
-    table = {
-        "scan": scan,
-        "range_m": rng.uniform(20e3, 40e3, len(scan)),
-        "azimuth_deg": np.tile(np.arange(12) * 30.0, 20),
-    }
-    turns = sweeps(table, begin_s=500.0)
-    stream, scans = given_out([*turns[:130], *turns[65:]])
+    stream, scans = given_out([*twelve_a_turn(7)[:130], *twelve_a_turn(8)[65:]])
     assert (stream.losses.resets, stream.losses.late) == (1, 0)
     assert [number for number, _ in scans] == list(range(24))
     assert (np.diff([scan.t for _, scan in scans]) > 0).all()
+
+
+def test_a_recording_that_is_sent_in_a_loop_is_no_late_copy():
+    turns = twelve_a_turn(7)
+    stream, scans = given_out([*turns, *turns, *turns])
+    assert (stream.losses.resets, stream.losses.duplicates) == (2, 0)
+    assert stream.plots > 0.95 * 3 * 240 - 12
+    assert (np.diff([scan.t for _, scan in scans]) > 0).all()
+
+
+@pytest.mark.parametrize("behind", [20, 60, 90])
+def test_late_copies_of_a_second_feed_are_left_out_as_in_a_recording(tmp_path, behind):
+    both = two_feeds(twelve_a_turn(7, turns=30), behind)
+    stream, scans = given_out(both)
+    scans += stream.over(silent=True)
+    path = tmp_path / "both.ast"
+    path.write_bytes(b"".join(both))
+    recorded = read(path, SETTINGS)
+    assert stream.losses.resets == 0
+    assert stream.losses.as_dict() == recorded.losses
+    assert stream.losses.duplicates > 200
+    assert [len(scan.z) for _, scan in scans] == np.bincount(recorded.scan).tolist()
 
 
 def test_a_silence_ends_the_scan_that_is_open(blocks):

@@ -166,7 +166,7 @@ def sites(tmp_path_factory):
         for name, sic in (("a", 201), ("b", 202)):
             radar, begin_s = (("SAC", 25), ("SIC", sic)), 100.0 + 4 * k + (sic - 201)
             blocks[name].append(mark(begin_s, turn_s=4.0, radar=radar))
-            blocks[name].append(block(plot(begin_s + 0.5, 20000 + sic + 400 * k, 45.0, radar)))
+            blocks[name].append(block(plot(begin_s + 0.5, 20000 + sic + 200 * (sic - 201) + 400 * k, 45.0, radar)))
     (folder / "both.ast").write_bytes(b"".join(one + two for one, two in zip(blocks["a"], blocks["b"], strict=True)))
     for name, own in blocks.items():
         (folder / f"{name}.ast").write_bytes(b"".join(own))
@@ -188,7 +188,7 @@ def test_a_recording_of_two_radars_is_split_by_their_codes(sites, caplog):
         assert one.plots.scan.tolist() == list(range(8))
     np.testing.assert_allclose(np.degrees([split[0].plots.z[0, 1], split[1].plots.z[0, 1]]), [45, 55], atol=0.01)
     assert split[1].found.z[0] == pytest.approx(
-        [900 + 20202 * np.sin(np.radians(55)), 20202 * np.cos(np.radians(55))], abs=5
+        [900 + 20402 * np.sin(np.radians(55)), 20402 * np.cos(np.radians(55))], abs=5
     )
     assert "not" not in "".join(one for one in caplog.messages if "tracked are" in one)
 
@@ -218,6 +218,49 @@ def test_the_plots_of_one_radar_are_not_those_of_two(biased, sites):
         read_feeds(
             [str(sites / f"{name}.ast") for name in ("a", "echo")], read_radars(sites / "echo.toml"), load().radar
         )
+
+
+def south_again(folder, change):
+    """A radar `again` at the place of `south`, whose plots are changed by change(time_s, range_m, azimuth_deg)."""
+    with (folder / "south.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    changed = change(*(np.array([float(row[name]) for row in rows]) for name in ("time_s", "range_m", "azimuth_deg")))
+    with (folder / "again.csv").open("w") as file:
+        file.write("scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg\n")
+        for row, t, r, a in zip(rows, *map(np.ndarray.tolist, changed), strict=True):
+            file.write(f"{row['scan']},{t!r},{r!r},{a!r},40,0.3\n")
+    (folder / "again.toml").write_text(
+        "".join(f"[radars.{name}]\nx_m = 0\ny_m = -15000\n" for name in ("south", "again"))
+    )
+    return read_feeds(
+        [str(folder / f"{name}.csv") for name in ("south", "again")], read_radars(folder / "again.toml"), load().radar
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda t, r, a: (t, r.round(0), a.round(2)), ""),
+        (lambda t, r, a: (t, r + 0.01, a), ""),
+        (lambda t, r, a: (t + 0.5, r, a), ", 0.5 s later"),
+        (lambda t, r, a: (t - 10, r.round(0), a.round(2)), ", 10 s earlier"),
+        (lambda t, r, a: (t.round(1), r / 1852 * 256 // 1 / 256 * 1852, a), ""),
+    ],
+)
+def test_a_copy_in_other_digits_or_with_a_delay_is_no_other_radar(biased, change, said):
+    with pytest.raises(vt.ConfigError, match=rf"'south' and 'again' have the same plots \(\d+ of \d+{said}\)"):
+        south_again(biased, change)
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.5])
+def test_two_radars_at_one_place_are_two(biased, later_s):
+    rng = np.random.default_rng(3)
+    both = np.sqrt(2) * rng.normal(size=(2, 100000))
+
+    def independent(t, r, a):
+        return t + later_s, np.abs(r + 40 * both[0, : len(r)]), (a + 0.3 * both[1, : len(a)]) % 360
+
+    assert [feed.placed.name for feed in south_again(biased, independent)] == ["south", "again"]
 
 
 def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):

@@ -46,9 +46,9 @@ class Clock:
         if self._last is None:
             self._last = clock_s
             return clock_s
-        step = _within_a_day(clock_s + self._offset - self._last)
+        step = within_a_day(clock_s + self._offset - self._last)
         if not -self._disorder_s <= step <= JUMP_S:
-            agrees = self._agreed and abs(_within_a_day(clock_s - self._suspect)) <= JUMP_S
+            agrees = self._agreed and abs(within_a_day(clock_s - self._suspect)) <= JUMP_S
             self._suspect, self._agreed = clock_s, self._agreed + 1 if agrees else 1
             if self._agreed < BELIEVED:
                 return math.nan
@@ -61,6 +61,6 @@ class Clock:
         return self._last
 
 
-def _within_a_day(step: float) -> float:
+def within_a_day(step: float) -> float:
     """The same step between two times of day, in -12 to 12 hours."""
     return step - DAY_S * round(step / DAY_S)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
+import math
+from collections import Counter, deque
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.coordinates import wrap
+from vidtrack.radar.feeds.clock import within_a_day
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses, Messages
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
@@ -148,20 +150,42 @@ def plots_of(messages: Messages, scan: Ints, settings: RadarSettings, plane: Pla
     return Plots(scan, messages.time_s, z, sigma, polar, 2, doppler, None, bad_rows=losses.damaged)
 
 
-def first_copies(messages: Messages, losses: Losses) -> Messages:
-    """Without the plots and marks that came before to the digit, as from a second feed of one radar that is late.
+class FirstCopies:
+    """Leaves out the plots and marks that came before to the digit, as from a second feed of one radar that is late.
 
     A late copy must not look like a clock that was set back, so this comes before the times are read.
+
+    remembered_s  s; by how much the time of what is remembered may differ from that of the newest
+    most          number of plots and marks that are remembered
     """
-    rows = np.flatnonzero(~_named(messages) & np.isfinite(messages.time_s))
-    some = messages.only(rows)
-    digits = np.nan_to_num(np.column_stack([some.kind, some.source, some.category, some.time_s, some.u, some.v]))
-    again = np.ones(len(rows), bool)
-    again[np.unique(digits, axis=0, return_index=True)[1]] = False
-    losses.duplicates += int((again & ~some.marks).sum())
-    kept = np.ones(len(messages), bool)
-    kept[rows[again]] = False
-    return messages.only(kept)
+
+    def __init__(self, losses: Losses, remembered_s: float = math.inf, most: float = math.inf) -> None:
+        self._losses, self._remembered_s, self._most = losses, remembered_s, most
+        self._seen: set[bytes] = set()
+        self._order: deque[tuple[float, bytes]] = deque()
+
+    def of(self, messages: Messages) -> Messages:
+        """The messages without those that came before, among them or in an earlier call, in order of arrival."""
+        rows = np.flatnonzero(~_named(messages) & np.isfinite(messages.time_s))
+        some = messages.only(rows)
+        columns = [some.kind, some.source, some.category, some.time_s, some.u, some.v]
+        digits = np.nan_to_num(np.column_stack(columns)) + 0.0  # no -0, whose octets are others
+        came = zip(some.time_s.tolist(), digits, strict=True)
+        again = np.array([self._came_before(time_s, row.tobytes()) for time_s, row in came], bool)
+        self._losses.duplicates += int((again & ~some.marks).sum())
+        kept = np.ones(len(messages), bool)
+        kept[rows[again]] = False
+        return messages.only(kept)
+
+    def _came_before(self, time_s: float, digits: bytes) -> bool:
+        """Whether a message came before; remembers it, and forgets those of other times."""
+        if digits in self._seen:
+            return True
+        self._seen.add(digits)
+        self._order.append((time_s, digits))
+        while len(self._order) > self._most or abs(within_a_day(time_s - self._order[0][0])) > self._remembered_s:
+            self._seen.remove(self._order.popleft()[1])
+        return False
 
 
 def _named(messages: Messages) -> Mask:

@@ -20,8 +20,8 @@ from vidtrack.radar.feeds.packets import payloads
 from vidtrack.radar.feeds.plots import (
     Choice,
     Code,
+    FirstCopies,
     choose,
-    first_copies,
     plots_of,
     stray_senders,
     warn_of_assumed_errors,
@@ -29,6 +29,7 @@ from vidtrack.radar.feeds.plots import (
 )
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
+from vidtrack.radar.rhythm import closed_up
 
 _log = logging.getLogger(__name__)
 _LOOKED_AT = 1 << 20
@@ -133,12 +134,12 @@ def read_recording(path: str | Path, settings: RadarSettings, known: Collection[
     losses.damaged += choice.damaged
     warn_of_others(choice, messages, settings, name)
     warn_of_assumed_errors(choice, settings, name)
-    found = paced(first_copies(choice.of(messages), losses), settings.scan_s, losses)
+    found = paced(FirstCopies(losses).of(choice.of(messages)), settings.scan_s, losses)
     if found is None:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
     messages, pace = found
     plane = plane_of(choice, messages, settings, name)
-    scan = np.floor(pace.progress(messages)).astype(np.int64)
+    scan = closed_up(np.floor(pace.progress(messages)).astype(np.int64), messages.time_s)
     plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
     if str(losses):
         _log.warning("%s: left out: %s", name, losses)

@@ -10,11 +10,12 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
-from vidtrack.radar.feeds.clock import Clock
+from vidtrack.radar.feeds.clock import JUMP_S, Clock
 from vidtrack.radar.feeds.messages import Losses, Message, Messages
 from vidtrack.radar.feeds.pace import Pace, paced
 from vidtrack.radar.feeds.plots import (
     Choice,
+    FirstCopies,
     choose,
     nothing_wanted,
     plots_of,
@@ -38,9 +39,10 @@ MOST_EMPTY = 50
 """Empty scans given out for a pause; every track has ended before."""
 SILENT_SCANS = 3
 """After a silence of so many scans what is there is given out."""
-
 KEPT_S = 60.0
 """s; what was heard before is forgotten as long as no plot can be tracked."""
+REMEMBERED = 1 << 17
+"""Plots and marks of the last JUMP_S that are remembered at most, to leave out their copies from a second feed."""
 
 
 class ScanStream:
@@ -64,7 +66,7 @@ class ScanStream:
         self._warned = False
         self._choice: Choice | None = None
         self._pace: Pace | None = None
-        self._clock = Clock(self.losses)
+        self._clock, self._copies = Clock(self.losses), _copies(self.losses)
         self._waiting, self._progress = Messages.of([]), np.zeros(0)
         self._latest = 0.0
         self._next: int | None = None
@@ -120,7 +122,7 @@ class ScanStream:
             self._learn(heard, silent)
             return
         self._heard = []
-        believed = self._clock.on_one_clock(self._choice.of(heard))
+        believed = self._clock.on_one_clock(self._copies.of(self._choice.of(heard)))
         self._keep(believed, self._pace.progress(believed))
 
     def _learn(self, heard: Messages, silent: bool) -> None:
@@ -129,7 +131,7 @@ class ScanStream:
             self._wait(nothing_wanted(heard, self._settings))
             return
         choice = choose(heard, self._settings, self._name)
-        chosen = choice.of(heard)
+        chosen = _copies(Losses()).of(choice.of(heard))
         found = paced(chosen, self._settings.scan_s, Losses())
         if found is None:
             self._wait("no plots with a time")
@@ -144,7 +146,7 @@ class ScanStream:
         self._choice, self._pace, self._heard = choice, pace, []
         self.losses.damaged += choice.damaged
         self._clock = Clock(self.losses, pace.disorder_s)
-        self._clock.on_one_clock(chosen)
+        self._clock.on_one_clock(self._copies.of(choice.of(heard)))
         self.plane = plane_of(choice, believed, self._settings, self._name)
         self._first = self._next = int(np.floor(progress[~believed.marks].min()))
         self._keep(believed, progress)
@@ -190,3 +192,8 @@ class ScanStream:
         ((_, scan),) = measurements(plots, self._settings)
         self._time_s = scan.t
         return scan
+
+
+def _copies(losses: Losses) -> FirstCopies:
+    """What leaves out late copies as long as they are no clock that was set back."""
+    return FirstCopies(losses, JUMP_S, REMEMBERED)

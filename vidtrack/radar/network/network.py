@@ -17,6 +17,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.plots import Code
 from vidtrack.radar.feeds.recording import is_feed, senders
+from vidtrack.radar.network.copies import Measured, copies
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
@@ -27,8 +28,8 @@ from vidtrack.scan import Scan
 from vidtrack.tracks import TENTATIVE, Tracks
 
 _log = logging.getLogger(__name__)
-MOSTLY = 0.5
-"""Share of the plots of the smaller of two feeds; with more of them in the other feed the two are of one radar."""
+SAME_TIME_S = 0.01
+"""s; delays of a copy that are shorter are not told."""
 _OWN = ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s", "scan_s", "sac", "sic")
 """Settings that a radar's table may have; else those of the run hold."""
 
@@ -165,22 +166,25 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
 
 def _refuse_same(feeds: Sequence[Feed]) -> None:
     """Raise ConfigError if most plots of a feed are another's: echoes of one radar would confirm its false plots."""
-    measured = [(feed.placed.name, _as_measured(feed)) for feed in feeds] if len(feeds) > 1 else []
-    for (one, own), (other, others) in combinations(measured, 2):
-        fewer = min(len(own), len(others))
-        same = int((np.unique(np.concatenate([own, others]), axis=0, return_counts=True)[1] > 1).sum())
-        if same > MOSTLY * fewer:
+    for one, other in combinations(feeds, 2):
+        found = copies(_as_measured(one), _as_measured(other))
+        if found.of_one_radar:
             raise ConfigError(
-                f"radars {one!r} and {other!r} have the same plots ({same} of {fewer}), so they are one radar; leave "
+                f"radars {one.placed.name!r} and {other.placed.name!r} have the same plots ({found.same} of "
+                f"{found.fewer}{_how_late(found.later_s)}) to a tenth of their errors, so they are one radar; leave "
                 "one of them out"
             )
 
 
-def _as_measured(feed: Feed) -> Floats:
-    """(N, 4) time, range and direction of each different plot as the radar measured it, not turned to north."""
-    azimuth = feed.plots.z[:, 1] - feed.placed.turned
-    direction = np.column_stack([np.cos(azimuth), np.sin(azimuth)]).round(9) + 0.0  # no -0, which is another row
-    return np.unique(np.column_stack([feed.plots.time_s, feed.plots.z[:, 0], direction]), axis=0)
+def _how_late(later_s: float) -> str:
+    """The delay of the second feed's plots in words, if it is one."""
+    return f", {abs(later_s):.3g} s {'later' if later_s > 0 else 'earlier'}" if abs(later_s) >= SAME_TIME_S else ""
+
+
+def _as_measured(feed: Feed) -> Measured:
+    plots = feed.plots
+    azimuth = plots.z[:, 1] - feed.placed.turned
+    return Measured(plots.time_s, plots.z[:, 0], azimuth, np.median(plots.sigma[:, :2], axis=0), feed.scan_s)
 
 
 def _refuse_idle(feeds: Sequence[Feed], radars: Radars, settings: RadarSettings) -> None:
