@@ -7,7 +7,7 @@ The scene is one of `vidtrack simulate` with a video; `junction` by default.
 A row is a row of tracks.parquet that a box of the truth matches (IoU from 0.3). NEES is e' P^-1 e, with e from the
 middle of the true box, which ends at the border of the picture; its mean is 2 if P is right. `rms` is of both axes,
 and `stated` what P says of it. Kinds by the true box: its area, and how much of it is visible. Rows of a vehicle
-are not independent: the number of vehicles says more than that of the rows.
+are not independent: `+-`, the standard error of NEES, is by vehicles.
 """
 
 from __future__ import annotations
@@ -81,6 +81,12 @@ def kinds(known: dict[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
     yield "at least 90 % visible", known["visible"] >= 0.9
 
 
+def standard_error(values: np.ndarray, group: np.ndarray) -> float:
+    """Standard error of the mean of values (K,) that depend on each other within a group (K,)."""
+    _, own = np.unique(group, return_inverse=True)
+    return float(np.linalg.norm(np.bincount(own, values - values.mean())) / len(values))
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -94,13 +100,14 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         each = [rows(seed, Path(place, str(seed)), arguments) for seed in range(first, last + 1)]
     known = {name: np.concatenate([one[name] for one in each]) for name in each[0]}
-    sys.stdout.write(f"{'':24}{'NEES':>8}{'median':>8}{'rms':>8}{'stated':>8}{'rows':>8}{'vehicles':>10}\n")
+    sys.stdout.write(f"{'':24}{'NEES':>8}{'+-':>8}{'median':>8}{'rms':>8}{'stated':>8}{'rows':>8}{'vehicles':>10}\n")
     for name, mask in kinds(known):
         if mask.any():
-            value, vehicles = known["nees"][mask], len(np.unique(known["vehicle"][mask]))
+            value, vehicle = known["nees"][mask], known["vehicle"][mask]
             rms, stated = (known[key][mask].mean() ** 0.5 for key in ("square", "stated"))
-            sys.stdout.write(f"{name:24}{value.mean():8.2f}{np.median(value):8.2f}{rms:8.2f}{stated:8.2f}")
-            sys.stdout.write(f"{mask.sum():8d}{vehicles:10d}\n")
+            error, vehicles = standard_error(value, vehicle), len(np.unique(vehicle))
+            sys.stdout.write(f"{name:24}{value.mean():8.2f}{error:8.2f}{np.median(value):8.2f}")
+            sys.stdout.write(f"{rms:8.2f}{stated:8.2f}{mask.sum():8d}{vehicles:10d}\n")
 
 
 if __name__ == "__main__":

@@ -5,8 +5,9 @@
 
 Each argument after the scenario is one choice of settings, as in measure_radar.py. The stretch is from the first to the
 last scan with one plot for both. IDF1, GOSPA (order 2) and matches are within 1 km. NEES is of positions, with the
-track nearest to a target in the scan, because which is which is not in the data; 2 is right. The scenario `anywhere` is
-radar-unresolved with targets that are not 60 m apart in the stretch, but anywhere in a resolution cell.
+track nearest to a target in the scan, because which is which is not in the data; 2 is right. Two scenarios are only
+here: `anywhere` is radar-unresolved with targets that are not 60 m apart in the stretch, but anywhere in a resolution
+cell; those of `straight` never manoeuvre, and drift through the cell until they pass each other anywhere in it.
 
 kept       runs in which the two tracks that follow the pair before the stretch are there in all its scans and after it
 switches   identity switches over the whole run, and their largest number in one run
@@ -88,9 +89,7 @@ def anywhere(rng: np.random.Generator) -> list[Target]:
     azimuth, course, r = *rng.uniform(0, 2 * np.pi, 2), rng.uniform(15e3, 30e3)
     line, along = (np.array([np.sin(angle), np.cos(angle), 0.0]) for angle in (azimuth, course))
     across = np.array([along[1], -along[0], 0.0])
-    side_m, side_deg = COARSE.cell
-    at_range, at_azimuth = rng.uniform(-1, 1, 2) * (side_m, np.radians(side_deg) * r)
-    apart = at_range * line + at_azimuth * np.array([line[1], -line[0], 0.0])
+    apart = in_cell(rng, line, r)
     velocity = rng.uniform(180, 220) * along
     return [
         Target(
@@ -101,6 +100,27 @@ def anywhere(rng: np.random.Generator) -> list[Target]:
         )
         for side in (-1, 1)
     ]  # fmt: skip
+
+
+def straight(rng: np.random.Generator) -> list[Target]:
+    """Two aircraft on straight courses, 2 to 6 degrees apart, that pass each other anywhere in a resolution cell."""
+    azimuth, course, r = *rng.uniform(0, 2 * np.pi, 2), rng.uniform(15e3, 30e3)
+    angle, speed = np.radians(rng.uniform(2, 6)), rng.uniform(180, 220)
+    line = np.array([np.sin(azimuth), np.cos(azimuth), 0.0])
+    apart = in_cell(rng, line, r)
+    pair = []
+    for side in (-1, 1):
+        own = course + side * angle / 2
+        velocity = speed * np.array([np.sin(own), np.cos(own), 0.0])
+        pair.append(Target(fly(r * line + side * apart / 2 - 100 * velocity, velocity)))
+    return pair
+
+
+def in_cell(rng: np.random.Generator, line: np.ndarray, r: float) -> np.ndarray:
+    """A difference (3,) of two places that are in one cell, at r along the line (3,) from the radar."""
+    side_m, side_deg = COARSE.cell
+    at_range, at_azimuth = rng.uniform(-1, 1, 2) * (side_m, np.radians(side_deg) * r)
+    return np.asarray(at_range * line + at_azimuth * np.array([line[1], -line[0], 0.0]))
 
 
 def table(steps: list[tuple[int, Tracks]]) -> formats.Table:
@@ -142,9 +162,12 @@ def nearest(tracks: Tracks, xy: np.ndarray) -> list[int]:
 
 def show(name: str, found: list[Outcome]) -> None:
     """Print the means."""
-    idf1, nees = (np.nanmean([getattr(one, what) for one in found], axis=0) for what in ("idf1", "nees"))
+    idf1 = np.nanmean([one.idf1 for one in found], axis=0)
+    parts = np.array([one.nees for one in found])
+    error = np.nanstd(parts, axis=0) / len(found) ** 0.5
     gospa, switches = (np.array([getattr(one, what) for one in found]) for what in ("gospa", "switches"))
-    sys.stdout.write(f"{name or 'default'}\n    {', '.join(PARTS)}: IDF1 {idf1.round(3)}  NEES {nees.round(2)}\n")
+    sys.stdout.write(f"{name or 'default'}\n    {', '.join(PARTS)}: IDF1 {idf1.round(3)}  ")
+    sys.stdout.write(f"NEES {np.nanmean(parts, axis=0).round(2)} +- {error.round(2)}\n")
     over_all = np.array([one.nees_whole for one in found])
     sys.stdout.write(f"    NEES of whole runs {over_all.mean():.2f} +- {over_all.std() / len(found) ** 0.5:.2f}\n")
     kept = [one for one in found if one.kept]
@@ -161,13 +184,14 @@ def show(name: str, found: list[Outcome]) -> None:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenario", choices=["radar-unresolved", "radar-parting", "anywhere"])
+    parser.add_argument("scenario", choices=["radar-unresolved", "radar-parting", "anywhere", "straight"])
     parser.add_argument("choices", nargs="*", default=[""], metavar="A.B=VALUE;...")
     parser.add_argument("--seeds", default="200-219", metavar="FIRST-LAST")
     options = parser.parse_intermixed_args()
     logging.disable(logging.WARNING)
     radar, _, scans, holds = SCENARIOS["radar-unresolved"]
     SCENARIOS["anywhere"] = radar, anywhere, scans, holds
+    SCENARIOS["straight"] = radar, straight, scans, SCENARIOS["radar-parting"][3]  # some seconds in a cell are enough
     first, last = map(int, options.seeds.split("-"))
     for choice in options.choices:
         settings = load(assignments=[part for part in choice.split(";") if part])

@@ -77,6 +77,13 @@ def test_a_shared_blob_smaller_than_the_vehicle_lacks_an_end_of_it():
     assert by((20.0, 30.0)) == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.parametrize("by", [(6.0, -3.0), (0.0, 1.5)])
+def test_on_a_shared_blob_the_truth_is_between_the_position_and_the_middle_of_the_box(by):
+    step = step_of("shared", 1e-12 * np.eye(4))
+    moved = replace(step, tracks=replace(step.tracks, box=step.tracks.box + np.array([*by, 0, 0])))
+    assert np.diag(position(moved) - position(step)) == pytest.approx(np.square(by) / 3, abs=1e-9)
+
+
 @pytest.mark.parametrize("kind", sorted(ROWS))
 @pytest.mark.parametrize("known", [np.zeros(4), np.array([1.0, 1, 0, 1]), np.array([1.0, 0, -1, 0])])
 def test_a_filter_that_is_certain_of_something_is_no_error(kind, known):

@@ -17,7 +17,9 @@ L   what lasts, and what this picture contradicts:
              border the centroid is not the middle of what is seen, and is off by the difference at least
     blob     a blob of another size than the vehicle lacks the difference at one end, or has too much there; and where
              its middle is not that of the vehicle's box, the truth may be anywhere between: uniform errors. A shared
-             blob that is smaller than the vehicle lacks the difference at one end
+             blob that is smaller than the vehicle lacks the difference at one end. Its centroid is not the vehicle's:
+             where that is in the box is remembered, also while the box grows, and the truth may be anywhere between it
+             and the middle of the box
 """
 
 from __future__ import annotations
@@ -28,9 +30,8 @@ from itertools import groupby
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.output.sink import Step
-from vidtrack.scan import Scan
 from vidtrack.tracking.picture.border import Border
 
 _PIXEL = 0.15
@@ -48,6 +49,8 @@ _EDGE_SHARE, _EDGE_PIXEL = 0.05, 0.6
 """Standard deviation of the middle between two edges of a shared blob: shares of the vehicle's side, and pixels."""
 _UNIFORM = 1 / 12
 """Variance of what is uniform over an interval of one."""
+_BETWEEN = 1 / 3
+"""Mean square of what is uniform from nought to one."""
 
 
 def stated(step: Step) -> Step:
@@ -91,12 +94,13 @@ def _restated(steps: Sequence[Step]) -> Floats:
     edges = (_EDGE_SHARE * side) ** 2 + (_EDGE_PIXEL * pixel) ** 2
     measured = np.where(shared[:, None], 1 / edges, np.where(own[:, None], (_PIXEL * pixel) ** -2, 0.0))
     differs, lacks = (np.concatenate(parts) for parts in zip(*map(_contradicted, steps), strict=True))
-    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks, differs + _beside(scan, box, side))
+    cut, off = Border().of(scan).sides(box), np.square(box[:, :2] + box[:, 2:] / 2 - xy)
+    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks + _BETWEEN * off, differs + _beside(cut, side))
     eye = np.eye(len(place))
     updated = np.linalg.solve(eye + P * measured[:, None, :], P)  # (P^-1 + W^-1)^-1, for a singular P too
     updated = (updated + np.swapaxes(updated, 1, 2)) / 2
     cov = updated + _diagonal(lasting)
-    cov += _diagonal(np.maximum(_off_middle(scan, box, xy) - np.einsum("tii->ti", cov), 0.0))
+    cov += _diagonal(np.maximum(off * (cut[:, :2] | cut[:, 2:]) - np.einsum("tii->ti", cov), 0.0))
     return _with_position(whole, place, cov, pixel)
 
 
@@ -121,16 +125,9 @@ def _contradicted(step: Step) -> tuple[Floats, Floats]:
     return _UNIFORM * (more**2 + off**2), np.minimum(more, 0.0) ** 2 / 4
 
 
-def _beside(scan: Scan, box: Floats, side: Floats) -> Floats:
-    """(T, 2) variances along the border of the picture, where it cuts boxes (T, 4)."""
-    cut = Border().of(scan).sides(box)
+def _beside(cut: Mask, side: Floats) -> Floats:
+    """(T, 2) variances along the border of the picture, which cuts these sides (T, 4) of boxes."""
     return (_BESIDE * side) ** 2 * np.column_stack([cut[:, 1] | cut[:, 3], cut[:, 0] | cut[:, 2]])
-
-
-def _off_middle(scan: Scan, box: Floats, xy: Floats) -> Floats:
-    """(T, 2) squared differences of positions (T, 2) from the middles of boxes (T, 4), across borders that cut them."""
-    cut = Border().of(scan).sides(box)
-    return (box[:, :2] + box[:, 2:] / 2 - xy) ** 2 * (cut[:, :2] | cut[:, 2:])
 
 
 def _diagonal(values: Floats) -> Floats:
