@@ -63,7 +63,7 @@ class RoadReadings:
     def of(self, track_id: int) -> tuple[float, float, float, float]:
         """Length, speed and its standard deviations; NaN where nothing is known."""
         sums = self._sums.get(track_id)
-        length = np.nan if sums is None else float(mean_length(sums[None])[0])
+        length = np.nan if sums is None else float(mean_length(sums[None])[0][0])
         return length, *self._speeds.get(track_id, _NOTHING)
 
     def forget(self, before_s: float) -> None:

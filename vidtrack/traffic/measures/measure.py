@@ -109,7 +109,8 @@ class _Figures:
         self.against = contradicting(found)
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
-        whole = whole_tracks(None if found is None else found.classes, lives.length, site.classes)
+        classes = site.classes if self.metres else {}
+        whole = whole_tracks(None if found is None else found.classes, lives.length, lives.length_sigma, classes)
         self.length, self.kind, self.kind_probability = whole.length, whole.kind, whole.probability
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))
