@@ -84,10 +84,11 @@ def parse_line(text: str) -> Line:
     return Line(name, x1, y1, x2, y2)
 
 
-def parse_lines(texts: Sequence[str], width: int, height: int) -> list[Line]:
+def parse_lines(texts: Sequence[str], width: int, height: int, *, refuse: bool = False) -> list[Line]:
     """Lines from "NAME:x1,y1,x2,y2"; warns of those that no vehicle can cross in a width x height picture.
 
-    Raises ConfigError for a malformed line or a name that is used twice.
+    refuse  such a line, in place of the warning: the size is not estimated. Raises ConfigError for it, for a malformed
+            line and a name that is used twice
     """
     lines = [parse_line(text) for text in texts]
     for name, uses in Counter(line.name for line in lines).items():
@@ -96,7 +97,10 @@ def parse_lines(texts: Sequence[str], width: int, height: int) -> list[Line]:
     for line in lines:
         xs, ys = sorted((line.x1, line.x2)), sorted((line.y1, line.y2))
         if xs[1] <= 0 or xs[0] >= width - 1 or ys[1] <= 0 or ys[0] >= height - 1:
-            _log.warning("line %s lies outside the %d x %d picture: nothing can cross it", line.name, width, height)
+            outside = f"line {line.name} lies outside the {width} x {height} picture: nothing can cross it"
+            if refuse:
+                raise ConfigError(f"{outside}; draw it across the road")
+            _log.warning("%s", outside)
     return lines
 
 
