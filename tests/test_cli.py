@@ -122,7 +122,8 @@ def test_options_stand_for_settings(vidtrack, tmp_path):
 def test_stored_detections_are_tracked_like_a_video(vidtrack, tmp_path):
     table = [f"{k},-1,{10 + 4 * k},50,30,16,0.9,-1,-1,-1\n" for k in range(1, 40)]
     (tmp_path / "det.txt").write_text("".join(table))
-    code, out, _ = vidtrack("track", "det.txt", "--fps", 25, "-o", "out")
+    code, out, err = vidtrack("track", "det.txt", "--fps", 25, "-o", "out", "--line", "far:0,5000,90,5000")
+    assert "line far lies outside the" in err  # a warning: the size of the pictures is not known
     assert (code, out) == (0, "out\n")
     assert len({row.split(",")[2] for row in rows_of(tmp_path / "out")}) == 1
 
@@ -191,6 +192,7 @@ def test_a_video_of_one_frame_has_no_tracks(vidtrack, tmp_path):
         (("--config", "wrong.toml"), ["tracker.gate_probability"]),
         (("--config", "missing.toml"), ["missing.toml"]),
         (("--line", "gate:1,2,3"), ["gate:1,2,3", "NAME:x1,y1,x2,y2"]),
+        (("--line", "gate:0,2000,90,2000"), ["line gate lies outside the", "nothing can cross it; draw it across"]),
         (("--mask", "missing.png"), ["missing.png", "No such file"]),
         (("--mask", "black.png"), ["black.png", "black all over"]),
         (("--scale", "2"), ["source.scale", "2"]),

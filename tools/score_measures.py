@@ -1,11 +1,13 @@
 """Score `vidtrack measure` against the exact events of simulated roads.
 
-    python tools/score_measures.py CLIP... [--uncalibrated]
+    python tools/score_measures.py CLIP... [--uncalibrated | --reach 45]
 
 Each CLIP is a folder of `vidtrack simulate road|junction-3d|roundabout|motorway`; with tracks in CLIP/run (`vidtrack
 track CLIP/video.avi --site CLIP/site.toml -o CLIP/run`) these are scored as well. First the exact states are measured
 as if they were tracks: what is missed then is missed by the geometry. With --uncalibrated only the tracks are scored,
-without the site's calibration: positions are in pixels, and speeds are means over the site's sections.
+without the site's calibration: positions are in pixels, and speeds are means over the site's sections. With --reach
+each site, of a junction or roundabout, has calibration points up to so many metres along its legs besides, and the
+video is tracked again with it.
 
 A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
 same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
@@ -21,6 +23,9 @@ from __future__ import annotations
 
 import argparse
 import csv
+import re
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -30,12 +35,16 @@ import pyarrow.parquet as pq
 from exact_run import write_exact_run
 from scipy.optimize import linear_sum_assignment
 
+from vidtrack.simulate.roads.layout import ARMS
+from vidtrack.simulate.roads.scenarios import ROADS
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.measure import measured
-from vidtrack.traffic.site import read_site
+from vidtrack.traffic.site import Calibration, Site, read_site
 
 TOLERANCE_S, TOLERANCE_M = 1.0, 15.0
 FPS = 25.0
 SIZE = (1280, 720)
+BESIDE_M, ALONG_M = 4.6, (19.0, 21.0, 23.0, 25.0, 35.0, 45.0)  # of points beside the legs: the edges of the road
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -124,11 +133,41 @@ def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
     return False
 
 
-def score(clip: Path, run: Path, calibrated: bool = True) -> dict[str, Any]:
+def reaching(clip: Path, reach_m: float) -> str:
+    """The text of the clip's site with more points, along its legs, where its camera has them in the picture.
+
+    Its gates tell the camera: they are in the picture without errors, and the scenario has them on the ground.
+    """
+    site, text = read_site(clip / "site.toml"), (clip / "site.toml").read_text(encoding="utf-8")
+    assert site.calibration is not None
+    gates = ROADS[site.camera.name]().gates
+    known = {  # two gates may share a corner
+        corner: at
+        for name, gate in site.gates.items()
+        for corner, at in zip((gate.line[0], gate.line[-1]), gates[name].line.tolist(), strict=True)
+    }
+    lens = site.calibration.model_dump(include={"distortion", "focal_px", "center"})
+    exact = Calibration(picture=tuple(known), ground=tuple(known.values()), sigma_picture_px=0.01, **lens)
+    eye = calibrated(site.model_copy(update={"calibration": exact}))
+    along = [metres for metres in ALONG_M if metres <= reach_m]
+    more = np.array([arm(metres, side) for metres in along for arm in ARMS.values() for side in (-BESIDE_M, BESIDE_M)])
+    px = eye.pixels(more)
+    shown = (px >= 0).all(axis=1) & (px <= np.array(SIZE) - 1).all(axis=1)
+    for name, points in (("picture", px[shown].round(2)), ("ground", more[shown].round(3))):
+        text = re.sub(rf"(?m)^({name} = \[.*)\]$", rf"\1, {str(points.tolist())[1:-1]}]", text, count=1)
+    return text
+
+
+def tracked_again(clip: Path, site: Path, folder: Path) -> Path:
+    """The run of the clip's video with another site, in a new folder."""
+    again = [sys.executable, "-m", "vidtrack", "track", clip / "video.avi", "--site", site, "-o", folder, "-q"]
+    subprocess.run([*map(str, again)], check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
+def score(clip: Path, run: Path, site: Site) -> dict[str, Any]:
     """Crossings and movements: how many there were, were found, and were right; errors of speed [km/h]."""
-    events, site = rows_of(clip / "road_events.csv"), read_site(clip / "site.toml")
-    if not calibrated:
-        site = site.model_copy(update={"calibration": None, "classes": {}})
+    events = rows_of(clip / "road_events.csv")
     found = measured([str(run)], site).tables
     crossings, trips = found["crossings"].to_pylist(), found["trips"].to_pylist()
     true = [event for event in events if event["event"] == "crossing"]
@@ -158,7 +197,7 @@ def score(clip: Path, run: Path, calibrated: bool = True) -> dict[str, Any]:
         "untracked": sum(not tracked(clip, run, true[i]) for i in set(range(len(true))) - {i for i, _ in pairs}),
         "off": np.array(off),
         "sigma": np.array(sigma),
-        **conflicts(clip, events, found["conflicts"].to_pylist() if calibrated else []),
+        **conflicts(clip, events, found["conflicts"].to_pylist() if "conflicts" in found else []),
         **queues(events, found["queues"].to_pylist()),
     }
 
@@ -198,7 +237,9 @@ def told_queues(name: str, results: list[dict[str, Any]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", nargs="+", type=Path)
-    parser.add_argument("--uncalibrated", action="store_true", help="score the tracks without the calibration")
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--uncalibrated", action="store_true", help="score the tracks without the calibration")
+    other.add_argument("--reach", type=float, metavar="M", help="add calibration points up to M metres along the legs")
     options = parser.parse_args()
     clips, uncalibrated = options.clips, options.uncalibrated
     of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"
@@ -210,14 +251,21 @@ def main() -> None:
     lines = []
     with tempfile.TemporaryDirectory() as folder:
         for number, clip in enumerate(clips):
-            if not uncalibrated:
+            site, run = read_site(clip / "site.toml"), clip / "run"
+            if uncalibrated:
+                site = site.model_copy(update={"calibration": None, "classes": {}})
+            else:
                 perfect = Path(folder, str(number))
                 exact_run(clip, perfect)
-                exact.append(score(clip, perfect))
+                exact.append(score(clip, perfect, site))
                 print(told(f"{clip.name}, exact", exact[-1:]))
                 lines.append(told_queues(f"{clip.name}, exact", exact[-1:]))
-            if (clip / "run").is_dir():
-                real.append(score(clip, clip / "run", not uncalibrated))
+            if options.reach is not None:
+                path = Path(folder, f"{number}.toml")
+                path.write_text(reaching(clip, options.reach), encoding="utf-8")
+                site, run = read_site(path), tracked_again(clip, path, Path(folder, f"{number}-run"))
+            if run.is_dir():
+                real.append(score(clip, run, site))
                 print(told(clip.name, real[-1:]))
                 lines.append(told_queues(clip.name, real[-1:]))
     if exact:

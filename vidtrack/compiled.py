@@ -61,6 +61,12 @@ def first_run() -> bool:
     return CACHE and not any(any(folder.glob(ours)) for folder in kept)
 
 
+def kept(kernel: Any) -> bool:
+    """Whether compiled code of a kernel is kept."""
+    cache = kernel._cache
+    return Path(cache.cache_path, f"{cache._impl.filename_base}.nbi").exists()
+
+
 def forget_stale(package: Path) -> None:
     """Delete all kernels cached below a folder if any source file is newer than one of its kernels.
 

@@ -156,7 +156,14 @@ def test_two_lines_of_one_name_are_refused():
 def test_a_line_outside_the_picture_is_warned_of(caplog):
     with caplog.at_level(logging.WARNING):
         parse_lines(["in:0,5,9,5", "out:0,50,9,50"], 320, 40)
-    assert [record.args[0] for record in caplog.records] == ["out"]
+    assert [record.getMessage().split()[1] for record in caplog.records] == ["out"]
+
+
+@pytest.mark.parametrize("line", ["out:0,50,9,50", "out:0,-9,9,0", "out:320,0,400,39", "out:-9,0,0,39"])
+def test_where_the_size_is_known_a_line_wholly_outside_the_picture_is_refused(line):
+    parse_lines(["half:0,20,1979,20", "beyond:-9,-9,400,90"], 320, 40, refuse=True)
+    with pytest.raises(ConfigError, match="line out lies outside the 320 x 40 picture: nothing can cross it"):
+        parse_lines([line], 320, 40, refuse=True)
 
 
 @pytest.mark.parametrize("name", ["=cmd|' /C calc'!A0", "+1", "-a", "@SUM(A1)", "\tx"])

@@ -126,6 +126,59 @@ def test_a_mistake_is_refused_in_one_line(read, good, bad, words):
     assert "site.toml" in str(refused.value)
 
 
+DEGREES = [[9.0, 52.0005], [9.0003, 52.0005], [9.0002, 52.0], [9.0, 52.0]]
+EQUATOR = [[179.9, -0.0005], [179.9003, -0.0005], [179.9002, 0.0], [179.9, 0.0]]
+METRES = {  # the same in metres of each system
+    3857: [[1001875, 6800125], [1001908, 6800125], [1001897, 6800043], [1001875, 6800043]],
+    25832: [[500000, 5761094], [500020, 5761094], [500014, 5761038], [500000, 5761038]],
+}
+
+
+def placed(ground, epsg, *, geographic):
+    return WHOLE.replace("[[0, 50], [20, 50], [12, 0], [0, 0]]", str(ground)).replace(
+        "camera_height_m = 8.0", f"epsg = {epsg}\ngeographic = {str(geographic).lower()}"
+    )
+
+
+@pytest.mark.parametrize(
+    ("epsg", "ground", "scale"),
+    [
+        (3857, DEGREES, "1.624"),
+        (3857, METRES[3857], "1.624"),
+        (3395, DEGREES, "1.621"),
+        (6933, DEGREES, "1.405"),
+        (3034, DEGREES, "0.966"),
+        (32631, [[lon + 20, lat] for lon, lat in DEGREES], "1.038"),
+    ],
+)
+def test_a_system_that_is_not_true_to_lengths_there_is_refused_and_one_named(read, epsg, ground, scale):
+    with pytest.raises(ConfigError) as refused:
+        read(placed(ground, epsg, geographic=ground is not METRES.get(epsg)))
+    assert f"epsg = {epsg}" in str(refused.value)
+    assert f"its lengths are {scale} times those on the ground" in str(refused.value)
+    assert f"for example {32635 if epsg == 32631 else 32632}, the UTM zone of the place" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_points_beyond_what_a_system_maps_are_refused(read):
+    with pytest.raises(ConfigError, match="outside the region of epsg = 2154"):
+        read(placed([[2 + 0.01 * k, -90 + 0.01 * k * k] for k in range(4)], 2154, geographic=True))
+
+
+@pytest.mark.parametrize(
+    ("epsg", "ground"),
+    [
+        (25832, DEGREES),
+        (25832, METRES[25832]),
+        (25832, [[lon + 6, lat] for lon, lat in DEGREES]),  # a country may use one zone for all
+        (3035, DEGREES),  # of equal area, but true near its middle
+        (32760, EQUATOR),
+    ],
+)
+def test_a_system_that_is_nearly_true_to_lengths_is_taken(read, epsg, ground):
+    assert read(placed(ground, epsg, geographic=ground is not METRES.get(epsg))).calibration.epsg == epsg
+
+
 def test_three_points_are_refused(read):
     three = WHOLE.replace(", [50, 690]]", "]").replace(", [0, 0]]\ns", "]\ns")
     with pytest.raises(ConfigError, match="3 pairs of points; a plane needs at least 4"):

@@ -84,9 +84,12 @@ class FileSource(Protocol):
     stats: SourceStats
 
 
-def line_counter(settings: Settings, width: int, height: int) -> LineCounter | None:
-    """A counter for the lines in the settings, in a picture of this size [px]; None without lines."""
-    lines = parse_lines(settings.output.lines, width, height)
+def line_counter(settings: Settings, width: int, height: int, *, refuse: bool = False) -> LineCounter | None:
+    """A counter for the lines in the settings, in a picture of this size [px]; None without lines.
+
+    refuse  lines outside the picture, whose size is known, as `parse_lines` does
+    """
+    lines = parse_lines(settings.output.lines, width, height, refuse=refuse)
     return LineCounter(lines) if lines else None
 
 
@@ -100,6 +103,7 @@ def file_subject(
     """The subject of a file, `path` as the user wrote it. Raises ConfigError for a bad line or site.
 
     rates  returns the tracker's estimates
+    scene  returns the (H, W, 3) background; None: there are no pictures, and their size is estimated
     """
     stats = source.stats
 
@@ -117,7 +121,7 @@ def file_subject(
             **rates(),
         }
 
-    counter = line_counter(settings, source.width, source.height)
+    counter = line_counter(settings, source.width, source.height, refuse=scene is not None)
     subject = Subject(path, settings, (source.height, source.width), source.fps, scene, reading, counter, None)
     site = settings.output.site
     return subject if site is None else subject.at(used_site(site, source.width, source.height))

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     import pyproj
+
+_TRUE = 0.005
+"""Largest share by which lengths may differ from those on the ground: a country that uses one UTM zone stays below."""
 
 
 @cache
@@ -24,3 +30,32 @@ def metric_system(epsg: int) -> pyproj.CRS:
             "that does, for example 25832, and bring ground into it"
         )
     return system
+
+
+def refuse_untrue(epsg: int, ground: Sequence[tuple[float, float]], *, geographic: bool) -> None:
+    """Raise ValueError where lengths in a metric system are not those on the ground, as in web Mercator.
+
+    ground  (x, y) in the system [m], or, if geographic, (longitude, latitude) [degrees]
+    """
+    import pyproj
+
+    system = metric_system(epsg)
+    projection = pyproj.Proj(system)
+    x, y = np.array(ground, float).T
+    lon, lat = (x, y) if geographic else projection(x, y, inverse=True)
+    factors = projection.get_factors(lon, lat)
+    scales = np.stack([factors.meridional_scale, factors.parallel_scale])
+    if not np.isfinite(scales).all():
+        raise ValueError(f"ground lies outside the region of epsg = {epsg}")
+    off = np.abs(scales - 1)
+    if off.max() <= _TRUE:
+        return
+    direction, point = np.unravel_index(off.argmax(), off.shape)
+    east, north = lon[point], lat[point]
+    zone = (326 if north >= 0 else 327) * 100 + int((east + 180) // 6) % 60 + 1
+    metres = "" if geographic else ", and bring ground into it; metres from a point of your own have no epsg"
+    raise ValueError(
+        f"epsg = {epsg}, {system.name}: at longitude {east:.2f} and latitude {north:.2f} its lengths are "
+        f"{scales[direction, point]:.3f} times those on the ground; take a system that is true to lengths there, for "
+        f"example {zone}, the UTM zone of the place{metres}"
+    )

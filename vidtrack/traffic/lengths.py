@@ -15,17 +15,22 @@ _LEAST_SIGMA_M = 0.01
 
 
 def length_sums(track: Ints, length: Floats, sigma: Floats, tracks: int) -> Floats:
-    """(T, 2) sums of length / sigma^2 and of 1 / sigma^2 over the rows (N,) of each track that have both."""
+    """(T, 3) sums of length / sigma^2, of 1 / sigma^2 and of 1 over the rows (N,) of each track that have both."""
     weight = 1 / np.maximum(sigma, _LEAST_SIGMA_M) ** 2
     known = np.isfinite(weight * length)
-    terms = (weight * length, weight)
+    terms = (weight * length, weight, np.ones(len(track)))
     return np.column_stack([np.bincount(track[known], term[known], tracks) for term in terms])
 
 
-def mean_length(sums: Floats) -> Floats:
-    """(T,) m; the mean weighted by the variances, from `length_sums` (T, 2); NaN where it is not known."""
-    total, weight = sums.T
-    return np.asarray(np.divide(total, weight, out=np.full(len(total), np.nan), where=weight > 0))
+def mean_length(sums: Floats) -> tuple[Floats, Floats]:
+    """(T,) m; the mean weighted by the variances, from `length_sums` (T, 3), and its standard deviation.
+
+    That is the one of a row, since errors last. NaN where nothing is known.
+    """
+    total, weight, rows = sums.T
+    known = weight > 0
+    length, variance = (np.divide(a, weight, out=np.full(len(a), np.nan), where=known) for a in (total, rows))
+    return length, np.sqrt(variance)
 
 
 def class_of(length: Floats, classes: dict[str, tuple[float, float]]) -> list[str | None]:

@@ -16,7 +16,7 @@ from pydantic import model_validator as whole
 
 from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.epsg import metric_system
+from vidtrack.traffic.epsg import metric_system, refuse_untrue
 from vidtrack.traffic.lengths import apart, bounds
 from vidtrack.traffic.polyline import crosses_itself
 
@@ -146,6 +146,8 @@ class Calibration(Group):
             raise ValueError("geographic needs epsg, the metric system to measure in, for example 25832")
         if self.geographic and not all(abs(lon) <= 180 and abs(lat) <= 90 for lon, lat in self.ground):
             raise ValueError("with geographic, ground is longitude (-180 to 180) and latitude (-90 to 90) in degrees")
+        if self.epsg is not None:
+            refuse_untrue(self.epsg, self.ground, geographic=self.geographic)
 
     def points(self) -> Iterator[tuple[str, Point]]:
         """Every picture point with the key that it stands under."""
@@ -292,8 +294,8 @@ def read_site(path: str | Path) -> Site:
     """The site in a TOML file.
 
     Raises ConfigError for an unreadable file, an unknown key (naming the nearest), or a value that cannot be meant:
-    points outside the picture, a coordinate system that is not metric, lines and polygons that cross themselves,
-    unknown gates and legs, names that a spreadsheet or a browser could take for more than a name.
+    points outside the picture, a coordinate system that is not metric or not true to lengths there, lines and polygons
+    that cross themselves, unknown gates and legs, names that a spreadsheet or browser could take for more than a name.
     """
     path = Path(path)
     return parse_site(read_toml_text(path, "site"), path)

@@ -278,9 +278,11 @@ def test_level_x_needs_a_frame_rate(tmp_path):
 
 
 def test_a_length_in_no_class_is_unknown(tmp_path):
-    ways = way(1, range(3), length=2.0), way(2, range(3), length=5.4), way(3, range(3), length=20.0)
+    ways = way(1, range(3), length=2.0), way(2, range(3), length=6.5), way(3, range(3), length=20.0)
     assert open_road_run(write_run(tmp_path / "a", *ways)).vehicles.kind.tolist() == ["unknown", "truck", "unknown"]
     without = SITE[: SITE.index("[classes]")]
+    edge = way(1, range(3), length=5.5)  # 0.1 m from the bounds, known to 0.3 m
+    assert open_road_run(write_run(tmp_path / "c", edge)).vehicles.kind.tolist() == ["unknown"]
     assert open_road_run(write_run(tmp_path / "b", *ways, site=without)).vehicles.kind.tolist() == ["unknown"] * 3
 
 

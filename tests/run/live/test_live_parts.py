@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import time
+from collections import Counter
 from types import SimpleNamespace
 
 import pyarrow as pa
@@ -22,10 +23,13 @@ from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.summary import Summary
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Limits, Retention, parts_of
-from vidtrack.run.live.counting import counting_of
+from vidtrack.run.live.counting import counter_of, counting_of
 from vidtrack.run.live.part import Part
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.sinks import Subject, line_counter
+from vidtrack.traffic.measures.measure import measured
+from vidtrack.traffic.metres import used_site
+from vidtrack.traffic.site import read_site
 
 BEGAN_S = 1_800_000_000.0  # a full hour
 FPS = 25.0
@@ -288,3 +292,52 @@ def test_finished_parts_leave_nothing_in_memory(tmp_path, clock):
         gc.enable()
     assert len(parts_of(tmp_path)) == 3
     assert left == []
+
+
+SITE = """[site]
+name = "yard"
+width = 320
+height = 240
+[gates.beside]
+line = [[100, 101], [100, 200]]
+[gates.below]
+line = [[60, 102], [140, 102]]
+"""
+FROM_ABOVE = """[calibration]
+picture = [[0, 0], [319, 0], [319, 239], [0, 239]]
+ground = [[0, 0], [31.9, 0], [31.9, -23.9], [0, -23.9]]
+"""
+
+
+@pytest.mark.parametrize(("calibration", "passed"), [("", {"beside": 5, "below": 5}), (FROM_ABOVE, {"below": 5})])
+def test_live_gates_and_measure_count_where_vehicles_stand(tmp_path, clock, calibration, passed):
+    """The boxes are 20 x 10 px, and their middles pass above the upper end of the gate `beside`."""
+    path = tmp_path / "site.toml"
+    path.write_text(SITE + calibration)
+    settings = load(assignments=["live.zone=UTC", ("output.lines", ["line:100,90,100,100.5"]), f"output.site={path}"])
+    site = used_site(path, 320, 240)
+    counter = counter_of(settings, 320, 240, site)
+    reading = {"fps": FPS, "width": 320, "height": 240}.copy
+    subject = Subject("cam", settings, (240, 320), FPS, None, reading, counter, None).at(site)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    counting = counting_of(subject, folder / "intervals", clock.began_s)
+    reserve = Reserve(settings.live.reserve_bytes)
+    parts = Parts(folder, subject, False, None, Retention(Limits(None, None)), counting, reserve)
+    for frame in range(round(14 * FPS)):
+        time_s = frame / FPS
+        numbers = [number for number in range(5) if 2 * number <= time_s < 2 * number + 4]
+        places = [(50 + 25 * (time_s - 2 * number), 100) for number in numbers]
+        rows = [(number + 1, "c", x, y + 0.08 * (x - 100)) for number, (x, y) in zip(numbers, places, strict=True)]
+        clock.now = time_s
+        parts.write([make_step(frame, rows)])
+    parts.finish()
+    live = [row for row in rows_of(folder / "counts.csv") if row["line"] != "line"]
+    assert Counter(row["line"] for row in live) == passed
+    assert counter.totals()["line"]["right"] == 5
+    crossings = measured([str(folder)], read_site(path)).tables["crossings"].to_pylist()
+    assert [(row["gate"], row["direction"], row["track_id"]) for row in crossings] == [
+        (row["line"], row["direction"], int(row["track_id"])) for row in live
+    ]
+    for ours, row in zip(crossings, live, strict=True):
+        assert float(row["time_s"]) == pytest.approx(ours["time_s"], abs=0.02)

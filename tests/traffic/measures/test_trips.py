@@ -113,7 +113,7 @@ def end(t, x, v):
 
 def lives(tail, head):
     n = len(tail.t)
-    return Lives(head, tail, np.full(n, 4.0), np.arange(n), np.full(n, np.inf))
+    return Lives(head, tail, np.full(n, 4.0), np.full(n, 0.3), np.arange(n), np.full(n, np.inf))
 
 
 def anywhere(a, b):

@@ -72,6 +72,19 @@ def test_runs_of_earlier_versions_have_the_speeds_of_their_rows(tmp_path):
     assert found.tables["crossings"]["class"].to_pylist() == [None] * 3
 
 
+@pytest.mark.parametrize(
+    ("bounds", "name", "low", "high"),
+    [((3.0, 6.0), "short", 0.99, 1.0), ((3.9, 6.0), "unknown", 0.6, 0.75), ((5.0, 6.0), "unknown", np.nan, np.nan)],
+)
+def test_without_a_fit_the_lengths_of_rows_tell_a_site_s_class_and_how_likely_it_is(tmp_path, bounds, name, low, high):
+    """Lengths of 4 m, known to 0.2 m, however many rows have them."""
+    write_run(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)], metres=True)
+    crossings = measured([str(tmp_path / "run")], site(CALIBRATED, classes={"short": bounds})).tables["crossings"]
+    assert set(crossings["class"].to_pylist()) == {name}
+    for probability in crossings["class_probability"].to_pylist():
+        assert probability is None if np.isnan(low) else low < probability <= high
+
+
 @pytest.mark.parametrize(("length_m", "said"), [(20.0, False), (21.0, False), (10.0, True), (90.0, True)])
 def test_a_section_that_is_not_as_long_as_the_calibration_says_is_told(tmp_path, length_m, said):
     runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])

@@ -224,8 +224,8 @@ class _FirstLook:
         track, index = np.unique(parts[:, 0].astype(np.int64), return_inverse=True)
         until = np.full(len(track), -1)
         np.maximum.at(until, index, parts[:, 1].astype(np.int64))
-        length = mean_length(np.column_stack([np.bincount(index, parts[:, k]) for k in (2, 3)]))
-        named = whole.named(track, length)
+        lengths = mean_length(np.column_stack([np.bincount(index, parts[:, k]) for k in (2, 3, 4)]))
+        named = whole.named(track, *lengths)
         return Vehicles(track, until, named.length, np.array([name or UNKNOWN for name in named.kind]))
 
 

@@ -32,9 +32,9 @@ class WholeTracks:
         xy = np.column_stack([column["x_m"], column["y_m"]])
         self._vehicles.add(table["track_id"].to_numpy(), column["time_s"], xy, edges(column, self._size))
 
-    def named(self, track: Ints, length: Floats) -> Named:
-        """Of tracks (T,), with the mean lengths of their rows (T,) m."""
+    def named(self, track: Ints, length: Floats, sigma: Floats) -> Named:
+        """Of tracks (T,), with the mean lengths of their rows and their standard deviations (T,) m."""
         tracks = int(track.max(initial=-1)) + 1
         nothing = np.empty(0, np.int64)
         found = self._vehicles.fitted(np.arange(tracks), nothing, np.empty(0))
-        return whole_tracks(None if found is None else found.classes.of(track), length, self._classes)
+        return whole_tracks(None if found is None else found.classes.of(track), length, sigma, self._classes)

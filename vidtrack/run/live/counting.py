@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -17,7 +18,11 @@ from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lengths import length_sums, mean_length
 from vidtrack.traffic.lines import Crossing, Line, LineCounter, parse_line, parse_lines
+from vidtrack.traffic.measures.rows import rows_of
 from vidtrack.traffic.metres import UsedSite
+
+if TYPE_CHECKING:
+    from vidtrack.traffic.footprint import Footprints
 
 COUNTS = "intervals"
 """Folder of the counts by interval"""
@@ -58,7 +63,7 @@ class RoadReadings:
     def of(self, track_id: int) -> tuple[float, float, float, float]:
         """Length, speed and its standard deviations; NaN where nothing is known."""
         sums = self._sums.get(track_id)
-        length = np.nan if sums is None else float(mean_length(sums[None])[0])
+        length = np.nan if sums is None else float(mean_length(sums[None])[0][0])
         return length, *self._speeds.get(track_id, _NOTHING)
 
     def forget(self, before_s: float) -> None:
@@ -77,6 +82,7 @@ class Counting:
     keep_s   older days are deleted; None: they stay
     tell     called with each batch of crossings; None: nobody else wants them
     own      lines that are counted at every site
+    road     of the site, on which vehicles pass its gates; None: not known, and their boxes tell where they stand
 
     A time is watched if frames were tracked in it, tracks are carried through it and found again after a gap, and their
     crossings are decided.
@@ -92,8 +98,10 @@ class Counting:
         keep_s: float | None = None,
         tell: Callable[[Sequence[Passage]], None] | None = None,
         own: Sequence[Line] = (),
+        road: Footprints | None = None,
     ) -> None:
         self._tell = tell
+        self._road = road
         self._counter = counter
         self._own = own
         self._book = book
@@ -118,7 +126,11 @@ class Counting:
         self._set_clock()
         if rows is not None and len(rows):
             self._readings.add(rows)
-        crossings = [crossing for step in steps for crossing in self._counter.step(step.index, step.tracks)]
+        crossings = [
+            crossing
+            for step, stand in zip(steps, self._stands(steps, rows), strict=True)
+            for crossing in self._counter.step(step.index, step.tracks, stand)
+        ]
         self._note(crossings)
         for step in steps:
             self._watch(step.time_s)
@@ -133,6 +145,7 @@ class Counting:
         Gates that are the same go on; those that are new count from the last frame on.
         """
         self._counter.use(lines_at(self._own, site))
+        self._road = site.road
         since_s = self._offset_s + self._last_s if self._last_s is not None else time.time()
         self._book.use(ways_of(self._counter), site.classes, since_s)
         self._readings = RoadReadings()
@@ -151,6 +164,14 @@ class Counting:
     def close(self) -> None:
         """Finish the files of the intervals. Raises StoppedEarly."""
         self._book.close()
+
+    def _stands(self, steps: Sequence[Step], rows: pa.Table | None) -> Sequence[Floats | None]:
+        """(T, 2) px of the scene where the tracks of each step stand on the road, as `vidtrack measure` has them."""
+        if rows is None or self._road is None:
+            return [None] * len(steps)
+        ground = self._road.ground
+        xy = ground.pixels(rows_of(rows, ground).xy)
+        return np.split(xy, np.cumsum([len(step.tracks) for step in steps])[:-1])
 
     def _note(self, crossings: Sequence[Crossing]) -> None:
         passages = [
@@ -218,7 +239,7 @@ def counting_of(
     coast_s, hidden_s = settings.tracker.coast_s, settings.tracker.hidden_s
     late_s = max(coast_s, hidden_s) + _MARGIN_S
     own = list(map(parse_line, settings.output.lines))
-    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell, own)
+    return Counting(counter, book, began_s, coast_s, late_s, settings.live.keep_counts_s, tell, own, subject.road)
 
 
 def counter_of(settings: Settings, width: int, height: int, site: UsedSite | None) -> LineCounter | None:

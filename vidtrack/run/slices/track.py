@@ -17,6 +17,7 @@ from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, look_ahead, video_steps
 from vidtrack.state import gather, read_state, restore, write_state
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.traffic.lines import parse_lines
 from vidtrack.video.foreground import Background
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import open_part, open_source
@@ -51,6 +52,7 @@ def track_slice(
     with source, frame_by_frame(settings.detector.kind):
         detector = build_detector(settings)
         size = source.width, source.height
+        parse_lines(settings.output.lines, *size, refuse=True)  # else only the stitched run would refuse them
         tracker = build_blob_tracker(settings.tracker, size, smooth=bool(settings.output.smooth))
         both = _Both(detector, tracker)
         if before is None:

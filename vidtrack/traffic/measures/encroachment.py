@@ -76,7 +76,7 @@ def _met(track: Ints, rectangle: Floats, since: float, until: float) -> tuple[In
     order = np.argsort(life[:, BEGIN], kind="stable")
     row, count = 0, 0
     while row < len(order):
-        row, count = _look(row, count, order, life, first, leg, begin, rectangle, since, until, rows)
+        row, count = look(row, count, order, life, first, leg, begin, rectangle, since, until, rows)
         if row < len(order):
             rows = np.vstack([rows, np.empty_like(rows)])
     return rows[:count, 0], rows[:count, 1]
@@ -150,7 +150,7 @@ def _legs(begin: Ints, rectangle: Floats) -> Floats:
 
 
 @kernel
-def _look(
+def look(
     row: int, count: int, order: Ints, life: Floats, first: Ints, leg: Floats, begin: Ints, rectangle: Floats,
     since: float, until: float, rows: Ints,
 ) -> tuple[int, int]:  # fmt: skip

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.calibration.sections import section_doubts
+from vidtrack.traffic.measures.ahead import compile_ahead
 from vidtrack.traffic.measures.by_traffic import by_stretches, contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
@@ -43,12 +46,16 @@ class Measures:
     report: dict[str, Any]
 
 
-def measured(runs: Sequence[str], site: Site) -> Measures:
+def measured(runs: Sequence[str], site: Site, *, blocks: int | None = None) -> Measures:
     """The figures of all runs together, each FOLDER or FOLDER@TIME as `open_day` has it.
+
+    blocks  of rows, `rows.BLOCK` each, that are looked at; None: all
 
     Raises ConfigError, SourceError or FormatError for what cannot be used.
     """
     day = open_day(runs, site.camera.start)
+    if blocks is None:
+        compile_ahead(runs, site, day)
     sizes = sorted({recording.size for recording in day.recordings})
     if len(sizes) > 1 and site.calibration is None:
         raise ConfigError("the runs have pictures of several sizes; give the site a calibration, or measure each alone")
@@ -61,7 +68,7 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     staying, meeting, vehicles = Staying(outlines, metres), Meeting(), Vehicles(ground)
     with ThreadPoolExecutor(1) as beside:
         met = beside.submit(lambda: None)
-        for rows in by_stretches(reader, stretches, vehicles):
+        for rows in by_stretches(islice(reader, blocks), stretches, vehicles):
             passing.add(rows)
             staying.add(rows)
             met.result()
@@ -74,6 +81,12 @@ def measured(runs: Sequence[str], site: Site) -> Measures:
     return _Figures(
         day, site, drawn[sizes[0]], gates, ground, reader, passed, ways, lives, staying, meeting, vehicles
     ).measures()
+
+
+def beginning(told: str) -> None:
+    """Measure the first rows of runs at a site, both in JSON as `compile_ahead` tells them."""
+    runs, site = json.loads(told)
+    measured(runs, Site.model_validate(site), blocks=1)
 
 
 class _Figures:
@@ -109,7 +122,8 @@ class _Figures:
         self.against = contradicting(found)
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
-        whole = whole_tracks(None if found is None else found.classes, lives.length, site.classes)
+        classes = site.classes if self.metres else {}
+        whole = whole_tracks(None if found is None else found.classes, lives.length, lives.length_sigma, classes)
         self.length, self.kind, self.kind_probability = whole.length, whole.kind, whole.probability
         if not self.metres:
             self.passed = self.passed.with_speeds(*section_speeds(self.passed, self._sections()))

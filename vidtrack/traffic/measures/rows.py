@@ -20,6 +20,7 @@ from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
+from vidtrack.traffic.lines import foot_of
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
 
@@ -52,8 +53,8 @@ class Rows:
     t        (N,) s, of the site
     seen     (N,) the picture of that time shows the track
     merged   (N,) it shares a blob with others
-    xy       (N, 2) where it is: the middle of the footprint in metres with a calibration, else the middle of the
-             blob in pixels
+    xy       (N, 2) where it stands: the middle of the footprint in metres with a calibration, else in pixels as far as
+             its box tells
     sigma    (N,) standard deviation of its own position error, in the unit of xy
     margin   (N,) how far it must pass a gate by, in the unit of xy
     v        (N, 2) its velocity, in the unit of xy per second
@@ -98,9 +99,8 @@ def off_road(count: int) -> tuple[Floats, ...]:
 
 _MARGIN = 0.15
 """Share of a vehicle's length, or of its extent in the picture, by which it must pass a gate."""
-_FOOT, _FOOT_SIGMA = 0.2, 0.1
-"""Without a calibration, where the middle of a footprint is above the lower edge of a box, in heights of it, and the
-standard deviation of that: seen from 15 to 40 degrees above the road it is .13 to .35 for a car"""
+_FOOT_SIGMA = 0.1
+"""In heights of a box: standard deviation of where `foot_of` has the middle of its footprint above its lower edge"""
 _USUAL_M = 4.5
 """m; of a vehicle whose length is not known, for this margin"""
 _ROUGH_M = 1.0
@@ -147,7 +147,7 @@ class Reader:
         t = column["time_s"] + recording.offset_s
         if ground is None:
             high = column["height_px"]
-            xy = np.column_stack([column["left_px"] + column["width_px"] / 2, column["top_px"] + (1 - _FOOT) * high])
+            xy = foot_of(np.column_stack([column[name] for name in _BOX]))
             sigma = np.sqrt((column["sigma_x_px"] ** 2 + column["sigma_y_px"] ** 2 + (_FOOT_SIGMA * high) ** 2) / 2)
             margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])

@@ -69,7 +69,7 @@ class Lives:
     """What is left of T stretches when their rows have gone by.
 
     head, tail   where they began and ended, seen alone
-    length       (T,) m; the mean weighted by the variances, NaN where it is not known
+    length, length_sigma   (T,) m; the mean weighted by the variances, NaN where it is not known
     track        (T,) number of the track
     until        (T,) s; what the track did afterwards is of nobody; inf: it was not broken
     """
@@ -77,6 +77,7 @@ class Lives:
     head: End
     tail: End
     length: Floats
+    length_sigma: Floats
     track: Ints
     until: Floats
 
@@ -91,7 +92,7 @@ class Stretches:
         self._current = np.empty(0, np.int64)
         self._head, self._tail = np.full((2, 0, 9), np.nan)
         self._track, self._until = np.empty(0, np.int64), np.empty(0)
-        self._sums = np.zeros((0, 2))
+        self._sums = np.zeros((0, 3))
         self._count = 0
 
     def add(self, rows: Rows) -> Rows:
@@ -114,7 +115,7 @@ class Stretches:
         """Of all stretches so far."""
         n = self._count
         ends = _end(self._head[:n]), _end(self._tail[:n])
-        return Lives(*ends, mean_length(self._sums[:n]), self._track[:n], self._until[:n])
+        return Lives(*ends, *mean_length(self._sums[:n]), self._track[:n], self._until[:n])
 
     def _make_room(self, tracks: int, rows: int) -> None:
         """For tracks (K), and for as many stretches as these rows can begin."""
@@ -130,7 +131,7 @@ class Stretches:
             self._head, self._tail = np.vstack([self._head, unknown]), np.vstack([self._tail, unknown])
             self._track = np.concatenate([self._track, np.full(more, -1)])
             self._until = np.concatenate([self._until, np.full(more, np.inf)])
-            self._sums = np.concatenate([self._sums, np.zeros((more, 2))])
+            self._sums = np.concatenate([self._sums, np.zeros((more, 3))])
 
 
 def _end(states: Floats) -> End:

@@ -67,13 +67,13 @@ def named(found: Classified) -> tuple[list[str | None], Floats]:
 def named_by_length(length: Floats, sigma: Floats, bounds: dict[str, tuple[float, float]]) -> tuple[list[str], Floats]:
     """(T,) the class of each vehicle by a site's bounds, UNKNOWN where none is sure; (T,) its probability.
 
-    length, sigma (T,) m; NaN where they are not known: a length alone has a class, and no probability
+    length, sigma (T,) m; NaN where they are not known
     """
     names = class_of(length, bounds)
     low, high = np.array([bounds.get(name or "", (np.nan, np.nan)) for name in names]).reshape(-1, 2).T
     inside = np.asarray(ndtr((high - length) / sigma) - ndtr((low - length) / sigma))
-    vague = (inside < SURE).tolist()
-    return [UNKNOWN if name is None or unsure else name for name, unsure in zip(names, vague, strict=True)], inside
+    sure = (inside >= SURE).tolist()
+    return [name if name and known else UNKNOWN for name, known in zip(names, sure, strict=True)], inside
 
 
 def classified(information: Floats, vector: Floats, speed: Floats) -> Classified:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.traffic.lengths import UNKNOWN, class_of
+from vidtrack.traffic.lengths import UNKNOWN
 from vidtrack.traffic.vehicles.classes import Classified, classified, named, named_by_length
 
 _LEAST_SIGMA_M = 0.01
@@ -24,17 +24,22 @@ class Named:
     probability: Floats
 
 
-def whole_tracks(found: Classified | None, length: Floats, bounds: dict[str, tuple[float, float]]) -> Named:
-    """The classes of whole tracks by what was fitted to them, else by the mean length of their rows (T,) [m].
+def whole_tracks(
+    found: Classified | None, length: Floats, sigma: Floats, bounds: dict[str, tuple[float, float]]
+) -> Named:
+    """The classes of whole tracks by what was fitted to them; a site's, where nothing was, by the mean of their rows.
 
-    bounds  low and high length of each class of the site [m]; empty: those of `classes.CLASSES`
+    length, sigma  (T,) m; mean lengths of the rows, and their standard deviations
+    bounds         low and high length of each class of the site [m]; empty: those of `classes.CLASSES`
     """
-    if found is None:
-        return Named(length, class_of(length, bounds), np.full(len(length), np.nan))
-    length = np.where(np.isnan(found.size[:, 0]), length, found.size[:, 0])
+    if found is not None:
+        fitted = np.isfinite(found.size[:, 0])
+        length, sigma = np.where(fitted, found.size[:, 0], length), np.where(fitted, found.sigma[:, 0], sigma)
     if bounds:
-        names, probability = named_by_length(length, found.sigma[:, 0], bounds)
+        names, probability = named_by_length(length, sigma, bounds)
         return Named(length, [*names], probability)
+    if found is None:
+        return Named(length, [None] * len(length), np.full(len(length), np.nan))
     return Named(length, *named(found))
 
 

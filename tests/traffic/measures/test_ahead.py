@@ -1,0 +1,47 @@
+"""Kernels are compiled in a process of their own before the tables of a long day are read."""
+
+import subprocess
+
+import pyarrow as pa
+import pytest
+from drawn_runs import CALIBRATED, site, straight, write_run
+
+from vidtrack.traffic.measures import ahead
+from vidtrack.traffic.measures.measure import beginning, measured
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """What is given to processes that are started."""
+    given = []
+    monkeypatch.setattr(subprocess, "run", lambda command, *, input, **_: given.append(input))
+    return given
+
+
+def run(folder):
+    return write_run(folder, [straight(1, 2.0, 20, 240, 120.0, 4.8)], metres=True)
+
+
+@pytest.mark.parametrize(("least", "kept", "count"), [(0, False, 1), (0, True, 0), (10**9, False, 0)])
+def test_a_long_day_is_begun_in_another_process_if_nothing_is_compiled_yet(
+    tmp_path, monkeypatch, started, least, kept, count
+):
+    run(tmp_path / "run")
+    monkeypatch.setattr(ahead, "_LARGE", least)
+    monkeypatch.setattr(ahead, "CACHE", True)
+    monkeypatch.setattr(ahead, "kept", lambda kernel: kept)
+    found = measured([str(tmp_path / "run")], site(CALIBRATED))
+    assert len(started) == count
+    assert len(found.tables["crossings"]) == 3
+    for told in started:
+        beginning(told)  # it takes what it is given, and starts no other one
+    assert len(started) == count
+
+
+def test_the_beginning_is_so_many_blocks_of_rows(tmp_path, monkeypatch):
+    run(tmp_path / "run")
+    monkeypatch.setattr("vidtrack.traffic.measures.rows.BLOCK", 30)
+    runs = [str(tmp_path / "run")]
+    assert len(measured(runs, site(CALIBRATED)).tables["crossings"]) == 3
+    assert isinstance(measured(runs, site(CALIBRATED), blocks=1).tables["crossings"], pa.Table)
+    assert len(measured(runs, site(CALIBRATED), blocks=1).tables["crossings"]) < 3
