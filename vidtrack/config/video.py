@@ -31,6 +31,8 @@ class DisturbanceSettings(Group):
     """what passes for shadow, but has edges inside that the scene does not have, is a dark vehicle"""
     veil: bool = True
     """what haze or glare adds to black is learnt at each place, from the darkest parts of vehicles there"""
+    haze: bool = True
+    """in haze light comes from all sides: shadows are faint, and what is darker is a vehicle"""
     beams: bool = True
     """by night, light of headlamps on the road is no vehicle: it is brighter than the scene and fades into it"""
     contrast: bool = True

@@ -17,7 +17,7 @@ _STEEP = 99.0  # percent
 LEAST_CONTRAST = 0.5  # of the threshold in clear light
 _SHARP, _BLURRED = 65.0, 50.0  # grey levels over two pixels of the steepest edges in clear light, and in haze
 _STEEPEST = 99.9  # percent
-_DARKEST = 0.5  # percent of the pixels
+_DARKEST, _BRIGHTEST = 0.5, 99.9  # percent of the pixels
 _STANDS_OUT = 1.25  # interquartile ranges below the median; evenly spread levels reach down by 1.0
 _DARK_PAINT = 10.0  # grey levels; tyres are not quite black
 _ROWS = 4  # every so many are looked at
@@ -53,6 +53,12 @@ def veil(luma: Image) -> float | None:
     if median - dark < _STANDS_OUT * (high - low):
         return None
     return max(float(dark) - _DARK_PAINT, 0.0)
+
+
+def brightest(luma: Levels) -> np.float32:
+    """Luminance of the brightest of the scene (h, w); haze has less."""
+    rows = luma[::_ROWS]
+    return np.float32(_upper_percentile(rows, _BRIGHTEST)) if rows.size else np.float32(255)
 
 
 def _upper_percentile(values: Levels, percent: float) -> float:

@@ -15,14 +15,14 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.video import DisturbanceSettings
 from vidtrack.video.background.beam import is_dark, mark_beams, shows_lamps
 from vidtrack.video.background.change import Change
-from vidtrack.video.background.distance import contrast, disturbance, haziness, strong, veil
+from vidtrack.video.background.distance import brightest, contrast, disturbance, haziness, strong, veil
 from vidtrack.video.background.exposure import follow_gain, follow_tint
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
-from vidtrack.video.background.scene import Levels, Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
+from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
 from vidtrack.video.background.shadow import SOFT, Sunlight, find_dark, mark_shadow, reclaim
-from vidtrack.video.background.veil import VeilByPlace
+from vidtrack.video.background.veil import Air, Haze, VeilByPlace, even
 from vidtrack.video.camera.camera import Camera
 from vidtrack.video.camera.canvas import lay, mark_unseen, settled
 from vidtrack.video.foreground import Foreground
@@ -54,12 +54,16 @@ class Disturbance:
         "_contrast",
         "_hazy",
         "_veil",
+        "_brightest",
         "_sunlight",
         "_veil_by_place",
         "_coloured",
         "_dark",
     )
-    ADDED: ClassVar = {"_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black))}
+    ADDED: ClassVar = {
+        "_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black)),
+        "_brightest": lambda found: brightest(found._scene.luma),
+    }
 
     def __init__(self, settings: DisturbanceSettings, view: View) -> None:
         self._settings = settings
@@ -70,7 +74,7 @@ class Disturbance:
         )
         self._change = Change(settings.relearn_share)
         self._guard = np.ones(2 * (2 * settings.guard_px + 1,), np.uint8)
-        self._contrast, self._hazy, self._veil = np.float32(1), np.float32(0), 0.0
+        self._contrast, self._hazy, self._veil, self._brightest = np.float32(1), np.float32(0), 0.0, np.float32(255)
         self._sunlight = Sunlight()
         self._veil_by_place = VeilByPlace()
         self._coloured, self._dark = True, False
@@ -191,7 +195,7 @@ class Disturbance:
         self._change.restart(time_s)
         self._camera.restart()
         scene = start(picture)
-        self._contrast, self._hazy = contrast(scene.luma), haziness(scene.luma)
+        self._contrast, self._hazy, self._brightest = contrast(scene.luma), haziness(scene.luma), brightest(scene.luma)
         self._veil = veil(picture.luma) or 0.0
         self._veil_by_place = VeilByPlace()
         self._coloured = is_coloured(picture)
@@ -206,23 +210,21 @@ class Disturbance:
         """Contrast, haze, colour and darkness of the scene in view; a canvas has black rims where nothing was seen."""
         moves = self._camera.moves
         in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
-        self._contrast, self._hazy = contrast(in_view.luma), haziness(in_view.luma)
+        luma = in_view.luma
+        self._contrast, self._hazy, self._brightest = contrast(luma), haziness(luma), brightest(luma)
         self._coloured = is_coloured(Picture(*in_view[:3]))
         self._dark = is_dark(in_view.luma, np.float32(self._view.black))
         haze = veil(picture.luma)
         self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
 
-    @property
-    def _black(self) -> np.float32:
-        """Luminance of black as it is seen: haze lifts it where it blurs the scene."""
-        return np.float32(self._view.black + self._hazy * max(0.0, self._veil - self._view.black))
-
-    def _black_by_place(self, picture: Picture) -> Levels:
-        """(h, w) the same at each place; a canvas that grows has no cells of its own."""
+    def _air(self, picture: Picture) -> Air:
+        """What the air does to the light at each place; a canvas that grows has no places of its own."""
+        s, clear = self._settings, self._view.black
+        lifted = clear + self._hazy * max(0.0, self._veil - clear)  # a veil that does not blur is the scene's own light
+        share = self._hazy if s.haze else np.float32(0)
+        haze = Haze(share, np.float32(clear), np.float32(lifted), self._brightest)
         shape = picture.luma.shape
-        if self._settings.veil and not self._camera.moves:
-            return self._veil_by_place.black(self._black, shape)
-        return np.full(shape, self._black)
+        return self._veil_by_place.air(haze, shape) if s.veil and not self._camera.moves else even(haze, shape)
 
     @property
     def _unsure(self) -> bool:
@@ -239,8 +241,8 @@ class Disturbance:
         disturbance(seen, scene, floor, factor, chroma, np.float32(s.weak), strength, weak, hit)
         if s.shadow:
             told = seen if self._coloured else seen.grey()
-            black_here = self._black_by_place(picture)
-            count = mark_shadow(told, scene, black_here, self._sunlight.tolerance, weak)
+            air = self._air(picture)
+            count = mark_shadow(told, scene, air, self._sunlight.tolerance, weak)
             self._sunlight.learn(count, weak.size, dt)
         black = np.float32(self._view.black)
         if s.beams and self._dark and shows_lamps(seen.luma, black):
@@ -250,7 +252,7 @@ class Disturbance:
             reclaim(hit)
         if s.shadow and s.dark:
             sunlit = self._sunlight.tolerance is not SOFT and not self._dark  # lamps cast hard shadows, too
-            find_dark(told, scene, black_here, sunlit, hit)
+            find_dark(told, scene, air.black, sunlit, hit)
         return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

@@ -12,6 +12,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import inlined, kernel
 from vidtrack.video.background.picture import Picture
 from vidtrack.video.background.scene import SHADOW, Levels, Scene
+from vidtrack.video.background.veil import Air
 from vidtrack.video.frame import Image
 from vidtrack.video.runs import CORNERS, OBJECTS, Runs, connect, find_runs
 
@@ -44,19 +45,21 @@ class Tolerance(NamedTuple):
     """Limits of the shadow test.
 
     darkest        least share of the scene's light
+    faintest       the same where haze spreads the light of the sky
     chroma_share   share of the scene's colour by which the chroma planes may miss the factor, beside _CHROMA
     texture        grey levels by which luminance differences may miss the factor: soft edges
     texture_share  the same as a share of the scene's light
     """
 
     darkest: np.float32
+    faintest: np.float32
     chroma_share: np.float32
     texture: np.float32
     texture_share: np.float32
 
 
-SOFT = Tolerance(np.float32(0.5), np.float32(0), np.float32(2), np.float32(0.22))
-_HARD = Tolerance(np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3))
+SOFT = Tolerance(np.float32(0.5), np.float32(0.9), np.float32(0), np.float32(2), np.float32(0.22))
+_HARD = Tolerance(np.float32(0.5), np.float32(0.5), np.float32(0.15), np.float32(6), np.float32(0.3))
 
 
 class Sunlight:
@@ -86,11 +89,12 @@ class Sunlight:
             return SOFT
         while least > 0 and shadow[least - 1] > _TAIL * peak:
             least -= 1
-        return _HARD._replace(darkest=min(_HARD.darkest, np.float32((least + _HARDEST) / _BINS)))
+        darkest = min(_HARD.darkest, np.float32((least + _HARDEST) / _BINS))
+        return _HARD._replace(darkest=darkest, faintest=darkest)
 
 
 @kernel
-def mark_shadow(picture: Picture, scene: Scene, black: Levels, tolerance: Tolerance, hit: Image) -> Floats:
+def mark_shadow(picture: Picture, scene: Scene, air: Air, tolerance: Tolerance, hit: Image) -> Floats:
     """Set hit (h, w) uint8 from 1 to SHADOW where luminance, colour and texture are the scene's times one factor r.
 
     r = (Y - black) / (B - black); texture is the luminance differences over +-1 px, across and down.
@@ -105,10 +109,10 @@ def mark_shadow(picture: Picture, scene: Scene, black: Levels, tolerance: Tolera
     for k in range(len(row)):
         y = row[k]
         for x in range(start[k], stop[k]):
-            light = scene.luma[y, x] - black[y, x]
+            light = scene.luma[y, x] - air.black[y, x]
             if light <= 0:
                 continue
-            r = (np.float32(picture.luma[y, x]) - black[y, x]) / light
+            r = (np.float32(picture.luma[y, x]) - air.black[y, x]) / light
             if not r < _LIGHTEST:
                 continue
             missed, structure = _texture(picture.luma, scene.luma, y, x, r)
@@ -119,7 +123,7 @@ def mark_shadow(picture: Picture, scene: Scene, black: Levels, tolerance: Tolera
             if structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA:
                 count[int(r * _BINS)] += 1
             if (
-                r >= tolerance.darkest
+                r >= tolerance.darkest + air.spread[y, x] * (tolerance.faintest - tolerance.darkest)
                 and off < _CHROMA + tolerance.chroma_share * colour
                 and missed < tolerance.texture + share * light
             ):

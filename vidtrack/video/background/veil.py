@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import cv2
 import numpy as np
@@ -19,12 +19,45 @@ _LEAST = 0.05  # share of a cell that traffic covers, from which its darkest pix
 _SEEN_S = 2.0  # s of traffic in a cell before its veil is known
 _LIFT = 1.0  # grey levels by which the darkest luminance is forgotten in a second of traffic
 _DARK = 40.0  # grey levels; the darkest part of vehicles is darker than this where nothing adds light
+_FAINT, _FAINTEST = np.float32(0.25), np.float32(0.5)  # veil, as a share of the haze's own light, that spreads light
+
+
+class Haze(NamedTuple):
+    """Haze over the whole scene.
+
+    share  how far it blurs the scene, 0 clear .. 1
+    clear  luminance of black in clear air
+    black  luminance of black as it is seen
+    light  luminance of the haze itself, at most
+    """
+
+    share: np.float32
+    clear: np.float32
+    black: np.float32
+    light: np.float32
+
+
+class Air(NamedTuple):
+    """What the air does to the light at each place.
+
+    black   (h, w) luminance of black as it is seen
+    spread  (h, w) how far haze spreads the light of the sky, 0 clear .. 1: shadows are faint then
+    """
+
+    black: Levels
+    spread: Levels
+
+
+def even(haze: Haze, shape: tuple[int, int]) -> Air:
+    """The same air at all places of a picture (h, w)."""
+    return Air(np.full(shape, haze.black), np.full(shape, _spread(haze.black, haze)))
 
 
 class VeilByPlace:
     """Learns the veil in cells of the picture, from the darkest pixels of the traffic in each.
 
     Tyres, grilles and what is under a vehicle are nearly black. Where nothing that drives is dark, light is added.
+    Glare only adds it; haze also takes away from what is behind it (Koschmieder's law).
     """
 
     STATE = ("_darkest", "_seen_s", "_since_s")
@@ -34,7 +67,7 @@ class VeilByPlace:
         self._darkest = np.full((_ROWS, _COLUMNS), 255.0)
         self._seen_s = np.zeros((_ROWS, _COLUMNS))
         self._since_s = 0.0
-        self._last: tuple[Floats, np.float32, Levels] | None = None  # darkest and least of the last black, and it
+        self._last: tuple[Floats, Haze, Air] | None = None  # what the last air was made of, and it
 
     def learn(self, luma: Image, mask: Image, dt: float) -> None:
         """Take a picture (h, w) and where it shows traffic, dt [s] after the last one."""
@@ -48,26 +81,35 @@ class VeilByPlace:
         self._seen_s += seen_s
         self._since_s = 0.0
 
-    def black(self, least: np.float32, shape: tuple[int, int]) -> Levels:
-        """(h, w) the luminance of black at each place: `least` where nothing is added or known."""
+    def air(self, haze: Haze, shape: tuple[int, int]) -> Air:
+        """The air at each place of a picture (h, w): that of `haze` where it is not known that more is added."""
         if self._last is not None:
-            darkest, base, black = self._last
-            if darkest is self._darkest and base == least and black.shape == shape:
-                return black
-        black = self._interpolated(least, shape)
-        self._last = self._darkest, least, black
-        return black
+            darkest, base, air = self._last
+            if darkest is self._darkest and base == haze and air.black.shape == shape:
+                return air
+        black = self._black(haze, shape)
+        air = Air(black, _spread(black, haze))
+        self._last = self._darkest, haze, air
+        return air
 
-    def _interpolated(self, least: np.float32, shape: tuple[int, int]) -> Levels:
+    def _black(self, haze: Haze, shape: tuple[int, int]) -> Levels:
         known = self._seen_s > _SEEN_S
-        level = np.where(known, np.maximum(self._darkest - _DARK, least), least)
-        if not (level > least).any():
-            return np.full(shape, least)
-        cells = _spread(level, known).astype(np.float32)
+        room = max(float(haze.light) - _DARK, 1.0)
+        behind = 1 - haze.share * np.clip((self._darkest - _DARK) / room, 0, 1)  # share of the light that comes through
+        level = np.where(known, np.maximum(self._darkest - _DARK * behind, haze.black), haze.black)
+        if not (level > haze.black).any():
+            return np.full(shape, haze.black)
+        cells = _filled(level, known).astype(np.float32)
         return np.asarray(cv2.resize(cells, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
-def _spread(level: Floats, known: Mask) -> Floats:
+def _spread(black: Levels | np.float32, haze: Haze) -> Levels:
+    """Air.spread (h, w) where black is seen so bright."""
+    veil = (black - haze.clear) / max(haze.light - haze.clear, np.float32(1))
+    return haze.share * np.clip((veil - _FAINT) / (_FAINTEST - _FAINT), np.float32(0), np.float32(1))
+
+
+def _filled(level: Floats, known: Mask) -> Floats:
     """Levels of the cells, unknown ones as their nearest known neighbours."""
     around = np.ones((3, 3))
     while not known.all():
