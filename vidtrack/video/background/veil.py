@@ -106,7 +106,7 @@ class VeilByPlace:
 def _spread(black: Levels | np.float32, haze: Haze) -> Levels:
     """Air.spread (h, w) where black is seen so bright."""
     veil = (black - haze.clear) / max(haze.light - haze.clear, np.float32(1))
-    return haze.share * np.clip((veil - _FAINT) / (_FAINTEST - _FAINT), np.float32(0), np.float32(1))
+    return np.asarray(haze.share * np.clip((veil - _FAINT) / (_FAINTEST - _FAINT), np.float32(0), np.float32(1)))
 
 
 def _filled(level: Floats, known: Mask) -> Floats:
