@@ -159,9 +159,11 @@ def test_a_line_outside_the_picture_is_warned_of(caplog):
     assert [record.getMessage().split()[1] for record in caplog.records] == ["out"]
 
 
-@pytest.mark.parametrize("line", ["out:0,50,9,50", "out:0,-9,9,0", "out:320,0,400,39", "out:-9,0,0,39"])
+@pytest.mark.parametrize(
+    "line", ["out:0,50,9,50", "out:0,-9,9,0", "out:-90,30,30,-90", "out:320,0,400,39", "out:-9,0,0,39"]
+)
 def test_where_the_size_is_known_a_line_wholly_outside_the_picture_is_refused(line):
-    parse_lines(["half:0,20,1979,20", "beyond:-9,-9,400,90"], 320, 40, refuse=True)
+    parse_lines(["half:0,20,1979,20", "beyond:-9,-9,400,90", "edge:0,0,0,39"], 320, 40, refuse=True)
     with pytest.raises(ConfigError, match="line out lies outside the 320 x 40 picture: nothing can cross it"):
         parse_lines([line], 320, 40, refuse=True)
 

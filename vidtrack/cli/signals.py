@@ -62,8 +62,8 @@ def stoppable(items: Iterable[Item]) -> Iterator[Item]:
 def stopping(stop: Callable[[], None], late: Callable[[], object] = interrupt_main) -> Iterator[None]:
     """The first signal calls `stop`; a second one interrupts the main thread.
 
-    late  is called by another thread if the block has not ended soon after the first signal; by default it interrupts
-          the main thread
+    late  is called by another thread if the block has not ended soon after a first Ctrl-C; by default it interrupts
+          the main thread, as SIGTERM always does: who sends it does not wait long
     """
     stopped, over = Event(), Event()
 
@@ -72,11 +72,11 @@ def stopping(stop: Callable[[], None], late: Callable[[], object] = interrupt_ma
             raise KeyboardInterrupt
         stopped.set()
         stop()
-        Thread(target=wait, name="patience", daemon=True).start()
+        Thread(target=wait, args=(number,), name="patience", daemon=True).start()
 
-    def wait() -> None:
+    def wait(number: int) -> None:
         if not over.wait(_PATIENCE_S):
-            late()
+            (late if number == signal.SIGINT else interrupt_main)()
 
     before = {number: signal.signal(number, note) for number in _WATCHED}
     try:

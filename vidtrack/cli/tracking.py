@@ -116,7 +116,7 @@ _OPTIONS = (
     ),
     click.option("--start", type=float, metavar="S", help="Begin at this time [s]."),
     click.option("--end", type=float, metavar="S", help="Stop at this time [s]."),
-    click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 1/2, 1/3, ..."),
+    click.option("--scale", type=float, metavar="F", help="Detect in a reduced picture: 0.5, 0.333, ..."),
     click.option("--mask", type=click.Path(path_type=Path), metavar="IMAGE", help="Only where this picture is white."),
     click.option(
         "--decoder", type=choice(names.Decoder), help="Hardware that decodes, if there is any.  [default: software]"
@@ -152,8 +152,8 @@ def finish(run: Run, quiet: bool, unit: str = "frame", none: str = "no tracks") 
 def finish_feed(run: Run, stop: Callable[[], None], quiet: bool) -> None:
     """Complete a run over what comes from the network; Ctrl-C and SIGTERM call `stop`, which is its normal end.
 
-    What was heard is tracked to the end, however long kernels are compiled for it: it does not come again. A second
-    signal breaks it off.
+    After Ctrl-C what was heard is tracked to the end, however long kernels are compiled for it: it does not come again.
+    A second one breaks it off.
     """
     from vidtrack.cli.progress import progress, report_outcome
     from vidtrack.cli.signals import stopping

@@ -25,7 +25,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 def read_toml_text(path: Path, what: str) -> str:
     """The text of a TOML file. Raises ConfigError if it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise ConfigError(f"cannot read {what} {path}: {error.strerror or error}") from None
     except UnicodeDecodeError as error:

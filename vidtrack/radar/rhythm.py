@@ -8,6 +8,8 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 
+USUAL = 4
+"""Medians of the steps; longer ones tell nothing of the time of a scan."""
 PAUSE_S, PAUSE_SCANS = 3600.0, 100
 """A step from one scan to the next that is longer than both, the second in usual steps, is a pause."""
 
@@ -15,8 +17,9 @@ PAUSE_S, PAUSE_SCANS = 3600.0, 100
 class Rhythm(NamedTuple):
     """The times of scans.
 
-    scan_s   s; usual time of a scan: the median, which a jump or a silence does not change, or, if times are so
-             coarse that it is 0, the mean outside of pauses; 0 for a single scan
+    scan_s   s; usual time of a scan: the mean of steps that are at most four medians long, so that a jump or a silence
+             does not change it, or, if times are so coarse that the median is 0, of all outside of pauses; 0 for a
+             single scan
     limit_s  s; a longer step is a pause; infinite for a single scan
     begin_s, end_s   (K,) s; the last scan before each pause, and the first after it
     """
@@ -34,9 +37,9 @@ def rhythm(scan: Ints, time_s: Floats) -> Rhythm:
     scans, step_s = np.diff(number), np.diff(mean_s)
     limit_s = longest_step(step_s / scans)
     paused: Mask = step_s > limit_s * scans
-    going_s = time_s[-1] - time_s[0] - step_s[paused].sum()
-    scan_s = np.median(step_s / scans) if len(scans) else 0.0
-    scan_s = scan_s or going_s / max(1, int(scans[~paused].sum()))
+    median_s = np.median(step_s / scans) if len(scans) else 0.0
+    usual = step_s <= USUAL * median_s * scans if median_s > 0 else ~paused
+    scan_s = step_s[usual].sum() / max(1, int(scans[usual].sum()))
     return Rhythm(float(scan_s), limit_s, mean_s[:-1][paused], mean_s[1:][paused])
 
 

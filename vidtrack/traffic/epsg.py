@@ -29,6 +29,12 @@ def metric_system(epsg: int) -> pyproj.CRS:
             f"the system {system.name} does not measure in metres on a plane; take a projected system of the region "
             "that does, for example 25832, and bring ground into it"
         )
+    axes = {axis.direction for axis in system.axis_info[:2]}
+    if axes != {"east", "north"}:
+        raise ValueError(
+            f"the axes of {system.name} point {' and '.join(sorted(axes))}; take a system of the region whose axes "
+            "point east and north, for example its UTM zone, and bring ground into it"
+        )
     return system
 
 

@@ -95,13 +95,25 @@ def parse_lines(texts: Sequence[str], width: int, height: int, *, refuse: bool =
         if uses > 1:
             raise ConfigError(f"{uses} lines are called {name!r}; give each its own name")
     for line in lines:
-        xs, ys = sorted((line.x1, line.x2)), sorted((line.y1, line.y2))
-        if xs[1] <= 0 or xs[0] >= width - 1 or ys[1] <= 0 or ys[0] >= height - 1:
+        if not _enters(line, width, height):
             outside = f"line {line.name} lies outside the {width} x {height} picture: nothing can cross it"
             if refuse:
                 raise ConfigError(f"{outside}; draw it across the road")
             _log.warning("%s", outside)
     return lines
+
+
+def _enters(line: Line, width: int, height: int) -> bool:
+    """Whether more than a point of a line lies in the picture, outermost pixels included (Liang and Barsky)."""
+    begin, end = 0.0, 1.0
+    for place, step, last in ((line.x1, line.x2 - line.x1, width - 1), (line.y1, line.y2 - line.y1, height - 1)):
+        if step == 0:
+            if not 0 <= place <= last:
+                return False
+            continue
+        into, out = sorted((-place / step, (last - place) / step))
+        begin, end = max(begin, into), min(end, out)
+    return begin < end
 
 
 @dataclass(frozen=True, slots=True)

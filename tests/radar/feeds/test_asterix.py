@@ -232,6 +232,35 @@ def test_a_recording_goes_on_after_bytes_that_are_no_block(tmp_path):
     assert len(seconds(path)) == 8
 
 
+@pytest.mark.parametrize("damage", ["cut", "cut far", "inserted", "changed"])
+def test_octets_that_are_missing_or_wrong_cost_no_more_than_their_neighbours(scene, damage):
+    """Lengths of blocks are then read from other octets, and may reach far into the recording."""
+    sound = (scene[0] / "radar.ast").read_bytes()
+    rng = np.random.default_rng(4)
+    whole = sum(1 for _ in Decoder(Losses()).messages(sound))
+    lost = []
+    for at in rng.integers(500, len(sound) - 500, 60):
+        losses = Losses()
+        damaged = {
+            "cut": sound[:at] + sound[at + 1 :],
+            "cut far": sound[:at] + sound[at + 50 :],
+            "inserted": sound[:at] + rng.bytes(20) + sound[at:],
+            "changed": sound[:at] + rng.bytes(1) + sound[at + 1 :],
+        }[damage]
+        lost.append(whole - sum(1 for _ in Decoder(losses).messages(damaged)))
+        assert losses.damaged or lost[-1] <= 5
+    assert max(lost) <= 10
+
+
+@pytest.mark.parametrize("category", [63, 247])
+def test_blocks_that_are_not_read_are_no_damage_however_many_stand_between(category):
+    other = bytes([category, 0, 9, 1, 2, 3, 4, 5, 6])
+    losses = Losses()
+    recording = b"".join(block(plot(k, 9000, 3 * k)) + k % 7 * other for k in range(60))
+    assert sum(1 for _ in Decoder(losses).messages(recording + 20_000 * other)) == 60
+    assert not losses.damaged
+
+
 @pytest.mark.parametrize(
     "trash", [b"HTTP/1.1 200 OK\r\n\r\n", b"\x30\xff\xff" * 9, bytes(1000), b"\x30\0\5ab" * 3 + b"\7"]
 )

@@ -45,3 +45,28 @@ def test_the_beginning_is_so_many_blocks_of_rows(tmp_path, monkeypatch):
     assert len(measured(runs, site(CALIBRATED)).tables["crossings"]) == 3
     assert isinstance(measured(runs, site(CALIBRATED), blocks=1).tables["crossings"], pa.Table)
     assert len(measured(runs, site(CALIBRATED), blocks=1).tables["crossings"]) < 3
+
+
+def test_the_other_process_runs_nothing_from_the_folder_it_is_started_in(tmp_path, monkeypatch, capfd):
+    run(tmp_path / "run")
+    (tmp_path / "json.py").write_text("raise SystemExit('not ours')")
+    ended = []
+    start = subprocess.run
+    monkeypatch.setattr(subprocess, "run", lambda *given, **named: ended.append(start(*given, **named)))
+    monkeypatch.setattr(ahead, "_LARGE", 0)
+    monkeypatch.setattr(ahead, "CACHE", True)
+    monkeypatch.setattr(ahead, "kept", lambda kernel: False)
+    monkeypatch.chdir(tmp_path)
+    measured(["run"], site(CALIBRATED))
+    assert [one.returncode for one in ended] == [0]
+    assert capfd.readouterr().out == ""
+
+
+def test_without_another_process_a_day_is_measured_all_the_same(tmp_path, monkeypatch):
+    run(tmp_path / "run")
+    monkeypatch.setattr(ahead, "_LARGE", 0)
+    monkeypatch.setattr(ahead, "CACHE", True)
+    monkeypatch.setattr(ahead, "kept", lambda kernel: False)
+    for executable in ("", "/nowhere/python"):
+        monkeypatch.setattr("sys.executable", executable)
+        assert len(measured([str(tmp_path / "run")], site(CALIBRATED)).tables["crossings"]) == 3

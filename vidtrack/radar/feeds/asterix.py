@@ -21,6 +21,10 @@ BESIDE = (8, 10, 11, 19, 20, 23, 63, 65)
 _HEAD = 3
 _ENOUGH = 4
 """Blocks in a row that are looked at."""
+_FOLLOWED = 16
+"""Blocks after one of unknown content that are followed to tell whether its length is right."""
+_SMALL = 64
+"""Octets of a block in which no others are looked for: little is lost."""
 _CHECKED = 512
 """Octets of a block in which records are looked at to tell whether it is one."""
 _SEEN, _NO_LENGTH = 1024, 1 << 16
@@ -38,18 +42,18 @@ def looks_like(content: bytes, at: int = 0) -> bool:
     return blocks > 1 or (blocks == 1 and at == len(content))
 
 
-def first_block(content: bytes, farthest: int) -> int | None:
-    """Where sound blocks begin, no farther than so many octets; None: nowhere.
+def first_block(content: bytes, farthest: int, begin: int = 0, enough: int = _ENOUGH) -> int | None:
+    """Where sound blocks begin, from `begin` on, no farther than so many octets; None: nowhere.
 
-    Several of them follow each other, or the only one ends with the content, and those that are read have no damage in
-    their first octets. Blocks from different places may overlap: each record is decoded once.
+    At least `enough` of them follow each other, or the only one ends with the content, and those that are read have no
+    damage in their first octets. Blocks from different places may overlap: each record is decoded once.
     """
     decoder, records = Decoder(Losses()), dict[tuple[int, int], int]()
     known: dict[int, tuple[int, bool]] = {}  # of places walked: sound blocks from there on, whether up to the end
-    for first in range(min(farthest, len(content))):
+    for first in range(begin, min(begin + farthest, len(content))):
         walked: list[tuple[int, int]] = []
         read, at = 0, _timed(content, first)
-        while read < _ENOUGH and at not in known and _is_block(content, at):
+        while read < enough and at not in known and _is_block(content, at):
             after = _following(content, at)
             if content[at] in READ and not _is_sound(content, at, decoder, records):
                 known[at] = 0, False
@@ -58,10 +62,41 @@ def first_block(content: bytes, farthest: int) -> int | None:
             read += content[at] in READ
             at = after
         more, whole = known.get(at, (0, at == len(content)))
-        if read + more >= _ENOUGH or (whole and read + more):
+        if read + more >= enough or (whole and read + more):
             return first
         known.update((place, (read + more - before, whole)) for place, before in walked)
     return None
+
+
+def _is_passable(content: bytes, at: int) -> bool:
+    """Whether the length of a block that is damaged, or not read, is right: others follow it, and it holds none."""
+    after = _following(content, at)
+    if after == len(content):
+        return True
+    return _leads_on(content, after) and (after - at < _SMALL or first_block(content, after - at - 1, at + 1) is None)
+
+
+def _leads_on(content: bytes, at: int) -> bool:
+    """Whether blocks of any category lead from `at` to a sound one of those that are read, or to the end, or go on."""
+    for _ in range(_FOLLOWED):
+        size = int.from_bytes(content[at + 1 : at + _HEAD], "big")
+        if at == len(content):
+            return True
+        if not _HEAD < size <= len(content) - at:
+            return False
+        if content[at] in READ:
+            return _is_sound(content, at, Decoder(Losses()), {})
+        at = _following(content, at)
+    return True
+
+
+def _next_sound(content: bytes, begin: int) -> int:
+    """The place, from `begin` on, of the next of two sound blocks in a row, or of one at the end; else the end."""
+    for place in range(begin, len(content), _NO_LENGTH):
+        found = first_block(content, _NO_LENGTH, place, enough=2)
+        if found is not None:
+            return _timed(content, found)
+    return len(content)
 
 
 def _is_sound(content: bytes, at: int, decoder: Decoder, known: dict[tuple[int, int], int]) -> bool:
@@ -92,7 +127,8 @@ def _following(content: bytes, at: int) -> int:
 class Decoder:
     """Turns payloads into messages, and counts what is damaged in `losses`.
 
-    After a damaged record the rest of its block is left out; after a damaged block it goes on where blocks are found.
+    After a damaged record the rest of its block is left out. Where no block follows another, as octets are missing, it
+    goes on at the next sound ones.
     It remembers each sender's time, because CAT 001 says it only modulo 512 s.
     """
 
@@ -103,17 +139,19 @@ class Decoder:
 
     def messages(self, payload: bytes) -> Iterator[Message]:
         """The messages of a payload of whole blocks."""
-        at = _timed(payload)
+        at, last = _timed(payload), -1  # the places of this block and of the last one that was read or found
         while at < len(payload):
             size = int.from_bytes(payload[at + 1 : at + _HEAD], "big")
-            if size <= _HEAD or at + size > len(payload):
-                self.losses.damaged += 1
-                at = next((k for k in range(at + 1, len(payload) - _HEAD) if looks_like(payload, k)), len(payload))
-            elif payload[at] in self._layouts:
+            whole, damaged = _HEAD < size <= len(payload) - at, self.losses.damaged
+            sound = whole and payload[at] in self._layouts
+            if sound:
                 yield from self._block(payload[at], payload[at + _HEAD : at + size])
-                at = _timed(payload, at + size)
+                last, sound = at, self.losses.damaged == damaged
+            if sound or (whole and _is_passable(payload, at)):
+                at = _following(payload, at)
             else:
-                at = _timed(payload, at + size)
+                self.losses.damaged = damaged + 1
+                at = last = _next_sound(payload, last + 1)
 
     def length(self, category: int, body: bytes) -> int:
         """Octets of the first record: one more than given if it goes on, more than any block has if it is damaged."""

@@ -163,6 +163,7 @@ class FirstCopies:
         self._losses, self._remembered_s, self._most = losses, remembered_s, most
         self._seen: set[bytes] = set()
         self._order: deque[tuple[float, bytes]] = deque()
+        self._time_s = math.nan  # of the last message
 
     def of(self, messages: Messages) -> Messages:
         """The messages without those that came before, among them or in an earlier call, in order of arrival."""
@@ -178,14 +179,19 @@ class FirstCopies:
         return messages.only(kept)
 
     def _came_before(self, time_s: float, digits: bytes) -> bool:
-        """Whether a message came before; remembers it, and forgets those of other times."""
+        """Whether a message came before; remembers it, and forgets those of other times, by two messages that agree."""
         if digits in self._seen:
             return True
+        agreed = not self._is_far(time_s, self._time_s)
+        self._time_s = time_s
         self._seen.add(digits)
         self._order.append((time_s, digits))
-        while len(self._order) > self._most or abs(within_a_day(time_s - self._order[0][0])) > self._remembered_s:
+        while len(self._order) > self._most or (agreed and self._is_far(time_s, self._order[0][0])):
             self._seen.remove(self._order.popleft()[1])
         return False
+
+    def _is_far(self, time_s: float, other_s: float) -> bool:
+        return math.isfinite(other_s) and abs(within_a_day(time_s - other_s)) > self._remembered_s
 
 
 def _named(messages: Messages) -> Mask:

@@ -166,7 +166,7 @@ class Counting:
         self._book.close()
 
     def _stands(self, steps: Sequence[Step], rows: pa.Table | None) -> Sequence[Floats | None]:
-        """(T, 2) px of the scene where the tracks of each step stand on the road, as `vidtrack measure` has them."""
+        """(T, 2) px of the scene where the tracks of each step stand on the road, by their rows alone."""
         if rows is None or self._road is None:
             return [None] * len(steps)
         ground = self._road.ground
