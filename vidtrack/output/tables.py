@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 
+from vidtrack.arrays.covariance import correlation
 from vidtrack.arrays.types import Floats
 from vidtrack.output.linefile import Every, LineFile
 from vidtrack.output.parquet import ParquetParts
@@ -148,7 +149,7 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
         "time_s": np.repeat([step.time_s for step in steps], counts),
         "track_id": stacked(steps, "id"),
         "status": _STATUS_WORDS[stacked(steps, "status")],
-        "corr_xy": _correlation(cov[:, 0, 1], sigma[:, 0] * sigma[:, 1]),
+        "corr_xy": correlation(cov[:, 0, 1], sigma[:, 0] * sigma[:, 1]),
         "group_id": stacked(steps, "group"),
         "nis": stacked(steps, "nis"),
     }
@@ -164,7 +165,7 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
     plane = [*position[:2], *velocity[:2]]
     for name, (i, j) in _PAIRS.items():
         i, j = plane[i], plane[j]
-        values[f"corr_{name}"] = _correlation(P[:, i, j], np.sqrt(P[:, i, i] * P[:, j, j]))
+        values[f"corr_{name}"] = correlation(P[:, i, j], np.sqrt(P[:, i, i] * P[:, j, j]))
     values |= on_road
     values |= zip(("left_px", "top_px", "width_px", "height_px"), box.T, strict=True)
     values |= zip(_SEEN, edge.T, strict=True)
@@ -186,7 +187,7 @@ def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[
         "y_m": stand.xy[:, 1],
         "sigma_x_m": sigma[:, 0],
         "sigma_y_m": sigma[:, 1],
-        "corr_xy_m": _correlation(stand.xy_own[:, 0, 1], sigma.prod(axis=1)),
+        "corr_xy_m": correlation(stand.xy_own[:, 0, 1], sigma.prod(axis=1)),
         "shared_sigma_x_m": shared[:, 0],
         "shared_sigma_y_m": shared[:, 1],
         "speed_kmh": 3.6 * stand.speed,
@@ -198,11 +199,6 @@ def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[
         "width_m": stand.width,
         "class": stand.kind,
     }
-
-
-def _correlation(cov: Floats, scale: Floats) -> Floats:
-    """(N,) covariances (N,) of two errors over the product of their sigmas (N,); NaN where there is no error."""
-    return np.divide(cov, scale, out=np.full(len(cov), np.nan), where=~(scale <= 0))
 
 
 def stacked(steps: Sequence[Step], name: str) -> np.ndarray:

@@ -11,6 +11,14 @@ from vidtrack.traffic.measures.measure import beginning, measured
 
 
 @pytest.fixture
+def cold(monkeypatch):
+    """Nothing is compiled yet, and each day is a long one."""
+    monkeypatch.setattr(ahead, "_LARGE", 0)
+    monkeypatch.setattr(ahead, "CACHE", True)
+    monkeypatch.setattr(ahead, "kept", lambda kernel: False)
+
+
+@pytest.fixture
 def started(monkeypatch):
     """What is given to processes that are started."""
     given = []
@@ -47,15 +55,12 @@ def test_the_beginning_is_so_many_blocks_of_rows(tmp_path, monkeypatch):
     assert len(measured(runs, site(CALIBRATED), blocks=1).tables["crossings"]) < 3
 
 
-def test_the_other_process_runs_nothing_from_the_folder_it_is_started_in(tmp_path, monkeypatch, capfd):
+def test_the_other_process_runs_nothing_from_the_folder_it_is_started_in(tmp_path, monkeypatch, cold, capfd):
     run(tmp_path / "run")
     (tmp_path / "json.py").write_text("raise SystemExit('not ours')")
     ended = []
     start = subprocess.run
     monkeypatch.setattr(subprocess, "run", lambda *given, **named: ended.append(start(*given, **named)))
-    monkeypatch.setattr(ahead, "_LARGE", 0)
-    monkeypatch.setattr(ahead, "CACHE", True)
-    monkeypatch.setattr(ahead, "kept", lambda kernel: False)
     only_read = ahead._BEGINNING.replace("beginning(", "import json; json.loads(")  # to compile takes long
     monkeypatch.setattr(ahead, "_BEGINNING", only_read)
     monkeypatch.chdir(tmp_path)
@@ -64,11 +69,8 @@ def test_the_other_process_runs_nothing_from_the_folder_it_is_started_in(tmp_pat
     assert capfd.readouterr().out == ""
 
 
-def test_without_another_process_a_day_is_measured_all_the_same(tmp_path, monkeypatch):
+def test_without_another_process_a_day_is_measured_all_the_same(tmp_path, monkeypatch, cold):
     run(tmp_path / "run")
-    monkeypatch.setattr(ahead, "_LARGE", 0)
-    monkeypatch.setattr(ahead, "CACHE", True)
-    monkeypatch.setattr(ahead, "kept", lambda kernel: False)
     for executable in ("", "/nowhere/python"):
         monkeypatch.setattr("sys.executable", executable)
         assert len(measured([str(tmp_path / "run")], site(CALIBRATED)).tables["crossings"]) == 3

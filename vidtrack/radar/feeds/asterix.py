@@ -33,9 +33,9 @@ _SEEN, _NO_LENGTH = 1024, 1 << 16
 Place = dict[str, int]
 
 
-def looks_like(content: bytes, at: int = 0) -> bool:
-    """Whether data blocks begin at `at`: one that ends with the content, or at least two in a row."""
-    blocks, at = 0, _timed(content, at)
+def looks_like(content: bytes) -> bool:
+    """Whether it begins with data blocks: one that ends with the content, or at least two in a row."""
+    blocks, at = 0, _timed(content)
     while blocks < _ENOUGH and _is_block(content, at):
         blocks += 1
         at = _following(content, at)
@@ -79,10 +79,9 @@ def _is_passable(content: bytes, at: int) -> bool:
 def _leads_on(content: bytes, at: int) -> bool:
     """Whether blocks of any category lead from `at` to a sound one of those that are read, or to the end, or go on."""
     for _ in range(_FOLLOWED):
-        size = int.from_bytes(content[at + 1 : at + _HEAD], "big")
         if at == len(content):
             return True
-        if not _HEAD < size <= len(content) - at:
+        if not _is_whole(content, at):
             return False
         if content[at] in READ:
             return _is_sound(content, at, Decoder(Losses()), {})
@@ -104,7 +103,7 @@ def _is_sound(content: bytes, at: int, decoder: Decoder, known: dict[tuple[int, 
 
     known  the places after records, or after what is seen of them, by category and place
     """
-    category, end = content[at], at + int.from_bytes(content[at + 1 : at + _HEAD], "big")
+    category, end = content[at], at + _size(content, at)
     place = at + _HEAD
     while place < min(end, at + _CHECKED):
         if (category, place) not in known:
@@ -115,13 +114,22 @@ def _is_sound(content: bytes, at: int, decoder: Decoder, known: dict[tuple[int, 
 
 def _is_block(content: bytes, at: int) -> bool:
     """Whether a whole data block of a known category may be at `at`."""
-    size = int.from_bytes(content[at + 1 : at + _HEAD], "big")
-    return at < len(content) and content[at] in (*READ, *BESIDE) and _HEAD < size <= len(content) - at
+    return at < len(content) and content[at] in (*READ, *BESIDE) and _is_whole(content, at)
+
+
+def _is_whole(content: bytes, at: int) -> bool:
+    """Whether a block at `at` would have content, and end in what there is."""
+    return _HEAD < _size(content, at) <= len(content) - at
 
 
 def _following(content: bytes, at: int) -> int:
     """The place after the data block at `at`."""
-    return _timed(content, at + int.from_bytes(content[at + 1 : at + _HEAD], "big"))
+    return _timed(content, at + _size(content, at))
+
+
+def _size(content: bytes, at: int) -> int:
+    """Octets of the data block at `at`."""
+    return int.from_bytes(content[at + 1 : at + _HEAD], "big")
 
 
 class Decoder:
@@ -141,11 +149,10 @@ class Decoder:
         """The messages of a payload of whole blocks."""
         at, last = _timed(payload), -1  # the places of this block and of the last one that was read or found
         while at < len(payload):
-            size = int.from_bytes(payload[at + 1 : at + _HEAD], "big")
-            whole, damaged = _HEAD < size <= len(payload) - at, self.losses.damaged
+            whole, damaged = _is_whole(payload, at), self.losses.damaged
             sound = whole and payload[at] in self._layouts
             if sound:
-                yield from self._block(payload[at], payload[at + _HEAD : at + size])
+                yield from self._block(payload[at], payload[at + _HEAD : at + _size(payload, at)])
                 last, sound = at, self.losses.damaged == damaged
             if sound or (whole and _is_passable(payload, at)):
                 at = _following(payload, at)

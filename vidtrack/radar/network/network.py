@@ -166,8 +166,9 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
 
 def _refuse_same(feeds: Sequence[Feed]) -> None:
     """Raise ConfigError if most plots of a feed are another's: echoes of one radar would confirm its false plots."""
-    for one, other in combinations(feeds, 2):
-        found = copies(_as_measured(one), _as_measured(other))
+    measured = [_as_measured(feed) for feed in feeds]
+    for (one, own), (other, others) in combinations(zip(feeds, measured, strict=True), 2):
+        found = copies(own, others)
         if found.of_one_radar:
             raise ConfigError(
                 f"radars {one.placed.name!r} and {other.placed.name!r} have the same plots ({found.same} of "

@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet as pq
 
+from vidtrack.arrays.covariance import correlation
 from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
@@ -298,7 +299,7 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str
         "y_m": stand.xy[:, 1],
         "sigma_x_m": own[:, 0],
         "sigma_y_m": own[:, 1],
-        "corr_xy_m": stand.xy_own[:, 0, 1] / own.prod(axis=1),
+        "corr_xy_m": correlation(stand.xy_own[:, 0, 1], own.prod(axis=1)),
         "speed_kmh": 3.6 * stand.speed,
         "speed_sigma_kmh": 3.6 * stand.speed_own_sigma,
         "speed_shared_sigma_kmh": 3.6 * np.linalg.norm(stand.speed_by_shared, axis=1),

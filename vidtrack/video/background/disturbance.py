@@ -195,11 +195,9 @@ class Disturbance:
         self._change.restart(time_s)
         self._camera.restart()
         scene = start(picture)
-        self._contrast, self._hazy, self._brightest = contrast(scene.luma), haziness(scene.luma), brightest(scene.luma)
+        self._judge_scene(scene)
         self._veil = veil(picture.luma) or 0.0
         self._veil_by_place = VeilByPlace()
-        self._coloured = is_coloured(picture)
-        self._dark = is_dark(scene.luma, np.float32(self._view.black))
         return scene
 
     def _is_new_second(self, dt: float) -> bool:
@@ -210,12 +208,15 @@ class Disturbance:
         """Contrast, haze, colour and darkness of the scene in view; a canvas has black rims where nothing was seen."""
         moves = self._camera.moves
         in_view = settled(self._scene, self._camera.motion, self._view.reduced) if moves else self._scene
-        luma = in_view.luma
-        self._contrast, self._hazy, self._brightest = contrast(luma), haziness(luma), brightest(luma)
-        self._coloured = is_coloured(Picture(*in_view[:3]))
-        self._dark = is_dark(in_view.luma, np.float32(self._view.black))
+        self._judge_scene(in_view)
         haze = veil(picture.luma)
         self._veil = self._veil if haze is None else min(self._veil + _LIFT, haze)
+
+    def _judge_scene(self, scene: Scene) -> None:
+        luma = scene.luma
+        self._contrast, self._hazy, self._brightest = contrast(luma), haziness(luma), brightest(luma)
+        self._coloured = is_coloured(Picture(*scene[:3]))
+        self._dark = is_dark(luma, np.float32(self._view.black))
 
     def _air(self, picture: Picture) -> Air:
         """What the air does to the light at each place; a canvas that grows has no places of its own."""
