@@ -23,14 +23,15 @@ def distinct(scan: Scan, free: Mask) -> Mask:
     candidates = free.nonzero()[0]
     if len(candidates) < 2:
         return free
-    first = np.zeros(len(scan), bool)
-    sigma = np.sqrt(np.diagonal(scan.R[candidates], axis1=1, axis2=2).min(axis=0))
-    cell = np.floor(scan.z[candidates] / sigma).T
-    keys = tuple(cell) if scan.run is None else (*cell, scan.run[candidates])
-    order = np.lexsort(keys)
-    new = np.ones(len(order), bool)
-    new[1:] = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)
-    first[candidates[order[new]]] = True
+    variance = scan.R.take(candidates, axis=0).diagonal(axis1=1, axis2=2)
+    cell = np.floor(scan.z.take(candidates, axis=0) / np.sqrt(np.minimum.reduce(variance, axis=0)))
+    if scan.run is not None:
+        cell = np.column_stack([cell, scan.run[candidates]])
+    order = np.lexsort(cell.T)
+    cell = cell.take(order, axis=0)
+    again = np.logical_and.reduce(cell[1:] == cell[:-1], axis=1)
+    first = free.copy()
+    first[candidates[order[1:][again]]] = False
     return first
 
 

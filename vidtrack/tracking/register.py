@@ -50,16 +50,9 @@ class Register:
     }
 
     LINKS = ("prior_x", "prior_P", "gain")
-    _TABLES = (
-        ("born_s", "updated_s", "merged_since_s", "exchange", "score", "best", "alone_s", "travelled", "rest_s"),
-        ("id", "history", "merged", "run", "label"),
-    )
-    """Columns of one type, which are kept and made longer together; the others one by one."""
 
     def __init__(self, dim: int, smooth: bool = False, stations: int = 1) -> None:
         """dim of the positions; whether a smoother needs more; number of stations."""
-        together = {name for names in self._TABLES for name in names}
-        self._others = tuple(n for n in self.STATE[1:] if n not in together) + (self.LINKS if smooth else ())
         self.next_id = 1
         self.id = np.empty(0, np.int64)
         self.status = np.empty(0, np.int8)
@@ -89,6 +82,7 @@ class Register:
         self.look = np.empty((0, 3))
         self.shown = np.empty((0, 4, 2))
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
+        self._columns = self.STATE[1:] + (self.LINKS if smooth else ())
 
     def __len__(self) -> int:
         return len(self.id)
@@ -109,7 +103,7 @@ class Register:
     @property
     def came_in(self) -> Mask:
         """(T,) rows that came in over the border of the picture, or are coming in."""
-        return self.entered | self.inward.any(axis=1)
+        return self.entered | self.inward[:, 0] | self.inward[:, 1]
 
     def travel(self, xy: Floats) -> Floats:
         """(T,) distances of positions (T, d) from where the rows began."""
@@ -129,10 +123,7 @@ class Register:
         What is seen of a vehicle that comes in grows, so that its middle moves half as far as the vehicle: along these
         axes distances count twice. Once it is in, its start is moved so that they stay what they were.
         """
-        cut = sides.any(axis=1)
-        self.entered |= self.outside & ~cut
-        self.outside &= cut
-        _come_in(xy, sides, self.inward, self.start, self.towed, self.rest)
+        _come_in(xy, sides, self.outside, self.entered, self.inward, self.start, self.towed, self.rest)
 
     def tow(self, rows: Ints, by: Floats) -> None:
         """Move on where rows (K,) would be if they went with vehicles, that moved by (K, d)."""
@@ -172,8 +163,12 @@ class Register:
         """Register new tentative tracks, cut by sides (B, 4); returns their ids, the next ones unless given."""
         count = len(position)
         sides = np.zeros((count, 4), bool) if sides is None else sides
-        ids = np.arange(self.next_id, self.next_id + count) if ids is None else ids
-        self.next_id = max(self.next_id + count, 1 + int(ids.max(initial=0)))
+        following = self.next_id + count
+        if ids is None:
+            ids = np.arange(self.next_id, following)
+        else:
+            following = max(following, 1 + int(ids.max(initial=0)))
+        self.next_id = following
         new = {
             "id": ids,
             "status": TENTATIVE,
@@ -189,7 +184,7 @@ class Register:
             "run": run,
             "label": -1 if label is None else label,
             "alone_s": 0.0,
-            "outside": sides.any(axis=1),
+            "outside": np.logical_or.reduce(sides, axis=1),
             "entered": False,
             "inward": inward(sides),
             "beside": False,
@@ -200,19 +195,12 @@ class Register:
             "missed": 0,
         }
         first = len(self)
-        for names in self._TABLES:
-            table = self._table(names)
-            longer = np.empty((len(names), first + count), table.dtype)
-            longer[:, :first] = table
-            for name, column in zip(names, longer, strict=True):
-                column[first:] = new.get(name, np.nan)
-                setattr(self, name, column)
-        for name in self._others:
+        for name in self._columns:
             old = getattr(self, name)
-            wider = np.empty((first + count, *old.shape[1:]), old.dtype)
-            wider[:first] = old
-            wider[first:] = new.get(name, np.nan)
-            setattr(self, name, wider)
+            longer = np.empty((first + count, *old.shape[1:]), old.dtype)
+            longer[:first] = old
+            longer[first:] = new.get(name, np.nan)
+            setattr(self, name, longer)
         return ids
 
     def rename(self, rows: np.ndarray) -> tuple[Ints, Ints]:
@@ -225,15 +213,8 @@ class Register:
 
     def keep(self, rows: np.ndarray) -> None:
         """Drop all rows but these indices."""
-        for names in self._TABLES:
-            for name, column in zip(names, self._table(names).take(rows, axis=1), strict=True):
-                setattr(self, name, column)
-        for name in self._others:
+        for name in self._columns:
             setattr(self, name, getattr(self, name).take(rows, axis=0))
-
-    def _table(self, names: tuple[str, ...]) -> np.ndarray:
-        """(columns, T) columns of one type."""
-        return np.array([getattr(self, name) for name in names])
 
 
 @kernel
@@ -282,12 +263,19 @@ def inward(sides: Mask) -> Mask:
 
     Not over the top: there far vehicles come into view whole.
     """
-    return np.column_stack([sides[:, 0] | sides[:, 2], sides[:, 3]])
+    inward = sides[:, 2:].copy()
+    inward[:, 0] |= sides[:, 0]
+    return inward
 
 
 @kernel
-def _come_in(xy: Floats, sides: Mask, inward: Mask, start: Floats, towed: Floats, rest: Floats) -> None:
+def _come_in(
+    xy: Floats, sides: Mask, outside: Mask, entered: Mask, inward: Mask, start: Floats, towed: Floats, rest: Floats
+) -> None:
     for i in range(len(xy)):
+        out = outside[i] and (sides[i, 0] or sides[i, 1] or sides[i, 2] or sides[i, 3])
+        entered[i] |= outside[i] and not out
+        outside[i] = out
         for axis in range(2):
             cut = sides[i, axis + 2] or (axis == 0 and sides[i, 0])
             if inward[i, axis] and not cut:

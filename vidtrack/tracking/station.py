@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Protocol
 
 import numpy as np
@@ -105,7 +106,7 @@ class Stations:
             raise ScanError(f"the scan is of station {scan.station}, but the tracker has {len(self.each)}, from 0")
         before = float(self.last_s[scan.station])
         self.last_s[scan.station] = scan.t
-        return 0.0 if np.isnan(before) else scan.t - before
+        return 0.0 if isnan(before) else scan.t - before
 
     def expected(
         self, scan: Scan, zhat: Floats, register: Register, share: float | Floats, since: float

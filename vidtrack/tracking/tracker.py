@@ -244,7 +244,7 @@ class Tracker:
         share = self.stations.share(scan, self.bank.x, self.model)
         detection, clutter = self.stations.expected(scan, zhat, self.register, share, since)
         problem = Problem.gated(
-            self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank), clutter,
+            self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank.x, self.bank.P), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
             modes=None if self._mixture is None else self._mixture.modes(sensor),
         )  # fmt: skip
@@ -300,8 +300,10 @@ class Tracker:
         """Delete tracks that are hopeless, have left, or are part of another vehicle; returns (T,) the rows kept."""
         register = self.register
         left = register.history & 1 == 0
-        if np.count_nonzero(left):
-            left &= self.picture.in_view(self.bank) < 0.5  # unseen, and likelier outside
+        unseen = left.nonzero()[0]
+        if len(unseen):
+            x, P = self.bank.x.take(unseen, axis=0), self.bank.P.take(unseen, axis=0)
+            left[unseen] = self.picture.in_view(x, P) < 0.5  # likelier outside
         relieved = self.picture.relieved(register, self.bank)
         hopeless = self.life.hopeless(register)
         xy = self._xy()

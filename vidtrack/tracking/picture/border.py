@@ -57,7 +57,7 @@ class Border:
     @property
     def speck(self) -> float:
         """px; size below which objects are treated as this large, zero without a border."""
-        return 0.0 if np.isinf(self.width) else SPECK * max(self.width, self.height)
+        return 0.0 if math.isinf(self.width) else SPECK * max(self.width, self.height)
 
     def sides(self, box: Floats) -> Mask:
         """(N, 4) which sides (left, top, right, bottom) of boxes (N, 4) the border cuts."""
@@ -106,11 +106,12 @@ def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float]) -> 
         return inside
     for i in range(len(x)):
         for axis in range(2):
-            sigma, at = math.sqrt(2 * P[i, 2 * axis, 2 * axis]), x[i, 2 * axis] + 0.5
-            below, above = (edges[axis] - at) / sigma, (edges[axis + 2] - at) / sigma
-            if below < -FAR and above > FAR:
+            variance, at = 2 * P[i, 2 * axis, 2 * axis], x[i, 2 * axis] + 0.5
+            below, above = edges[axis] - at, edges[axis + 2] - at
+            if below < 0 < above and min(below * below, above * above) > FAR * FAR * variance:
                 continue
-            inside[i] *= (math.erfc(-above) - math.erfc(-below)) / 2
+            sigma = math.sqrt(variance)
+            inside[i] *= (math.erfc(-above / sigma) - math.erfc(-below / sigma)) / 2
     return inside
 
 

@@ -74,8 +74,8 @@ class Surroundings(Protocol):
     def relieved(self, register: Register, bank: Estimator) -> Mask:
         """(T,) tracks that have left, and in whose place others come in."""
 
-    def in_view(self, bank: Estimator) -> Floats:
-        """(T,) probability that each track is where the scan looks; elsewhere P_D is zero."""
+    def in_view(self, x: Floats, P: Floats) -> Floats:
+        """(N,) probability that states x (N, n), P (N, n, n) are where the scan looks; elsewhere P_D is zero."""
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) sizes by which objects at xy (T, d) must travel to be believed."""
@@ -118,9 +118,9 @@ class NoPicture:
         """(T,) none."""
         return np.zeros(len(register), bool)
 
-    def in_view(self, bank: Estimator) -> Floats:
-        """(T,) ones."""
-        return np.ones(len(bank))
+    def in_view(self, x: Floats, P: Floats) -> Floats:
+        """(N,) ones."""
+        return np.ones(len(x))
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) zeros."""
@@ -216,9 +216,9 @@ class Picture:
         alone = (register.history & 1 == 1) & (register.merged < 0)
         return self.border.relieved(box, bank.x.take(bank.model.velocity, axis=1), alone, register.shown)
 
-    def in_view(self, bank: Estimator) -> Floats:
-        """(T,) probability that each track is within the border of the last scan."""
-        return self.border.in_view(bank.x, bank.P)
+    def in_view(self, x: Floats, P: Floats) -> Floats:
+        """(N,) probability that states x (N, n), P (N, n, n) are within the border of the last scan."""
+        return self.border.in_view(x, P)
 
     def size(self, box: Floats, xy: Floats) -> Floats:
         """(T,) longer sides, of specks that of the least object; more where the picture is restless."""
