@@ -145,6 +145,9 @@ def logs(detection: Floats, inside: Floats, clutter: Floats, row: Ints, log_l: F
         most = max(most, abs(log_l[k]))
     least = -VANISHING - 4 * most
     for t in range(len(inside)):
+        if t > 0 and detection[t] == detection[t - 1] and inside[t] == inside[t - 1] and clutter[t] == clutter[t - 1]:
+            missed[t], density[t] = missed[t - 1], density[t - 1]  # as in most rows
+            continue
         missed[t] = max(math.log(1.0 - detection[t] * inside[t]), least)
         density[t] = math.log(detection[t]) - max(math.log(clutter[t]), least)
     for k in range(len(row)):

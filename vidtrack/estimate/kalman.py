@@ -80,7 +80,11 @@ class KalmanBank:
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance H P H' plus the excess (T, m, m)."""
         zhat, H, excess = self.linearised(sensor)
-        return zhat, projection(*H.shape[1:])(self.P, H, excess)
+        return zhat, projection(*H.shape[1:], positions=self._selects_positions(H))(self.P, H, excess)
+
+    def _selects_positions(self, H: Floats) -> bool:
+        """Whether H is the matrix that selects the positions."""
+        return H is POSITION.H(self.x, self.model.position)
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
         """Successor rows from the weights of a decision (paper 004, eqs. 3 to 5; mixtures moment-matched)."""
@@ -88,8 +92,8 @@ class KalmanBank:
         rows, m = len(decision.parent), H.shape[1]
         known = decision.inflation is not None and scan.noise is not None
         inflation = decision.inflation if known else np.zeros(rows)
-        positions = H is POSITION.H(self.x, self.model.position)
-        self.x, self.P = mixture_update(*H.shape[1:], sensor.angles, positions=positions)(
+        update = mixture_update(*H.shape[1:], sensor.angles, positions=self._selects_positions(H))
+        self.x, self.P = update(
             self.x, self.P, H, excess, zhat, scan.z, scan.R,
             decision.parent, decision.row, decision.measurement, decision.beta, decision.beta0,
             inflation, decision.spread, scan.noise if known else _no_excess(m)[0],

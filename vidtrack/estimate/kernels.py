@@ -56,28 +56,33 @@ def propagation(n: int) -> Propagation:
 
 
 @lru_cache
-def projection(m: int, n: int) -> Projection:
-    """H P H' + excess (T, m, m) for all rows; H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m)."""
+def projection(m: int, n: int, *, positions: bool = False) -> Projection:
+    """H P H' + excess (T, m, m) for all rows; H (T, m, n) or (1, m, n), excess (T, m, m) or (1, m, m).
+
+    `positions`: H selects the positions of a state [x, vx, y, vy, ...]; H P H' are then the entries that it selects.
+    """
 
     def project(P: Floats, H: Floats, excess: Floats) -> Floats:
         out, HP = np.empty((len(P), m, m)), np.empty((m, n))
         for t in range(len(P)):
             h, s = min(t, len(H) - 1), min(t, len(excess) - 1)
             for a in range(m):
-                for j in range(n):
+                for j in range(0 if positions else n):
                     total = 0.0
                     for k in range(n):
                         total += H[h, a, k] * P[t, k, j]
                     HP[a, j] = total
             for a in range(m):
                 for b in range(a, m):
-                    total = 0.0
-                    for k in range(n):
+                    total = P[t, 2 * a, 2 * b] if positions else 0.0
+                    for k in range(0 if positions else n):
                         total += HP[a, k] * H[h, b, k]
                     out[t, a, b] = total + excess[s, a, b]
                     out[t, b, a] = total + excess[s, b, a]
         return out
 
+    if positions:
+        project.__name__ = "project_positions"
     return specialised(project, m, n)
 
 
