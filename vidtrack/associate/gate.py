@@ -225,8 +225,7 @@ def _gated(
         order, first, origin, cell, shape = cells(z, run, reach)
         runs = (len(first) - 1) // (shape[0] * shape[1])
         size = 4 * rows + 16
-        row, measurement = np.empty(size, np.int64), np.empty(size, np.int64)
-        d2, nis, log_s = np.empty(size), np.empty(size), np.empty(size)
+        pair, value = np.empty((size, 2), np.int64), np.empty((size, 3))
         n = 0
         L, v = np.empty((m, m)), np.empty(m)
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
@@ -282,44 +281,52 @@ def _gated(
                             continue
                         if n == size:
                             size *= 2
-                            row, measurement = _grown(row, size), _grown(measurement, size)
-                            d2, nis, log_s = _grown(d2, size), _grown(nis, size), _grown(log_s, size)
-                        row[n], measurement[n], d2[n] = t, j, distance
-                        nis[n], log_s[n] = whitened, 2.0 * np.log(det)
+                            pair, value = _grown(pair, size), _grown(value, size)
+                        pair[n, 0], pair[n, 1] = t, j
+                        value[n, 0], value[n, 1], value[n, 2] = distance, whitened, 2.0 * np.log(det)
                         n += 1
         # the order in the grid depends on the cell size; results must not
-        place = _ascending(row[:n], measurement[:n], rows, len(z))
-        nis, log_s = nis[place], log_s[place]
-        log_l = -0.5 * (nis + log_s + m * np.log(TURN))
-        return row[:n], measurement[place], d2[place], nis, log_s, log_l, starts(row[:n], rows)
+        order, start = _ascending(pair, n, rows, len(z))
+        row, measurement = np.empty(n, np.int64), np.empty(n, np.int64)
+        d2, nis, log_s, log_l = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+        for p in range(n):
+            row[p], measurement[p] = pair[order[p], 0], pair[order[p], 1]
+            d2[p], nis[p], log_s[p] = value[order[p], 0], value[order[p], 1], value[order[p], 2]
+            log_l[p] = -0.5 * (nis[p] + log_s[p] + m * np.log(TURN))
+        return row, measurement, d2, nis, log_s, log_l, start
 
     return specialised(gated, m, mode, *angles)
 
 
 @inlined
-def _ascending(row: Ints, measurement: Ints, rows: int, count: int) -> Ints:
-    """(P,) order by row, then measurement, of pairs that are sorted by row; two counting sorts."""
-    first, begin = np.zeros(count + 1, np.int64), np.zeros(rows + 1, np.int64)
-    for p in range(len(row)):
-        first[measurement[p] + 1] += 1
-        begin[row[p] + 1] += 1
-    for counts in (first, begin):
-        for c in range(1, len(counts)):
-            counts[c] += counts[c - 1]
-    by_measurement, order = np.empty(len(row), np.int64), np.empty(len(row), np.int64)
-    for p in range(len(row)):
-        by_measurement[first[measurement[p]]] = p
-        first[measurement[p]] += 1
-    for pair in by_measurement:
-        order[begin[row[pair]]] = pair
-        begin[row[pair]] += 1
-    return order
+def _ascending(pair: Ints, count: int, rows: int, measurements: int) -> tuple[Ints, Ints]:
+    """(count,) order by row, then measurement, of the pairs (row, measurement); (rows + 1,) where each row starts.
+
+    Two counting sorts.
+    """
+    first, start = np.zeros(measurements + 1, np.int64), np.zeros(rows + 1, np.int64)
+    for p in range(count):
+        start[pair[p, 0] + 1] += 1
+        first[pair[p, 1] + 1] += 1
+    for j in range(measurements):
+        first[j + 1] += first[j]
+    for t in range(rows):
+        start[t + 1] += start[t]
+    by_measurement, order, place = np.empty(count, np.int64), np.empty(count, np.int64), start.copy()
+    for p in range(count):
+        by_measurement[first[pair[p, 1]]] = p
+        first[pair[p, 1]] += 1
+    for p in by_measurement:
+        order[place[pair[p, 0]]] = p
+        place[pair[p, 0]] += 1
+    return order, start
 
 
 @inlined
-def _grown(array: np.ndarray, size: int) -> np.ndarray:
-    """A copy with room for `size` elements."""
-    wider = np.empty(size, array.dtype)
-    for i in range(len(array)):
-        wider[i] = array[i]
+def _grown(table: np.ndarray, size: int) -> np.ndarray:
+    """A copy with room for `size` rows."""
+    wider = np.empty((size, table.shape[1]), table.dtype)
+    for i in range(len(table)):
+        for column in range(table.shape[1]):
+            wider[i, column] = table[i, column]
     return wider
