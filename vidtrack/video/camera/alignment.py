@@ -144,8 +144,11 @@ def _fit(
     seen, normal, found = np.empty(count), np.empty((6, 6)), np.empty(6)
     A = motion.copy()
     gain, bias = 1.0, 0.0
-    inside = _sample(luma, size, x, y, A, seen)
-    for _ in range(steps):
+    inside, settled = 0, False
+    for step in range(steps + 1):
+        inside = _sample(luma, size, x, y, A, seen)
+        if settled or step == steps:
+            break
         if inside < _INSIDE * count:
             return A, 0.0
         centre, sigma = _spread(seen, gain, bias, value)
@@ -169,9 +172,7 @@ def _fit(
             return A, 0.0
         tx, ty, grow, turn = found[0] / gain, found[1] / gain, found[2] / gain / radius, found[3] / gain / radius
         A = _undone(A, tx, ty, 1 + grow, turn, middle_x, middle_y)
-        inside = _sample(luma, size, x, y, A, seen)
-        if abs(tx) + abs(ty) + radius * (abs(grow) + abs(turn)) < _SETTLED_PX * size:
-            break
+        settled = abs(tx) + abs(ty) + radius * (abs(grow) + abs(turn)) < _SETTLED_PX * size
     fits = 0
     for k in range(count):
         off, slope = abs(seen[k] - gain * value[k] - bias), np.sqrt(gx[k] ** 2 + gy[k] ** 2) * gain
