@@ -37,6 +37,15 @@ def missed(rows):
     return Decision(np.arange(rows), nobody, nobody, np.empty(0), np.ones(rows))
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_covariance_of_predicted_positions_is_the_product_with_the_matrix_that_selects_them(dim):
+    bank = filled_bank(np.random.default_rng(dim), 7, dim)
+    zhat, cov = bank.predicted_measurement(POSITION)
+    H = POSITION.H(bank.x, bank.model.position)[0]
+    assert (zhat == bank.x @ H.T).all()
+    assert np.allclose(cov, H @ bank.P @ H.T, rtol=1e-15)
+
+
 def kalman_step(x, P, F, Q, H, z, R):
     """Textbook predict and update of one filter."""
     x, P = F @ x, F @ P @ F.T + Q

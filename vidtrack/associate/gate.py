@@ -316,9 +316,9 @@ def _ascending(pair: Ints, count: int, rows: int, measurements: int) -> tuple[In
     for p in range(count):
         by_measurement[first[pair[p, 1]]] = p
         first[pair[p, 1]] += 1
-    for p in by_measurement:
-        order[place[pair[p, 0]]] = p
-        place[pair[p, 0]] += 1
+    for index in by_measurement:
+        order[place[pair[index, 0]]] = index
+        place[pair[index, 0]] += 1
     return order, start
 
 
