@@ -97,6 +97,47 @@ def test_a_jump_of_the_clock_holds_no_turns_of_the_antenna(tmp_path, caplog, jum
     assert "40 scans, 4" in caplog.text
 
 
+def _rows_of_scans(count=40, back_s=0.0):
+    """Rows of `count` scans of 5 plots, 4 s apart, and half way a clock that is set back."""
+    times = [4.0 * k - back_s * (k >= count / 2) for k in range(count) for _ in range(5)]
+    return [f"{t},{1000 + 10 * n},{72 * n % 360}" for n, t in enumerate(times)]
+
+
+def test_a_clock_that_was_set_back_goes_on_where_no_column_says_the_scan(tmp_path, caplog):
+    plots = read_plots(write(tmp_path / "p.csv", *_rows_of_scans(back_s=60.0), header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == [4.0 * k for k in range(40) for _ in range(5)]
+    assert plots.z[:, 0].tolist() == [1000 + 10 * n for n in range(200)]
+    assert "time_s goes back from 76 to 20 s at line 102" in caplog.text
+
+
+def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path):
+    times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))
+    rows = [f"{t - 61.3 * (t > 80):.4f},{1e4 + 37 * k},{90 * t % 360:.3f}" for k, t in enumerate(times)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
+
+
+@pytest.mark.parametrize("order", ["shuffled", "downwards", "by sensor", "by target", "late", "one wrong time"])
+def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tmp_path, caplog, order):
+    rows = [row + ",0" for row in _rows_of_scans()]
+    if order == "shuffled":
+        rows = [rows[k] for k in np.random.default_rng(0).permutation(len(rows))]
+    elif order == "downwards":
+        rows = rows[::-1]
+    elif order == "by sensor":
+        rows = [row[:-1] + "north" for row in rows[::2]] + [row[:-1] + "south" for row in rows[1::2]]
+    elif order == "by target":
+        rows = [row[:-1] + str(k) for k in range(5) for row in rows[k::5]]
+    elif order == "late":
+        rows = rows[:50] + rows[60:100] + rows[50:60] + rows[100:]
+    else:
+        rows[50] = "9000,1500,0,0"
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,source"))
+    times = [4.0 * k for k in range(40) for _ in range(5)]
+    assert plots.time_s.tolist() == (times if order != "one wrong time" else [*times[:50], *times[51:], 9000])
+    assert "goes back" not in caplog.text
+
+
 @pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])
 def test_a_time_that_cannot_be_one_does_not_hide_the_turns_of_the_antenna(tmp_path, caplog, stray):
     times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))

@@ -19,7 +19,7 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import NAN, Kind, Message, Messages
 from vidtrack.radar.feeds.pace import Turns, pace_of
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import closed_up, longest_step
+from vidtrack.radar.rhythm import closed_up, longest_step, set_back
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -79,7 +79,8 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     """Read a CSV or Parquet table of plots.
 
     Rows may come in any order. Without a column `scan`, plots of the same time are one scan, or, if nearly each has its
-    own time, those of one turn of the antenna. Standard deviations come from columns, else from the settings.
+    own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set:
+    time goes on. Standard deviations come from columns, else from the settings.
     Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
     rows. With settings.skip_bad_rows bad rows are left out with a warning.
     """
@@ -108,6 +109,7 @@ def _numbered(table: Table) -> Table:
     similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
     if scan in table.names or time not in table.columns or similar:
         return table
+    table = _on_one_clock(table)
     time_s = possible_times(table.columns[time])
     times, member = np.unique(time_s, return_inverse=True)
     steps = np.diff(times[np.isfinite(times)])
@@ -128,6 +130,34 @@ def _numbered(table: Table) -> Table:
         table.path, len(steps) + 1, usual,
     )  # fmt: skip
     return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
+
+
+def _on_one_clock(table: Table) -> Table:
+    """The table with times that go on where its clock was set back; rows in another order than of arrival stay so."""
+    name = TIME[1]
+    rows = np.flatnonzero(np.isfinite(possible_times(table.columns[name])))
+    time_s = table.columns[name][rows]
+    back = set_back(time_s)
+    if not len(back) or _grouped(table, rows[back]):
+        return table
+    step_s = np.diff(time_s)
+    offset = np.zeros(len(table.line))
+    for k in back.tolist():
+        offset[rows[k] :] += np.median(step_s[step_s > 0]) - step_s[k - 1]
+    first, others = back[0], f", the first of {len(back)} such steps" if len(back) > 1 else ""
+    _log.warning(
+        "%s: time_s goes back from %.10g to %.10g s at %s %d%s, as if the clock was set: time goes on there; if the "
+        "rows are only out of order, sort them by time_s",
+        table.path, time_s[first - 1], time_s[first], table.unit, table.line[rows[first]], others,
+    )  # fmt: skip
+    return replace(table, columns=table.columns | {name: table.columns[name] + offset})
+
+
+def _grouped(table: Table, back: Ints) -> bool:
+    """Whether rows are in order of another column, as a sensor or target, which changes where their time goes back."""
+    measured = {TIME[1], *MEASURED}
+    changes = (table.changes(name) for name in table.names if name not in measured)
+    return any(bool(new[back].all()) and new.sum() <= 2 * len(back) for new in changes)
 
 
 def _one_by_one(steps: Floats, plots: int) -> bool:

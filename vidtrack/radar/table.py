@@ -27,7 +27,7 @@ SHOWN = 5
 class Table:
     """A file's columns as numbers, NaN for cells that are not numbers.
 
-    names   of all columns in the file; `columns` has the wanted ones
+    cells   all columns as they are in the file; `columns` has the wanted ones
     line    (N,) line of each row: the header of a CSV is line 1, blank lines do not count; rows of a Parquet file
             count from 1
     unit    what `line` counts: "line" or "row"
@@ -35,11 +35,25 @@ class Table:
     """
 
     path: Path
-    names: list[str]
+    cells: pa.Table
     columns: dict[str, Floats]
     line: Ints
     unit: str
     faults: Faults
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns in the file."""
+        return self.cells.column_names
+
+    def changes(self, name: str) -> Mask:
+        """(N,) rows whose cell in a column is another than that of the row before."""
+        column = self.cells[name]
+        try:
+            same = pa.compute.equal(column[1:], column[:-1]).fill_null(False)
+        except pa.ArrowNotImplementedError:  # cells that cannot be compared
+            return np.arange(len(column)) > 0
+        return np.concatenate([[False], ~same.to_numpy()])
 
     def refuse(self, bad: Mask, name: str, rule: str) -> None:
         """Add a fault for the rows of a mask (N,) whose value in column `name` breaks a rule."""
@@ -88,7 +102,7 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
         )
     line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
     columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
-    return Table(path, table.column_names, columns, line, unit, faults)
+    return Table(path, table, columns, line, unit, faults)
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str:
