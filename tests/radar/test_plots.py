@@ -87,6 +87,27 @@ def test_turns_of_the_antenna_are_scans_where_each_plot_has_its_own_time(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+@pytest.mark.parametrize("header", ["time_s,range_m,azimuth_deg", "time_s,x_m,y_m"])
+def test_turns_of_the_antenna_are_scans_where_times_are_in_whole_seconds(tmp_path, caplog, header):
+    rng = np.random.default_rng(0)
+    turn, part = np.divmod(np.sort(rng.uniform(0, 40, 400)), 1)
+    east_north = np.sin(2 * np.pi * part), np.cos(2 * np.pi * part)
+    ranges = rng.uniform(5e3, 5e4, 400)
+    place = (ranges, 360 * part) if "range_m" in header else tuple(ranges * one for one in east_north)
+    rows = [f"{int(t)},{u:.3f},{v:.3f}" for t, u, v in zip(4 * (turn + part), *place, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=header))
+    assert (plots.scan == turn).mean() > 0.99
+    assert "40 scans, 4" in caplog.text
+
+
+@pytest.mark.parametrize("targets", [1, 3])
+@pytest.mark.parametrize("scan_s", [1, 4, 30])
+def test_targets_that_stay_in_their_direction_are_no_turning_antenna(tmp_path, targets, scan_s):
+    rows = [f"{scan_s * k},{9000 + 10 * k},{40 + 90 * j}" for k in range(200) for j in range(targets)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [k for k in range(200) for _ in range(targets)]
+
+
 @pytest.mark.parametrize("jump_s", [3e5, 1e6])
 def test_a_jump_of_the_clock_holds_no_turns_of_the_antenna(tmp_path, caplog, jump_s):
     rng = np.random.default_rng(0)
