@@ -263,6 +263,29 @@ def test_two_radars_at_one_place_are_two(biased, later_s):
     assert [feed.placed.name for feed in south_again(biased, independent)] == ["south", "again"]
 
 
+def in_cells(folder, detected, moved_m):
+    """Two radars at one place that see one target in cells of 150 m and 1.5 degrees, which moves by so much a scan."""
+    rng = np.random.default_rng(4)
+    for name in ("one", "other"):
+        seen = np.flatnonzero(rng.random(60) < detected)
+        rows = [f"{k},{4 * k},{(10000 + moved_m * k) // 150 * 150},45,50,0.5" for k in seen]
+        header = "scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg"
+        (folder / f"{name}.csv").write_text("\n".join([header, *rows]) + "\n")
+    (folder / "cells.toml").write_text("".join(f"[radars.{name}]\nx_m = 0\ny_m = 0\n" for name in ("one", "other")))
+    paths = [str(folder / f"{name}.csv") for name in ("one", "other")]
+    return read_feeds(paths, read_radars(folder / "cells.toml"), load().radar)
+
+
+@pytest.mark.parametrize("detected", [1.0, 0.9, 0.6])
+def test_one_target_that_stands_in_a_cell_does_not_make_two_radars_one(tmp_path, detected):
+    assert len(in_cells(tmp_path, detected, 0.0)) == 2
+
+
+def test_a_target_that_moves_from_cell_to_cell_tells_that_two_radars_are_one(tmp_path):
+    with pytest.raises(vt.ConfigError, match="same plots"):
+        in_cells(tmp_path, 1.0, 200.0)
+
+
 def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):
     (sites / "one.toml").write_text("[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n")
     with pytest.raises(vt.ConfigError, match="no radar with sac = 25 and sic = 202"):
