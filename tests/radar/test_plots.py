@@ -307,6 +307,15 @@ def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
             read_plots(path)
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-be"])
+@pytest.mark.parametrize("text", ["\n".join([HEADER, *GOOD]), "$RATTM,01,2.00,90.0,T,0,0,T,0,0,N,,T,,120000,A\n" * 40])
+def test_text_in_another_encoding_is_named(tmp_path, encoding, text):
+    path = tmp_path / "p.csv"
+    path.write_bytes(text.encode(encoding))
+    with pytest.raises(PlotFormatError, match=rf"p\.csv is text in {encoding[:6].upper()}; save it in UTF-8"):
+        read_plots(path)
+
+
 def test_a_missing_file_is_an_input_error(tmp_path):
     with pytest.raises(SourceError, match=r"none\.csv"):
         read_plots(tmp_path / "none.csv")

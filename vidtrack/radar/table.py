@@ -16,6 +16,13 @@ import pyarrow.parquet
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import PlotFormatError, SourceError
 
+WIDE = ("utf-32-le", "utf-32-be", "utf-16-le", "utf-16-be")
+"""Encodings of text that are named, since they are not read."""
+PLAIN = 0.9
+"""Share of characters of a table or of NMEA that are ASCII."""
+LOOKED_AT = 4096
+"""Octets from which an encoding is told."""
+
 Faults = dict[int, str]
 """Fault by line of the file; the first fault of a line is kept."""
 
@@ -81,10 +88,14 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     """
     try:
         with path.open("rb") as file:
-            parquet = file.read(4) == b"PAR1"
+            beginning = file.read(LOOKED_AT)
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
+    wide = _wide(beginning)
+    if wide is not None:
+        raise PlotFormatError(f"{path} is text in {wide.upper()[:6]}; save it in UTF-8")
     faults: Faults = {}
+    parquet = beginning.startswith(b"PAR1")
     unit = "row" if parquet else "line"
     try:
         table = pyarrow.parquet.read_table(path) if parquet else _read_csv(path, faults)
@@ -103,6 +114,17 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
     columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
     return Table(path, table, columns, line, unit, faults)
+
+
+def _wide(beginning: bytes) -> str | None:
+    """The encoding of text in characters of two or four octets, with or without a byte order mark; None: it is none."""
+    whole = beginning[: len(beginning) // 4 * 4]
+    for encoding in WIDE if b"\0" in whole else ():
+        text = whole.decode(encoding, errors="replace")
+        plain = sum(one.isascii() and (one.isprintable() or one.isspace()) for one in text)
+        if plain > PLAIN * len(text):
+            return encoding
+    return None
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str:
