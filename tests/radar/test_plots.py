@@ -11,6 +11,7 @@ from plot_files import GOOD, HEADER, write
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import FormatError, PlotFormatError, SourceError
 from vidtrack.radar.plots import read_plots
+from vidtrack.radar.reading import read
 
 SKIP = RadarSettings(skip_bad_rows=True)
 
@@ -173,6 +174,13 @@ def test_plots_one_by_one_that_follow_no_antenna_are_warned_of(tmp_path, caplog)
     rows = [f"{t:.4f},{rng.uniform(1e3, 5e4):.1f},{rng.uniform(0, 360):.3f}" for t in np.sort(rng.uniform(0, 160, 400))]
     read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
     assert "nearly every plot its own time" in caplog.text
+
+
+@pytest.mark.parametrize(("step", "told"), [(4, False), (60, False), (4000, True)])
+def test_times_that_seem_to_be_milliseconds_are_asked_about(tmp_path, caplog, step, told):
+    rows = [f"{k},{step * k},{1000 + k},5" for k in range(20)]
+    read(write(tmp_path / "p.csv", *rows, header="scan,time_s,range_m,azimuth_deg"), RadarSettings())
+    assert (f"scans are {step} s apart: is time_s in seconds, not in milliseconds?" in caplog.text) is told
 
 
 def test_bad_times_without_scans_are_refused_as_bad_times(tmp_path):
