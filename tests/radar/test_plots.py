@@ -101,12 +101,23 @@ def test_turns_of_the_antenna_are_scans_where_times_are_in_whole_seconds(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+@pytest.mark.parametrize(("turn_s", "told"), [(1.5, True), (1.8, True), (4.0, False)])
+def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told):
+    rng = np.random.default_rng(0)
+    turns = np.sort(rng.uniform(0, 40, 600))
+    ranged = zip(turns, rng.uniform(5e3, 5e4, 600), strict=True)
+    rows = [f"{int(turn_s * t)},{r:.1f},{360 * t % 360:.3f}" for t, r in ranged]
+    read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert ("too coarse to tell its turns: give a column 'scan'" in caplog.text) is told
+
+
 @pytest.mark.parametrize("targets", [1, 3])
 @pytest.mark.parametrize("scan_s", [1, 4, 30])
-def test_targets_that_stay_in_their_direction_are_no_turning_antenna(tmp_path, targets, scan_s):
+def test_targets_that_stay_in_their_direction_are_no_turning_antenna(tmp_path, caplog, targets, scan_s):
     rows = [f"{scan_s * k},{9000 + 10 * k},{40 + 90 * j}" for k in range(200) for j in range(targets)]
     plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
     assert plots.scan.tolist() == [k for k in range(200) for _ in range(targets)]
+    assert "antenna" not in caplog.text
 
 
 @pytest.mark.parametrize("jump_s", [3e5, 1e6])

@@ -17,7 +17,7 @@ from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order, possible_times
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import ONE_BY_ONE, Turns, pace_of
+from vidtrack.radar.feeds.pace import ONE_BY_ONE, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.rhythm import closed_up, longest_step, set_back
 from vidtrack.radar.table import Table, nearest, read_table
@@ -191,6 +191,12 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
     plots = Messages.of(list(polar))
     pace = pace_of(plots, None, coarse_s)
     if not isinstance(pace, Turns):
+        short_s = turn_within(plots, coarse_s) if 0 < coarse_s < np.inf else None
+        if short_s is not None:
+            _log.warning(
+                "%s: azimuths follow an antenna with turns of %.3g s, but times are in steps of %.3g s, too coarse to "
+                "tell its turns: give a column 'scan', or finer times", table.path, short_s, coarse_s,
+            )  # fmt: skip
         return None
     turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
     scan = np.zeros(len(time_s))

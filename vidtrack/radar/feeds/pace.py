@@ -15,6 +15,8 @@ FASTEST_S, USUAL_S, SLOWEST_S = 0.4, 20.0, 90.0
 """s; durations of a turn that are looked for: up to the second first, and if there is none, up to the third."""
 ONCE_ROUND = 1.5
 """Turns of a slow antenna that its plots must last, for azimuths that hardly change follow a slow one for a while."""
+MOST_IN_A_STEP = 0.7
+"""Turns in a step of rounded times up to which they can be told from azimuths that stay."""
 TARGETS_M_S = 1000.0
 """m/s; plots that follow each other at less may be of one target round the radar, and tell no slow antenna."""
 ROTATES = 0.8
@@ -182,6 +184,18 @@ def _found(plots: Messages, coarse_s: float) -> float | None:
     return quick or (_peak(plots, USUAL_S, SLOWEST_S, coarse_s) if _are_apart(plots) else None)
 
 
+def turn_within(plots: Messages, coarse_s: float) -> float | None:
+    """The duration of a turn that is too short, below two steps of rounded times, to tell which turn a plot is of.
+
+    plots in order of time
+    """
+    if len(plots) < 2 or not _are_apart(plots):
+        return None
+    begin = plots.only(np.arange(min(len(plots), LOOKED_AT)))
+    span = max(float(np.ptp(begin.time_s)), coarse_s)
+    return _highest(begin, np.arange(0.5, MOST_IN_A_STEP, 0.2 * coarse_s / span) / coarse_s, coarse_s)
+
+
 def _are_apart(plots: Messages) -> bool:
     """Whether plots that follow each other are mostly too far apart to be of one target."""
     order = np.argsort(plots.time_s, kind="stable")
@@ -203,11 +217,15 @@ def _peak(plots: Messages, fastest_s: float, slowest_s: float, coarse_s: float) 
     fastest_s, slowest_s = max(fastest_s, 2 * coarse_s), min(slowest_s, max(span / ONCE_ROUND, USUAL_S))
     if fastest_s >= slowest_s:
         return None
-    rate = np.arange(1 / slowest_s, 1 / fastest_s, min(1 / slowest_s, 0.2 / span))
+    return _highest(begin, np.arange(1 / slowest_s, 1 / fastest_s, min(1 / slowest_s, 0.2 / span)), coarse_s)
+
+
+def _highest(plots: Messages, rate: Floats, coarse_s: float) -> float | None:
+    """The duration of a turn at the highest peak, of these rates [1/s]; None for a peak that chance could make."""
     left = np.sinc(coarse_s * rate)
-    score = np.array([_resultant(begin, one) for one in rate])
+    score = np.array([_resultant(plots, one) for one in rate])
     best = int((score / left).argmax())
-    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / len(begin))
+    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / len(plots))
     return 1 / float(rate[best]) if score[best] > max(ROTATES * left[best], chance) else None
 
 
