@@ -84,7 +84,7 @@ def sheet_of(found: Findings, turns: Mapping[tuple[str, str], str]) -> Sheet:
     legs = list(dict.fromkeys([*found.site.legs, *(leg for pair in pairs for leg in pair)]))
     order = [*TURNS, ""]
     ways = product(found.site.legs_with("entry"), found.site.legs_with("exit"))
-    possible = found.site.movements.allowed or [(a, b) for a, b in ways if a != b]
+    possible = found.site.movements.allowed or tuple((a, b) for a, b in ways if a != b)
     shown = sorted(
         {*possible, *pairs},
         key=lambda pair: (legs.index(pair[0]), order.index(turns.get(pair, "")), legs.index(pair[1])),
