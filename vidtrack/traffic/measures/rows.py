@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields
 from os import SEEK_END
@@ -86,6 +86,11 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    @classmethod
+    def together(cls, parts: Sequence[Rows]) -> Rows:
+        """The rows of parts, one after the other."""
+        return cls(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(cls)))
 
     def only(self, chosen: Mask | Ints) -> Rows:
         """The rows of a mask or of indices."""
@@ -172,11 +177,30 @@ class Reader:
         return np.array(known, np.int64)[ids.indices.to_numpy(zero_copy_only=False)]
 
 
-def rows_of(table: pa.Table, ground: Ground) -> Rows:
-    """The rows of a table with ROAD_COLUMNS; the numbers of tracks are their ids, and no edges are known."""
-    column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
-    track, edge = table["track_id"].to_numpy(), np.full((len(table), 4), np.nan)
-    return _on_road(ground, column, track, column["time_s"], *_states(table), edge)
+class LiveReader:
+    """Reads the tables of vehicles that are still tracked, with ROAD_COLUMNS, one after the other in order of time.
+
+    The numbers of tracks are their ids, and no edges are known.
+    """
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._latest: dict[int, Floats] = {}
+
+    def read(self, table: pa.Table) -> Rows:
+        """The rows of the next table; vehicles without a place are carried as in `Reader`."""
+        column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
+        track, t, edge = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
+        rows = _on_road(self._ground, column, track, t, *_states(table), edge)
+        if len(t) == 0:
+            return rows
+        ids, number = np.unique(track, return_inverse=True)
+        unknown = np.full(5, np.nan)
+        latest = np.array([self._latest.get(one, unknown) for one in ids.tolist()])
+        _go_on(number, t, np.isnan(column["x_m"]), rows.seen & ~rows.merged, rows.v, rows.xy, latest)
+        known = self._latest | dict(zip(ids.tolist(), latest, strict=True))
+        self._latest = {one: last for one, last in known.items() if t[-1] - last[0] < _ONWARD_S}
+        return rows
 
 
 def _states(table: pa.Table) -> tuple[Mask, Mask]:
