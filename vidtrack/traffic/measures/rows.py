@@ -20,7 +20,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
+from vidtrack.traffic.footprint import Footprints, Seen, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
@@ -159,7 +159,7 @@ class Reader:
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
             return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
-            column |= _stand(road, track, column)
+            column |= _stand(road, track, column, merged)
         edge = edges(column, recording.size)
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
@@ -304,7 +304,7 @@ def _go_on(track: Ints, t: Floats, rough: Mask, alone: Mask, v: Floats, xy: Floa
             xy[i, 1] = latest[k, 2] + (t[i] - latest[k, 0]) * latest[k, 4]
 
 
-def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str, Floats]:
+def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask) -> dict[str, Floats]:
     """The columns of the road, computed from those of the picture."""
     sigma = np.column_stack([column[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
     corr = np.ones((len(track), 4, 4))
@@ -316,7 +316,8 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str
     box = np.column_stack([column[name] for name in _BOX])
     edge = [column[name] for name in EDGE_COLUMNS if name in column]
     seen = Seen(column["time_s"], np.column_stack(edge)) if edge else None
-    stand = road.place(track, xy, u, P, box, seen)
+    hidden = partly_hidden(column["time_s"], box, merged)
+    stand = road.place(track, xy, u, P, box, seen, hidden)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],
