@@ -180,6 +180,12 @@ def test_who_is_partly_hidden_has_larger_errors_and_the_size_of_the_track_so_far
     assert alone.kind == [""]
 
 
+def test_a_length_is_never_known_better_than_an_outline_tells_it():
+    """From the side, and near, the edges alone would tell it to some centimetres."""
+    stand = placed(seen(CAR, (0, 12), 90))
+    assert 0.3 <= stand.length_sigma[0] < 0.5
+
+
 def test_no_vehicle_at_all():
     stand = Footprints(GROUND, (WIDTH, HEIGHT)).place(
         np.empty(0, np.int64), np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 4, 4)), np.empty((0, 4))

@@ -41,6 +41,8 @@ _HIDDEN_SHARE = 0.12
 roads."""
 _APART_PX = 3.0
 """px; boxes that are farther apart hide nothing of each other"""
+_OUTLINE_M = 0.3
+"""m; standard deviation of a length because the outline of a blob is no footprint's: set on simulated roads"""
 _ROUNDS = 3
 _SILHOUETTE = 0.02
 """Standard deviation of speeds, as a share, because a centroid is of a silhouette and not one point of the vehicle:
@@ -227,7 +229,7 @@ class Footprints:
             v_shared=shared[:, 2:],
             heading=np.where(np.isnan(middle[:, 0]), np.nan, np.arctan2(e[:, 0], e[:, 1])),
             length=sides[:, 0],
-            length_sigma=np.linalg.norm(length_errors, axis=0)[:, 0],
+            length_sigma=np.hypot(np.linalg.norm(length_errors, axis=0)[:, 0], _OUTLINE_M),
             width=sides[:, 1],
             kind=np.full(len(xy), ""),
         )
