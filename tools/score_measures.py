@@ -234,12 +234,20 @@ def told_queues(name: str, results: list[dict[str, Any]]) -> str:
     return f"| {name} | {' | '.join(counts)} | {sum(result['false_queues'] for result in results)} |"
 
 
+def reach(text: str) -> float:
+    """The metres of --reach."""
+    metres = float(text)
+    if not metres >= ALONG_M[0]:
+        raise argparse.ArgumentTypeError(f"{text} m adds no points: the nearest are {ALONG_M[0]:g} m along the legs")
+    return metres
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("clips", nargs="+", type=Path)
     other = parser.add_mutually_exclusive_group()
     other.add_argument("--uncalibrated", action="store_true", help="score the tracks without the calibration")
-    other.add_argument("--reach", type=float, metavar="M", help="add calibration points up to M metres along the legs")
+    other.add_argument("--reach", type=reach, metavar="M", help="add calibration points up to M metres along the legs")
     options = parser.parse_args()
     clips, uncalibrated = options.clips, options.uncalibrated
     of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"

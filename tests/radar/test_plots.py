@@ -11,6 +11,7 @@ from plot_files import GOOD, HEADER, write
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import FormatError, PlotFormatError, SourceError
 from vidtrack.radar.plots import read_plots
+from vidtrack.radar.reading import read
 
 SKIP = RadarSettings(skip_bad_rows=True)
 
@@ -87,6 +88,38 @@ def test_turns_of_the_antenna_are_scans_where_each_plot_has_its_own_time(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+@pytest.mark.parametrize("header", ["time_s,range_m,azimuth_deg", "time_s,x_m,y_m"])
+def test_turns_of_the_antenna_are_scans_where_times_are_in_whole_seconds(tmp_path, caplog, header):
+    rng = np.random.default_rng(0)
+    turn, part = np.divmod(np.sort(rng.uniform(0, 40, 400)), 1)
+    east_north = np.sin(2 * np.pi * part), np.cos(2 * np.pi * part)
+    ranges = rng.uniform(5e3, 5e4, 400)
+    place = (ranges, 360 * part) if "range_m" in header else tuple(ranges * one for one in east_north)
+    rows = [f"{int(t)},{u:.3f},{v:.3f}" for t, u, v in zip(4 * (turn + part), *place, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=header))
+    assert (plots.scan == turn).mean() > 0.99
+    assert "40 scans, 4" in caplog.text
+
+
+@pytest.mark.parametrize(("turn_s", "told"), [(1.5, True), (1.8, True), (4.0, False)])
+def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told):
+    rng = np.random.default_rng(0)
+    turns = np.sort(rng.uniform(0, 40, 600))
+    ranged = zip(turns, rng.uniform(5e3, 5e4, 600), strict=True)
+    rows = [f"{int(turn_s * t)},{r:.1f},{360 * t % 360:.3f}" for t, r in ranged]
+    read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert ("too coarse to tell its turns: give a column 'scan'" in caplog.text) is told
+
+
+@pytest.mark.parametrize("targets", [1, 3])
+@pytest.mark.parametrize("scan_s", [1, 4, 30])
+def test_targets_that_stay_in_their_direction_are_no_turning_antenna(tmp_path, caplog, targets, scan_s):
+    rows = [f"{scan_s * k},{9000 + 10 * k},{40 + 90 * j}" for k in range(200) for j in range(targets)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [k for k in range(200) for _ in range(targets)]
+    assert "antenna" not in caplog.text
+
+
 @pytest.mark.parametrize("jump_s", [3e5, 1e6])
 def test_a_jump_of_the_clock_holds_no_turns_of_the_antenna(tmp_path, caplog, jump_s):
     rng = np.random.default_rng(0)
@@ -95,6 +128,47 @@ def test_a_jump_of_the_clock_holds_no_turns_of_the_antenna(tmp_path, caplog, jum
     plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
     assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
     assert "40 scans, 4" in caplog.text
+
+
+def _rows_of_scans(count=40, back_s=0.0):
+    """Rows of `count` scans of 5 plots, 4 s apart, and half way a clock that is set back."""
+    times = [4.0 * k - back_s * (k >= count / 2) for k in range(count) for _ in range(5)]
+    return [f"{t},{1000 + 10 * n},{72 * n % 360}" for n, t in enumerate(times)]
+
+
+def test_a_clock_that_was_set_back_goes_on_where_no_column_says_the_scan(tmp_path, caplog):
+    plots = read_plots(write(tmp_path / "p.csv", *_rows_of_scans(back_s=60.0), header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == [4.0 * k for k in range(40) for _ in range(5)]
+    assert plots.z[:, 0].tolist() == [1000 + 10 * n for n in range(200)]
+    assert "time_s goes back from 76 to 20 s at line 102" in caplog.text
+
+
+def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path):
+    times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))
+    rows = [f"{t - 61.3 * (t > 80):.4f},{1e4 + 37 * k},{90 * t % 360:.3f}" for k, t in enumerate(times)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
+
+
+@pytest.mark.parametrize("order", ["shuffled", "downwards", "by sensor", "by target", "late", "one wrong time"])
+def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tmp_path, caplog, order):
+    rows = [row + ",0" for row in _rows_of_scans()]
+    if order == "shuffled":
+        rows = [rows[k] for k in np.random.default_rng(0).permutation(len(rows))]
+    elif order == "downwards":
+        rows = rows[::-1]
+    elif order == "by sensor":
+        rows = [row[:-1] + "north" for row in rows[::2]] + [row[:-1] + "south" for row in rows[1::2]]
+    elif order == "by target":
+        rows = [row[:-1] + str(k) for k in range(5) for row in rows[k::5]]
+    elif order == "late":
+        rows = rows[:50] + rows[60:100] + rows[50:60] + rows[100:]
+    else:
+        rows[50] = "9000,1500,0,0"
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,source"))
+    times = [4.0 * k for k in range(40) for _ in range(5)]
+    assert plots.time_s.tolist() == (times if order != "one wrong time" else [*times[:50], *times[51:], 9000])
+    assert "goes back" not in caplog.text
 
 
 @pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])
@@ -111,6 +185,13 @@ def test_plots_one_by_one_that_follow_no_antenna_are_warned_of(tmp_path, caplog)
     rows = [f"{t:.4f},{rng.uniform(1e3, 5e4):.1f},{rng.uniform(0, 360):.3f}" for t in np.sort(rng.uniform(0, 160, 400))]
     read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
     assert "nearly every plot its own time" in caplog.text
+
+
+@pytest.mark.parametrize(("step", "told"), [(4, False), (60, False), (4000, True)])
+def test_times_that_seem_to_be_milliseconds_are_asked_about(tmp_path, caplog, step, told):
+    rows = [f"{k},{step * k},{1000 + k},5" for k in range(20)]
+    read(write(tmp_path / "p.csv", *rows, header="scan,time_s,range_m,azimuth_deg"), RadarSettings())
+    assert (f"scans are {step} s apart: is time_s in seconds, not in milliseconds?" in caplog.text) is told
 
 
 def test_bad_times_without_scans_are_refused_as_bad_times(tmp_path):
@@ -243,6 +324,15 @@ def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(PlotFormatError):
             read_plots(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-be"])
+@pytest.mark.parametrize("text", ["\n".join([HEADER, *GOOD]), "$RATTM,01,2.00,90.0,T,0,0,T,0,0,N,,T,,120000,A\n" * 40])
+def test_text_in_another_encoding_is_named(tmp_path, encoding, text):
+    path = tmp_path / "p.csv"
+    path.write_bytes(text.encode(encoding))
+    with pytest.raises(PlotFormatError, match=rf"p\.csv is text in {encoding[:6].upper()}; save it in UTF-8"):
+        read_plots(path)
 
 
 def test_a_missing_file_is_an_input_error(tmp_path):

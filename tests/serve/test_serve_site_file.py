@@ -87,12 +87,13 @@ def test_a_link_stays_a_link(tmp_path):
     assert read_site(path).camera.name == "y"
 
 
-def test_of_many_that_save_at_once_one_does(tmp_path):
-    file = SiteFile(tmp_path / "site.toml")
+@pytest.mark.parametrize("commands", [1, 16])
+def test_of_many_that_save_at_once_one_does(tmp_path, commands):
+    files = [SiteFile(tmp_path / "site.toml") for _ in range(commands)]  # as each `vidtrack site` has its own
 
     def save(name):
         try:
-            file.save({"site": {"name": f"x{name}", "width": 9, "height": 9}}, "")
+            files[name % commands].save({"site": {"name": f"x{name}", "width": 9, "height": 9}}, "")
         except ChangedError:
             return False
         return True
@@ -100,6 +101,7 @@ def test_of_many_that_save_at_once_one_does(tmp_path):
     with ThreadPoolExecutor(8) as pool:
         assert sum(pool.map(save, range(16))) == 1
     assert read_site(tmp_path / "site.toml").camera.name.startswith("x")
+    assert [path.name for path in tmp_path.iterdir()] == ["site.toml"]
 
 
 def test_a_file_that_is_no_site_is_refused_in_the_words_of_read_site(tmp_path):

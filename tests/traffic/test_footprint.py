@@ -9,7 +9,7 @@ from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 
 from vidtrack.formats import read_mot
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut, velocity
+from vidtrack.traffic.footprint import Footprints, Seen, footprint, partly_hidden, uncut, velocity
 from vidtrack.traffic.site import Site
 
 CAMERA = Pinhole()
@@ -143,6 +143,47 @@ def test_headings_are_remembered_from_batch_to_batch():
         xy, u, box = seen(CAR, (2, 25), 45, speed)
         stand = prints.place(np.array([7]), xy[None], u[None], SURE, box[None])
         assert np.degrees(stand.heading[0]) == pytest.approx(45, abs=3)
+
+
+def test_who_shares_a_blob_or_stands_behind_another_is_partly_hidden():
+    t = np.array([0.0, 0, 0, 1, 0, 0])
+    box = np.array(
+        [[100, 100, 50, 40], [140, 110, 50, 50], [300, 100, 50, 40], [140, 110, 50, 90], [352, 90, 9, 9], [0, 0, 9, 9]],
+        float,
+    )
+    merged = np.arange(6) == 5
+    assert partly_hidden(t, box, merged).tolist() == [True, False, False, False, True, True]
+    assert partly_hidden(t[:0], box[:0], merged[:0]).shape == (0,)
+
+
+def test_who_is_partly_hidden_has_larger_errors_and_the_size_of_the_track_so_far():
+    prints = Footprints(GROUND, (WIDTH, HEIGHT), {"car": (3.0, 6.0), "short": (0.0, 3.0)})
+    at = np.array([2.0, 25])
+    xy, u, box = seen(CAR, at, 90)
+    half = box - [0, 0, 0.3 * box[2], 0.2 * box[3]]  # another one hides the rest
+
+    def place(box, hidden):
+        one = np.array([7]), xy[None], u[None], SURE, box[None]
+        return prints.place(*one, hidden=np.array([hidden]))
+
+    whole, part = place(box, False), place(half, True)
+    assert (part.length, part.kind) == (pytest.approx(whole.length), ["car"])
+    assert part.width == pytest.approx(whole.width, rel=0.1)
+    error = part.xy[0] - at
+    assert error @ np.linalg.inv(part.xy_own[0]) @ error < 5.99 < error @ np.linalg.inv(whole.xy_own[0]) @ error
+    for _ in range(20):
+        assert place(half, True).kind == ["car"]
+    alone = Footprints(GROUND, (WIDTH, HEIGHT), {"short": (0.0, 3.0)}).place(
+        np.array([8]), xy[None], u[None], SURE, half[None], hidden=np.array([True])
+    )
+    assert np.isnan(alone.length[0])
+    assert alone.kind == [""]
+
+
+def test_a_length_is_never_known_better_than_an_outline_tells_it():
+    """From the side, and near, the edges alone would tell it to some centimetres."""
+    stand = placed(seen(CAR, (0, 12), 90))
+    assert 0.3 <= stand.length_sigma[0] < 0.5
 
 
 def test_no_vehicle_at_all():

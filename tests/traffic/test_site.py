@@ -160,6 +160,18 @@ def test_a_system_that_is_not_true_to_lengths_there_is_refused_and_one_named(rea
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("epsg", [25832, 27700, 3857, 2154, 5514])
+def test_own_metres_under_a_system_are_refused_with_the_advice_to_drop_it(read, epsg):
+    with pytest.raises(ConfigError, match=f"metres from a point of your own.*leave epsg = {epsg} out") as refused:
+        read(placed([[0, 50], [20, 50], [12, 0], [0, 0]], epsg, geographic=False))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("epsg", [6677, 3377])  # a zone of Japan, Johor
+def test_a_system_whose_zero_point_is_inland_has_sites_beside_it(read, epsg):
+    assert read(placed([[0, 50], [20, 50], [12, 0], [0, 0]], epsg, geographic=False)).calibration.epsg == epsg
+
+
 def test_points_beyond_what_a_system_maps_are_refused(read):
     with pytest.raises(ConfigError, match="outside the region of epsg = 2154"):
         read(placed([[2 + 0.01 * k, -90 + 0.01 * k * k] for k in range(4)], 2154, geographic=True))

@@ -1,11 +1,11 @@
-"""Exclusive locks on folders and files: one run at a time."""
+"""Exclusive locks on folders and files: one run, or one change, at a time."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from vidtrack.errors import OutputError
@@ -37,6 +37,31 @@ def exclusive(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)  # the lock file stays: another process may have opened it
+
+
+@contextmanager
+def by_turns(path: Path) -> Iterator[None]:
+    """Wait until no other process changes a file, there or not yet, and let none until the `with` block ends.
+
+    The lock file is gone afterwards. Without locks nothing is locked. Raises OSError if the lock file cannot be made.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    place = lock_file(path)
+    while True:
+        handle = os.open(place, os.O_RDWR | os.O_CREAT, 0o644)
+        with suppress(OSError):  # the file system has no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(handle), place.stat()):
+                break
+        os.close(handle)  # the one before has removed it
+    try:
+        yield
+    finally:
+        place.unlink(missing_ok=True)
+        os.close(handle)
 
 
 def lock_file(path: Path) -> Path:

@@ -16,10 +16,10 @@ from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order, possible_times
 from vidtrack.radar.coordinates import wrap
-from vidtrack.radar.feeds.messages import NAN, Kind, Message, Messages
-from vidtrack.radar.feeds.pace import Turns, pace_of
+from vidtrack.radar.feeds.messages import Kind, Message, Messages
+from vidtrack.radar.feeds.pace import ONE_BY_ONE, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import closed_up, longest_step
+from vidtrack.radar.rhythm import closed_up, longest_step, set_back
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -28,8 +28,6 @@ MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
 KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
 
 
-ONE_BY_ONE = 0.9
-"""Share of plots with their own time from which scans are looked for in turns of the antenna."""
 EVENLY = 0.1
 """Usual steps; how far a step may be from a multiple of the usual one to count as such."""
 
@@ -79,12 +77,13 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     """Read a CSV or Parquet table of plots.
 
     Rows may come in any order. Without a column `scan`, plots of the same time are one scan, or, if nearly each has its
-    own time, those of one turn of the antenna. Standard deviations come from columns, else from the settings.
+    own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set:
+    time goes on. Standard deviations come from columns, else from the settings.
     Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
     rows. With settings.skip_bad_rows bad rows are left out with a warning.
     """
     settings = settings or RadarSettings()
-    table = _numbered(read_table(Path(path), KNOWN))
+    table = _numbered(read_table(Path(path), KNOWN), settings.position[:2])
     measured = _measured(table)
     _hint_at_misspelt(table)
     sigma = {name: _sigma(table, name, settings) for name in measured}
@@ -99,8 +98,10 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     return _sorted(table, measured, sigma)
 
 
-def _numbered(table: Table) -> Table:
+def _numbered(table: Table, place: tuple[float, float]) -> Table:
     """The table with a column of scans: those of its times, if it has none and no other column may be meant.
+
+    place  x and y of the radar [m]
 
     A gap of several usual steps between two times holds empty scans, and a pause none.
     """
@@ -108,14 +109,16 @@ def _numbered(table: Table) -> Table:
     similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
     if scan in table.names or time not in table.columns or similar:
         return table
+    table = _on_one_clock(table)
     time_s = possible_times(table.columns[time])
     times, member = np.unique(time_s, return_inverse=True)
     steps = np.diff(times[np.isfinite(times)])
     usual = float(np.median(steps)) if len(steps) else 1.0
-    if _one_by_one(steps, len(member)):
-        turned = _turned(table, time_s)
-        if turned is not None:
-            return replace(table, columns=table.columns | {scan: turned})
+    one_by_one = _one_by_one(steps, len(member))
+    turned = _turned(table, time_s, place, 0.0 if one_by_one else _coarse(steps))
+    if turned is not None:
+        return replace(table, columns=table.columns | {scan: turned})
+    if one_by_one:
         _log.warning(
             "%s has no column 'scan', and nearly every plot its own time: give the plots of one turn the same scan",
             table.path,
@@ -130,6 +133,34 @@ def _numbered(table: Table) -> Table:
     return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
 
 
+def _on_one_clock(table: Table) -> Table:
+    """The table with times that go on where its clock was set back; rows in another order than of arrival stay so."""
+    name = TIME[1]
+    rows = np.flatnonzero(np.isfinite(possible_times(table.columns[name])))
+    time_s = table.columns[name][rows]
+    back = set_back(time_s)
+    if not len(back) or _grouped(table, rows[back]):
+        return table
+    step_s = np.diff(time_s)
+    offset = np.zeros(len(table.line))
+    for k in back.tolist():
+        offset[rows[k] :] += np.median(step_s[step_s > 0]) - step_s[k - 1]
+    first, others = back[0], f", the first of {len(back)} such steps" if len(back) > 1 else ""
+    _log.warning(
+        "%s: time_s goes back from %.10g to %.10g s at %s %d%s, as if the clock was set: time goes on there; if the "
+        "rows are only out of order, sort them by time_s",
+        table.path, time_s[first - 1], time_s[first], table.unit, table.line[rows[first]], others,
+    )  # fmt: skip
+    return replace(table, columns=table.columns | {name: table.columns[name] + offset})
+
+
+def _grouped(table: Table, back: Ints) -> bool:
+    """Whether rows are in order of another column, as a sensor or target, which changes where their time goes back."""
+    measured = {TIME[1], *MEASURED}
+    changes = (table.changes(name) for name in table.names if name not in measured)
+    return any(bool(new[back].all()) and new.sum() <= 2 * len(back) for new in changes)
+
+
 def _one_by_one(steps: Floats, plots: int) -> bool:
     """Whether nearly each of the plots has its own time, with steps (N,) that are not multiples of the usual one."""
     if len(steps) < 2 or len(steps) < ONE_BY_ONE * plots:
@@ -138,22 +169,34 @@ def _one_by_one(steps: Floats, plots: int) -> bool:
     return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
 
 
-def _turned(table: Table, time_s: Floats) -> Floats | None:
-    """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times; None: they follow no antenna."""
-    azimuth = table.columns.get(POLAR[1])
-    if azimuth is None:
+def _coarse(steps: Floats) -> float:
+    """The step [s] of times that several plots share, by steps (N,) between different times: nearly the shortest."""
+    return float(np.quantile(steps, 0.1)) if len(steps) else np.inf
+
+
+def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
+    """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times in steps of coarse_s.
+
+    None: they follow no antenna.
+    """
+    found = _polar(table, place)
+    if found is None:
         return None
-    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(azimuth))
+    range_m, azimuth = found
+    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(range_m) & np.isfinite(azimuth))
     if len(rows) < 2:
         return None
     rows = rows[np.argsort(time_s[rows], kind="stable")]
-    polar = (
-        Message(Kind.POLAR, 0, 0, t, NAN, a)
-        for t, a in zip(time_s[rows].tolist(), np.radians(azimuth[rows]).tolist(), strict=True)
-    )
+    polar = (Message(Kind.POLAR, 0, 0, *one) for one in zip(time_s[rows], range_m[rows], azimuth[rows], strict=True))
     plots = Messages.of(list(polar))
-    pace = pace_of(plots, None)
+    pace = pace_of(plots, None, coarse_s)
     if not isinstance(pace, Turns):
+        short_s = turn_within(plots, coarse_s) if 0 < coarse_s < np.inf else None
+        if short_s is not None:
+            _log.warning(
+                "%s: azimuths follow an antenna with turns of %.3g s, but times are in steps of %.3g s, too coarse to "
+                "tell its turns: give a column 'scan', or finer times", table.path, short_s, coarse_s,
+            )  # fmt: skip
         return None
     turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
     scan = np.zeros(len(time_s))
@@ -163,6 +206,18 @@ def _turned(table: Table, time_s: Floats) -> Floats | None:
         table.path, scan.max() + 1, pace.period_s,
     )  # fmt: skip
     return scan
+
+
+def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:
+    """Range [m] and azimuth [rad] (N,) of each row from a radar at (x, y) [m]; None without the columns for them."""
+    for names in (POLAR[:2], CARTESIAN[:2]):
+        if set(names) <= table.columns.keys():
+            first, second = (table.columns[name] for name in names)
+            if names == POLAR[:2]:
+                return first, np.radians(second)
+            east, north = first - place[0], second - place[1]
+            return np.hypot(east, north), np.arctan2(east, north)
+    return None
 
 
 def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:

@@ -15,6 +15,9 @@ from vidtrack.radar.rhythm import rhythm
 
 _log = logging.getLogger(__name__)
 
+SLOWEST_S = 600.0
+"""s; scans of a table that are farther apart have times in another unit."""
+
 
 def read(path: str | Path, settings: RadarSettings) -> Plots:
     """The plots of a table (CSV, Parquet) or a recording (ASTERIX, NMEA, AIS).
@@ -29,12 +32,15 @@ def read(path: str | Path, settings: RadarSettings) -> Plots:
 def read_any(path: str | Path, settings: RadarSettings, known: Collection[Code] = ()) -> Plots:
     """The same, whatever is set for recordings; `known` as in `read_recording`.
 
-    A warning says when the time jumps so far that all tracks end.
+    A warning says when the time jumps so far that all tracks end, and if a table's times seem to be no seconds.
 
     Raises the errors of `read_plots` and `read_recording`.
     """
-    plots = read_recording(path, settings, known) if is_feed(path) else read_plots(path, settings)
+    recorded = is_feed(path)
+    plots = read_recording(path, settings, known) if recorded else read_plots(path, settings)
     pauses = rhythm(plots.scan, plots.time_s)
+    if not recorded and pauses.scan_s > SLOWEST_S:
+        _log.warning("%s: scans are %.6g s apart: is time_s in seconds, not in milliseconds?", path, pauses.scan_s)
     for begin_s, end_s in zip(pauses.begin_s[:1], pauses.end_s[:1], strict=True):
         others = f", the first of {len(pauses.end_s)} such jumps" if len(pauses.end_s) > 1 else ""
         _log.warning(

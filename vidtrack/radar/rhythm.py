@@ -1,7 +1,8 @@
-"""How regularly scans follow each other: the time of a scan, and pauses that no track outlives."""
+"""How regularly scans follow each other: their time, pauses that no track outlives, and clocks that are set back."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,13 @@ USUAL = 4
 """Medians of the steps; longer ones tell nothing of the time of a scan."""
 PAUSE_S, PAUSE_SCANS = 3600.0, 100
 """A step from one scan to the next that is longer than both, the second in usual steps, is a pause."""
+
+LATE_S = 5.0
+"""s; a row of a table that is later in it by more than this is out of order, or its clock was set back."""
+FEW = 3
+"""Steps back in a table in order of arrival; with more of them its rows are in another order."""
+AGREED, KEPT = 3, 10
+"""Rows before a clock was set back, and rows after it, that agree about it."""
 
 
 class Rhythm(NamedTuple):
@@ -50,6 +58,26 @@ def closed_up(scan: Ints, time_s: Floats) -> Ints:
     scans, step_s = np.diff(number), np.diff(mean_s)
     idle = np.where(step_s > longest_step(step_s / scans), scans - 1, 0)
     return np.asarray(scan - np.concatenate([[0], np.cumsum(idle)])[member])
+
+
+def set_back(time_s: Floats) -> Ints:
+    """The rows (K,) at which a clock was set back, by times (N,) in the order of rows.
+
+    None if there are more than FEW steps back of over LATE_S: then the rows are in another order than that of arrival.
+    A row that comes late, or has a wrong time, is none, nor are rows whose times catch up at once.
+    """
+    back = (np.flatnonzero(np.diff(time_s) < -LATE_S) + 1).tolist()
+    if len(back) > FEW:
+        return np.zeros(0, np.int64)
+    return np.array([k for k, end in pairwise([*back, len(time_s)]) if _stays_back(time_s, k, end)], np.int64)
+
+
+def _stays_back(time_s: Floats, row: int, end: int) -> bool:
+    """Whether the clock is behind that of the rows before from a row on, up to `end`."""
+    before_s = time_s[max(0, row - AGREED) : row].min()
+    ahead = time_s[row:end] >= before_s
+    kept = time_s[row : row + int(ahead.argmax()) if ahead.any() else end]
+    return len(kept) >= KEPT and len(np.unique(kept)) >= AGREED
 
 
 def longest_step(step_s: Floats) -> float:

@@ -16,6 +16,13 @@ import pyarrow.parquet
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import PlotFormatError, SourceError
 
+WIDE = ("utf-32-le", "utf-32-be", "utf-16-le", "utf-16-be")
+"""Encodings of text that are named, since they are not read."""
+PLAIN = 0.9
+"""Share of characters of a table or of NMEA that are ASCII."""
+LOOKED_AT = 4096
+"""Octets from which an encoding is told."""
+
 Faults = dict[int, str]
 """Fault by line of the file; the first fault of a line is kept."""
 
@@ -27,7 +34,7 @@ SHOWN = 5
 class Table:
     """A file's columns as numbers, NaN for cells that are not numbers.
 
-    names   of all columns in the file; `columns` has the wanted ones
+    cells   all columns as they are in the file; `columns` has the wanted ones
     line    (N,) line of each row: the header of a CSV is line 1, blank lines do not count; rows of a Parquet file
             count from 1
     unit    what `line` counts: "line" or "row"
@@ -35,11 +42,25 @@ class Table:
     """
 
     path: Path
-    names: list[str]
+    cells: pa.Table
     columns: dict[str, Floats]
     line: Ints
     unit: str
     faults: Faults
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all columns in the file."""
+        return self.cells.column_names
+
+    def changes(self, name: str) -> Mask:
+        """(N,) rows whose cell in a column is another than that of the row before."""
+        column = self.cells[name]
+        try:
+            same = pa.compute.equal(column[1:], column[:-1]).fill_null(False)
+        except pa.ArrowNotImplementedError:  # cells that cannot be compared
+            return np.arange(len(column)) > 0
+        return np.concatenate([[False], ~same.to_numpy()])
 
     def refuse(self, bad: Mask, name: str, rule: str) -> None:
         """Add a fault for the rows of a mask (N,) whose value in column `name` breaks a rule."""
@@ -67,10 +88,14 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     """
     try:
         with path.open("rb") as file:
-            parquet = file.read(4) == b"PAR1"
+            beginning = file.read(LOOKED_AT)
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
+    wide = _wide(beginning)
+    if wide is not None:
+        raise PlotFormatError(f"{path} is text in {wide.upper()[:6]}; save it in UTF-8")
     faults: Faults = {}
+    parquet = beginning.startswith(b"PAR1")
     unit = "row" if parquet else "line"
     try:
         table = pyarrow.parquet.read_table(path) if parquet else _read_csv(path, faults)
@@ -88,7 +113,18 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
         )
     line = np.arange(1, len(table) + 1) if parquet else _lines(len(table), list(faults))
     columns = {name: _numbers(table[name], name, line, faults) for name in wanted if name in table.column_names}
-    return Table(path, table.column_names, columns, line, unit, faults)
+    return Table(path, table, columns, line, unit, faults)
+
+
+def _wide(beginning: bytes) -> str | None:
+    """The encoding of text in characters of two or four octets, with or without a byte order mark; None: it is none."""
+    whole = beginning[: len(beginning) // 4 * 4]
+    for encoding in WIDE if b"\0" in whole else ():
+        text = whole.decode(encoding, errors="replace")
+        plain = sum(one.isascii() and (one.isprintable() or one.isspace()) for one in text)
+        if plain > PLAIN * len(text):
+            return encoding
+    return None
 
 
 def nearest(wanted: str, names: Iterable[str]) -> str:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import heapq
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any
+
+import numpy as np
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
@@ -35,6 +38,8 @@ from vidtrack.traffic.road_scans import InPicture, RoadScans
 from vidtrack.traffic.site import read_site
 from vidtrack.video.resources import frame_by_frame
 from vidtrack.video.source import open_source
+
+_log = logging.getLogger(__name__)
 
 ROAD: Mapping[str, Any] = {
     "radar": {"estimator": "kalman", "max_speed": 40.0, "accel": 2.0, "hold_s": 2.0, "coast_scans": 40,
@@ -85,6 +90,11 @@ def _pipeline(
     network = Network(read_feeds(paths, radars, settings.radar))
     with open_camera(video, site, settings) as camera:
         tracker = build_road_tracker(settings, network.feeds, camera, explain=extras.explain, seed=seed)
+        if not have_common_place(network.feeds, camera.coverage):
+            _log.warning(
+                "no plot of a radar is where the camera shows the road, so no track is of both: are the places in %s "
+                "in the metres of %s, and the directions right?", radars.path, site,
+            )  # fmt: skip
 
         def reading() -> dict[str, object]:
             names = [*(feed.placed.name for feed in network.feeds), "camera"]
@@ -98,7 +108,7 @@ def _pipeline(
             name=Path(video).stem,
             place=Path(video),
             count=None,
-            steps=road_steps(network, camera, tracker),
+            steps=told_if_apart(road_steps(network, camera, tracker), len(network.feeds)),
             summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
             sinks=lambda folder: radar_sinks(
                 settings, extras, 2, [feed.placed.xyz[:2] for feed in network.feeds], folder
@@ -122,6 +132,25 @@ def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
         look_ahead(source, detector, settings)
         steps = video_steps(source, detector, build_blob_tracker(settings.tracker, size), settings)
         yield Camera(steps, RoadScans(ground, size), InPicture(ground, size))
+
+
+def have_common_place(feeds: Sequence[Feed], coverage: InPicture) -> bool:
+    """Whether any plot is in the picture."""
+    return any(coverage.share(feed.xy, np.zeros_like(feed.xy)).any() for feed in feeds)
+
+
+def told_if_apart(steps: Iterable[Step], radars: int) -> Iterator[Step]:
+    """The steps of so many radars, then a camera; after the last a warning, if they have no common time."""
+    first, last = np.full(2, np.inf), np.full(2, -np.inf)  # of radars, and of the camera
+    for step in steps:
+        kind = int(step.scan.station >= radars)
+        first[kind], last[kind] = min(first[kind], step.time_s), max(last[kind], step.time_s)
+        yield step
+    if first.max() > last.min() and np.isfinite(last).all():
+        _log.warning(
+            "the radar and the camera have no common time (scans %.10g to %.10g s, pictures %.10g to %.10g s), so no "
+            "track is of both: times of plots count from the first picture", first[0], last[0], first[1], last[1],
+        )  # fmt: skip
 
 
 def build_road_tracker(

@@ -26,7 +26,7 @@ from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.tracker import Tracker
-from vidtrack.tracks import TENTATIVE, Tracks
+from vidtrack.tracks import TENTATIVE, Status, Tracks
 from vidtrack.traffic.metres import footprints_of
 from vidtrack.traffic.site import read_site
 from vidtrack.video import background
@@ -88,8 +88,11 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
 
 def _stand(road: Footprints, tracks: Tracks) -> Stand:
     """Where the tracks, in pixels of the scene, stand on the road."""
+    from vidtrack.traffic.footprint import partly_hidden
+
     plane = [*tracks.position, *tracks.velocity]
-    return road.place(tracks.id, tracks.xy, tracks.v, tracks.P[:, plane][:, :, plane], tracks.box)
+    hidden = partly_hidden(np.full(len(tracks), tracks.t), tracks.box, tracks.status == Status.MERGED)
+    return road.place(tracks.id, tracks.xy, tracks.v, tracks.P[:, plane][:, :, plane], tracks.box, hidden=hidden)
 
 
 @contextmanager

@@ -36,6 +36,13 @@ _WIDEST_M = 2.55
 """m; the widest vehicles on European roads (Directive 96/53/EC)"""
 _EDGE_PX = 1.0
 """px; standard deviation of an edge of a box"""
+_HIDDEN_SHARE = 0.12
+"""Standard deviation of the edges of a box that may not be the whole vehicle's, in sides of the box: set on simulated
+roads."""
+_APART_PX = 3.0
+"""px; boxes that are farther apart hide nothing of each other"""
+_OUTLINE_M = 0.3
+"""m; standard deviation of a length because the outline of a blob is no footprint's: set on simulated roads"""
 _ROUNDS = 3
 _SILHOUETTE = 0.02
 """Standard deviation of speeds, as a share, because a centroid is of a silhouette and not one point of the vehicle:
@@ -61,7 +68,7 @@ class Stand:
     xy, xy_own, xy_shared   (N, 2), (N, 2, 2), (N, 2, 8) position [m]
     v, v_own, v_shared      (N, 2), (N, 2, 2), (N, 2, 8) velocity [m/s]
     heading                 (N,) of the vehicle, radians clockwise from north; of one that stands, the last one known
-    length, length_sigma    (N,) m; NaN without a heading
+    length, length_sigma    (N,) m; NaN without a heading; of one that is partly hidden, those of its track so far
     width                   (N,) m; taken from the length
     kind                    (N,) class by all lengths of the track so far; "" before there is one
     """
@@ -126,7 +133,16 @@ class Footprints:
         self._heading: dict[int, Floats] = {}
         self._pace = Pace()
 
-    def place(self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats, seen: Seen | None = None) -> Stand:
+    def place(
+        self,
+        track: Ints,
+        xy: Floats,
+        u: Floats,
+        P: Floats,
+        box: Floats,
+        seen: Seen | None = None,
+        hidden: Mask | None = None,
+    ) -> Stand:
         """The vehicles of N rows.
 
         track  (N,) identities
@@ -134,14 +150,16 @@ class Footprints:
         P      (N, 4, 4) covariance of (x, y, their velocities)
         box    (N, 4) left, top, width, height [px]
         seen   what was seen of them; None: velocities follow from u alone
+        hidden (N,) whose boxes may not be those of the whole vehicle, see `partly_hidden`; None: nobody's
         """
+        hidden = np.zeros(len(track), bool) if hidden is None else hidden
         box = np.where(self._cut(box)[:, None], np.nan, box)
         with np.errstate(invalid="ignore"):
             paced = None if seen is None else self._paced(track, seen)
             headings = self._headings(track, xy, u, P, box, paced)
-            stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2])
+            stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2], hidden)
             stand = stand if paced is None else self._at_pace(stand, *paced)
-            return replace(stand, kind=self._naming.named(track, stand.length, stand.length_sigma, stand.speed))
+            return self._named(track, stand, hidden)
 
     def _paced(self, track: Ints, seen: Seen) -> tuple[Floats, Floats]:
         """(N, 2) velocities that were filtered on the road, and (N, 2, 2) their covariances."""
@@ -163,7 +181,20 @@ class Footprints:
             v_shared=np.where(better[:, None, None], shared, stand.v_shared),
         )
 
-    def _stand(self, xy: Floats, u: Floats, P: Floats, box: Floats, e: Floats, e_sigma: Floats) -> Stand:
+    def _named(self, track: Ints, stand: Stand, hidden: Mask) -> Stand:
+        """The same with classes; who is partly hidden has the length of its track so far, and adds nothing to it."""
+        length = np.where(hidden, np.nan, stand.length)
+        kind, mean, sigma = self._naming.named(track, length, stand.length_sigma, stand.speed)
+        hidden = hidden & np.isfinite(stand.length)
+        return replace(
+            stand,
+            length=np.where(hidden, mean, stand.length),
+            length_sigma=np.where(hidden, sigma, stand.length_sigma),
+            width=np.where(hidden, np.minimum(_SLENDER * mean, _WIDEST_M), stand.width),
+            kind=kind,
+        )
+
+    def _stand(self, xy: Floats, u: Floats, P: Floats, box: Floats, e: Floats, e_sigma: Floats, hidden: Mask) -> Stand:
         ground = self.ground
         middle, sides = footprint(ground, box, e, _SLENDER)
         middle = ground.inside(middle)
@@ -175,7 +206,8 @@ class Footprints:
         length_errors = [(wide[0][1] - wide[1][1]) / 2, (turned[0][1] - turned[1][1]) / 2, stretched[1] - sides]
         foot = np.column_stack([middle[:, 0], box[:, 1] + box[:, 3] - 0.5])
         by_heading = np.where(np.isnan(e), _ANY_WAY_SIGMA * (foot - middle), (turned[0][0] - turned[1][0]) / 2)
-        edges = _EDGE_PX**2 * np.eye(2)
+        unseen = np.where(hidden[:, None], _HIDDEN_SHARE * box[:, 2:], 0.0)
+        edges = (_EDGE_PX**2 + unseen[:, :, None] ** 2) * np.eye(2)
         for error in (by_shape, by_heading):
             edges = edges + error[:, :, None] * error[:, None, :]
         position = ground.metres(middle)
@@ -197,7 +229,7 @@ class Footprints:
             v_shared=shared[:, 2:],
             heading=np.where(np.isnan(middle[:, 0]), np.nan, np.arctan2(e[:, 0], e[:, 1])),
             length=sides[:, 0],
-            length_sigma=np.linalg.norm(length_errors, axis=0)[:, 0],
+            length_sigma=np.hypot(np.linalg.norm(length_errors, axis=0)[:, 0], _OUTLINE_M),
             width=sides[:, 1],
             kind=np.full(len(xy), ""),
         )
@@ -243,6 +275,22 @@ def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
     near = _NEAR * size[0]
     inside = np.hstack([edge[:, :2] > near, edge[:, 2:] < np.array(size) - near])
     return np.asarray(np.where(inside, edge, np.nan))
+
+
+def partly_hidden(t: Floats, box: Floats, merged: Mask) -> Mask:
+    """(N,) whether the box of a row may not be that of its whole vehicle, and of it alone.
+
+    It shares its blob, merged (N,), or touches a box of the same time t (N,) that reaches farther down in the picture:
+    that vehicle is nearer to the camera and may hide a part of this one. box (N, 4) left, top, width, height [px]
+    """
+    hidden = merged.copy()
+    order = np.argsort(t, kind="stable")
+    low, high = box[:, :2] - _APART_PX / 2, box[:, :2] + box[:, 2:] + _APART_PX / 2
+    for rows in np.split(order, np.flatnonzero(np.diff(t[order])) + 1):
+        touch = (low[rows, None] < high[rows]).all(axis=2)
+        nearer = high[rows, 1] > high[rows, None, 1]
+        hidden[rows] |= (touch & touch.T & nearer).any(axis=1)
+    return hidden
 
 
 def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[Floats, Floats]:

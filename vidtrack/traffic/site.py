@@ -219,6 +219,11 @@ class Site(Group):
         """The legs in order of their gates; a gate without one is a leg by itself."""
         return tuple(dict.fromkeys(gate.leg or name for name, gate in self.gates.items()))
 
+    def legs_with(self, role: Literal["entry", "exit"]) -> tuple[str, ...]:
+        """The legs that have a gate of this role, or one of both roles, in the same order."""
+        gates = [(gate.leg or name, gate.role) for name, gate in self.gates.items()]
+        return tuple(leg for leg in self.legs if not {(leg, role), (leg, "both")}.isdisjoint(gates))
+
     @property
     def center(self) -> Point:
         """Where the optical axis meets the picture [px]."""

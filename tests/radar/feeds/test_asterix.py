@@ -166,6 +166,20 @@ def test_a_second_feed_that_is_late_is_no_clock_that_was_set_back(tmp_path, behi
     assert plots.time_s[-1] == pytest.approx(seconds(recorded(tmp_path, *blocks)).time_s[-1])
 
 
+@pytest.mark.parametrize(("turn_s", "told"), [(60.0, False), (300.0, True)])
+def test_turns_that_nothing_tells_are_asked_for(tmp_path, caplog, turn_s, told):
+    rng = np.random.default_rng(0)
+    turns = np.sort(rng.uniform(0, 12, 240))
+    places = zip(turns, rng.uniform(2e3, 6e4, 240), strict=True)
+    plots = [block(plot(20000 + turn_s * t, range_m, 360 * t % 360)) for t, range_m in places]
+    path = recorded(tmp_path, *plots)
+    assert (len(np.unique(read(path, RadarSettings()).scan)) == 12) is not told
+    assert ("set radar.scan_s" in caplog.text) is told
+    caplog.clear()
+    assert len(np.unique(read(path, RadarSettings(scan_s=turn_s)).scan)) == 12
+    assert "set radar.scan_s" not in caplog.text
+
+
 def test_several_radars_are_refused_until_one_is_chosen(tmp_path):
     blocks = [
         block(plot(4 * k, 20000 + 1000 * n, 1.0, radar)) for k in range(4) for n, radar in enumerate([RADAR, OTHER])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import Rounds, Turns, pace_of
+from vidtrack.radar.feeds.pace import Rounds, Turns, is_unknown, pace_of
 
 TURN_S = 4.7
 
@@ -48,6 +48,37 @@ def test_every_message_is_in_the_turn_that_saw_it(how):
     assert isinstance(pace, Turns)
     assert pace.period_s == pytest.approx(TURN_S, rel=0.02)
     assert (scan == np.array(turn) - turn[0]).all()
+
+
+@pytest.mark.parametrize("turn_s", [15.0, 25.0, 60.0, 85.0])
+def test_slow_turns_are_found_from_azimuths_and_times(turn_s):
+    messages, turn = swept(np.random.default_rng(1), marks=())
+    messages.time_s[:] *= turn_s / TURN_S
+    messages.u[:] = np.random.default_rng(2).uniform(2e3, 6e4, len(messages))
+    pace, scan = scans(messages)
+    assert pace.period_s == pytest.approx(turn_s, rel=0.02)
+    assert (scan == np.array(turn) - turn[0]).all()
+
+
+@pytest.mark.parametrize("turns", [0.4, 1.0, 4.0])
+def test_a_target_round_the_radar_is_no_slow_antenna(turns):
+    rng = np.random.default_rng(3)
+    part = np.sort(rng.uniform(0, turns, 200))
+    found = [Message(Kind.POLAR, 0, 48, 60 * one, 300 + rng.normal(0, 3), 2 * np.pi * one) for one in part]
+    pace, _ = scans(Messages.of(found))
+    assert isinstance(pace, Rounds)
+    assert is_unknown(pace, Messages.of(found))
+
+
+@pytest.mark.parametrize("coarse_s", [0.1, 1.0, 2.0])
+def test_turns_are_found_where_several_plots_share_a_rounded_time(coarse_s):
+    messages, turn = swept(np.random.default_rng(1), marks=())
+    messages.u[:] = np.random.default_rng(2).uniform(2e3, 6e4, len(messages))
+    messages.time_s[:] = np.floor(messages.time_s / coarse_s) * coarse_s
+    pace = pace_of(messages, None, coarse_s)
+    scan = np.floor(pace.progress(messages)).astype(int)
+    assert isinstance(pace, Turns)
+    assert (scan - scan[0] == np.array(turn) - turn[0]).all()
 
 
 def test_scattered_azimuths_do_not_turn_the_antenna():

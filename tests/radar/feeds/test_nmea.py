@@ -132,6 +132,16 @@ def test_what_stands_between_the_sentences_is_no_damage():
     assert not losses.damaged
 
 
+def test_what_is_tracked_of_several_kinds_is_told_by_kind(tmp_path, caplog):
+    lines = []
+    for second in range(40):
+        lines.append(sentence(f"RATTM,01,2.00,90.0,T,0,0,T,0,0,N,A,T,,1200{second:02}.00,A"))
+        lines.append(sentence(f"RATLL,02,4712.34,N,01234.56,E,B,1200{second:02}.00,T,"))
+    (tmp_path / "a.nmea").write_text("".join(lines))
+    read(tmp_path / "a.nmea", RadarSettings())
+    assert "tracked are 40 plots of NMEA; not 40 positions of NMEA" in caplog.text
+
+
 def test_hostile_text_never_crashes():
     rng = np.random.default_rng(0)
     good = (sentence("RATTM,03,2.5,270.0,T,10.0,90.0,T,0.1,5.0,N,A,T,,123519.5,A") + ais(5, lat=1, lon=1)).encode()

@@ -138,7 +138,7 @@ def test_what_is_not_wanted_is_forgotten_after_a_minute(blocks, monkeypatch, cap
         assert not list(stream.over())
         assert len(stream._heard) <= KEPT_S + 1
     assert [one for one in caplog.messages if "for 60 s" in one] == [
-        "feed: for 60 s there were no plots of the radar with this sac and sic; it has 62 of CAT 048 from 25/201"
+        "feed: for 60 s there were no plots of the radar with this sac and sic; it has 62 plots of CAT 048 from 25/201"
     ]
     scans = []
     for payload in blocks:
@@ -238,7 +238,7 @@ def test_a_feed_of_another_radar_is_said_to_be_one(tmp_path, blocks, monkeypatch
     asked = iter([False, True])
     with (
         pytest.raises(
-            SourceError, match="there were no plots of the radar with this sac and sic; it has 70 of CAT 048"
+            SourceError, match="there were no plots of the radar with this sac and sic; it has 70 plots of CAT 048"
         ),
         run_feed(f"udp://127.0.0.1:{free_port()}", settings, lambda: next(asked), tmp_path / "run") as run,
     ):

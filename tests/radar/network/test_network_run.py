@@ -263,6 +263,61 @@ def test_two_radars_at_one_place_are_two(biased, later_s):
     assert [feed.placed.name for feed in south_again(biased, independent)] == ["south", "again"]
 
 
+def in_cells(folder, detected, moved_m):
+    """Two radars at one place that see one target in cells of 150 m and 1.5 degrees, which moves by so much a scan."""
+    rng = np.random.default_rng(4)
+    for name in ("one", "other"):
+        seen = np.flatnonzero(rng.random(60) < detected)
+        rows = [f"{k},{4 * k},{(10000 + moved_m * k) // 150 * 150},45,50,0.5" for k in seen]
+        header = "scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg"
+        (folder / f"{name}.csv").write_text("\n".join([header, *rows]) + "\n")
+    (folder / "cells.toml").write_text("".join(f"[radars.{name}]\nx_m = 0\ny_m = 0\n" for name in ("one", "other")))
+    paths = [str(folder / f"{name}.csv") for name in ("one", "other")]
+    return read_feeds(paths, read_radars(folder / "cells.toml"), load().radar)
+
+
+@pytest.mark.parametrize("detected", [1.0, 0.9, 0.6])
+def test_one_target_that_stands_in_a_cell_does_not_make_two_radars_one(tmp_path, detected):
+    assert len(in_cells(tmp_path, detected, 0.0)) == 2
+
+
+def test_a_target_that_moves_from_cell_to_cell_tells_that_two_radars_are_one(tmp_path):
+    with pytest.raises(vt.ConfigError, match="same plots"):
+        in_cells(tmp_path, 1.0, 200.0)
+
+
+def placed(folder, begins_s, places_m):
+    """Feeds of radars 'a', 'b', ..., from so many seconds on, at so many metres east, up to 30 km, with 10 plots."""
+    names = "abc"[: len(begins_s)]
+    for n, (name, begin) in enumerate(zip(names, begins_s, strict=True)):
+        rows = [f"{k},{begin + 4 * k},{10000 + 500 * k + n},{30 * k + n},50,0.5" for k in range(10)]
+        header = "scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg"
+        (folder / f"{name}.csv").write_text("\n".join([header, *rows]) + "\n")
+    toml = "".join(
+        f"[radars.{name}]\nx_m = {x}\ny_m = 0\nfarthest_m = 30000\n" for name, x in zip(names, places_m, strict=True)
+    )
+    (folder / "placed.toml").write_text(toml)
+    return read_feeds([str(folder / f"{n}.csv") for n in names], read_radars(folder / "placed.toml"), load().radar)
+
+
+@pytest.mark.parametrize(
+    ("begins_s", "places_m", "said"),
+    [
+        ((0, 10), (0, 20000), ""),
+        ((0, 30, 60), (0, 0, 0), ""),  # each meets the next
+        ((0, 0, 0), (0, 35000, 70000), ""),
+        ((0, 5000), (0, 20000), "radars 'a', 'b' with no time in common with another radar (a has 0 to 36 s; b"),
+        ((0, 5000, 10), (0, 20000, 0), "radar 'b' with no time in common"),
+        ((0, 10), (0, 200000), "radars 'a', 'b' with no place in common"),
+        ((0, 10, 0), (0, 0, 200000), "radar 'c' with no place in common"),
+    ],
+)
+def test_radars_that_never_meet_are_named(tmp_path, caplog, begins_s, places_m, said):
+    placed(tmp_path, begins_s, places_m)
+    assert len(caplog.messages) == (said != "")
+    assert said in caplog.text
+
+
 def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):
     (sites / "one.toml").write_text("[radars.a]\nx_m = 0\ny_m = 0\nsac = 25\nsic = 201\n")
     with pytest.raises(vt.ConfigError, match="no radar with sac = 25 and sic = 202"):

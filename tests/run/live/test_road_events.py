@@ -10,6 +10,7 @@ from drawn_runs import CALIBRATED, FPS, SIZE, along, site, write_run
 from vidtrack.run.live import road_events
 from vidtrack.run.live.road_events import RoadEvents
 from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.measures.rows import LiveReader
 
 GAP_S = 0.6
 SITE = """[site]
@@ -42,9 +43,9 @@ def rows(tmp_path):
 
 def told_in(events, rows, times):
     """Time of the picture, and content, of each conflict that is told while pictures are taken at these times."""
-    told = []
+    told, reader = [], LiveReader(calibrated(site(CALIBRATED)))
     for time_s in times:
-        new = rows.filter(np.abs(rows["time_s"].to_numpy() - time_s) < 1e-6)
+        new = reader.read(rows.filter(np.abs(rows["time_s"].to_numpy() - time_s) < 1e-6))
         told += [(time_s, content) for _, content in events.conflicts([SimpleNamespace(time_s=time_s)], new)]
     return told
 

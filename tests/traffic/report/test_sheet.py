@@ -38,6 +38,16 @@ def test_counts_are_where_they_were_made(tmp_path):
     assert got.of_leg("west").tolist() == [0, 7, 1]
 
 
+def test_what_nobody_drove_is_zero_though_the_site_does_not_say_what_it_allows(tmp_path):
+    folder = write_day(tmp_path / "day", [4, 0, 5], [1, 0, 1])
+    site = folder / "site.toml"
+    site.write_text(site.read_text().partition("[movements]")[0])
+    _, got = sheet(folder)
+    assert {(one.start, one.end) for one in got.movements} == set(MOVEMENTS)
+    west = [one.start == "west" for one in got.movements]
+    np.testing.assert_array_equal(got.count[:, west], [[0] * 3, [np.nan] * 3, [0] * 3])
+
+
 def test_a_trip_without_an_exit_is_in_no_movement(tmp_path):
     _, got = sheet(write_day(tmp_path / "day", [[5, 2]], legs=[("north", "south"), ("north", None)]))
     assert got.total.tolist() == [5]

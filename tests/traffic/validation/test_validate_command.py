@@ -65,6 +65,17 @@ def test_and_from_the_intervals(folder, capsys):
     assert json.loads(capsys.readouterr().out)["gates"]["west"]["missed"] == 1
 
 
+def test_measures_of_a_site_without_start_are_compared_by_seconds_or_the_user_is_told_to_give_one(folder, capsys):
+    table = folder / "measures" / "crossings.csv"
+    table.write_text("time_s,utc,gate,direction,track_id\n1.0,,north,up,1\n2.0,,north,down,2\n")
+    (folder / "manual.csv").write_text("time_s,utc,gate,direction\n1.2,,north,up\n")
+    validate(folder / "measures", folder / "manual.csv", "--json", "-")
+    assert json.loads(capsys.readouterr().out)["pooled"]["hit"] == 1
+    (folder / "manual.csv").write_text("utc,gate,direction\n2026-06-01T07:00:01+02:00,north,up\n")
+    with pytest.raises(Error, match=r"manual.csv has times of day, .* give \[site\] the time of the first picture"):
+        validate(folder / "measures", folder / "manual.csv")
+
+
 @pytest.mark.parametrize(
     ("manual", "measures", "code", "words"),
     [

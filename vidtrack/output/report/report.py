@@ -69,8 +69,8 @@ def _why_no_peak(found: Findings) -> str:
 
 def _missing(page: Page, gone: str) -> dict[str, str]:
     """Why pictures are not there, by name; `gone`: why there are no paths."""
-    no_movement = "" if page.sheet.movements else "there is no whole trip from an entry gate to an exit gate"
-    no_entry = "" if page.legs else "no vehicle passed an entry gate"
+    no_movement = "" if page.sheet.movements else "the site has no entry gate with an exit gate on another leg"
+    no_entry = "" if page.legs else "the site has no entry gate"
     no_metres = "" if page.found.metres else "without a calibration nobody knows whether a vehicle stands"
     no_speed = "no speed was measured: without a calibration only sections with a length give speeds"
     ways = None if page.paths is None else page.paths.ways

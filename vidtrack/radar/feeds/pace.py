@@ -11,8 +11,14 @@ from vidtrack.arrays.types import Floats
 from vidtrack.radar.feeds.clock import JUMP_S, Clock
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses, Messages
 
-FASTEST_S, SLOWEST_S = 0.4, 20.0
-"""s; durations of a turn that are looked for."""
+FASTEST_S, USUAL_S, SLOWEST_S = 0.4, 20.0, 90.0
+"""s; durations of a turn that are looked for: up to the second first, and if there is none, up to the third."""
+ONCE_ROUND = 1.5
+"""Turns of a slow antenna that its plots must last, for azimuths that hardly change follow a slow one for a while."""
+MOST_IN_A_STEP = 0.7
+"""Turns in a step of rounded times up to which they can be told from azimuths that stay."""
+TARGETS_M_S = 1000.0
+"""m/s; plots that follow each other at less may be of one target round the radar, and tell no slow antenna."""
 ROTATES = 0.8
 """Mean resultant length from which the azimuths follow a turning antenna."""
 UNLIKELY = 6.0
@@ -94,6 +100,10 @@ class Turns:
         return nearest if follows else turn + FARTHEST
 
 
+ONE_BY_ONE = 0.9
+"""Share of plots with their own time from which an antenna seems to turn."""
+
+
 class Rounds:
     """Scans of equal durations.
 
@@ -125,20 +135,29 @@ def paced(messages: Messages, scan_s: float | None, losses: Losses) -> tuple[Mes
     return believed, pace_of(believed, scan_s) if losses.resets else pace
 
 
-def pace_of(messages: Messages, scan_s: float | None) -> Pace:
+def pace_of(messages: Messages, scan_s: float | None, coarse_s: float = 0.0) -> Pace:
     """The pace of a feed, from its first messages.
 
-    scan_s  duration of a scan; None: from the marks of the antenna, else from the azimuths and times of the plots, else
-            from how often targets report
+    scan_s    duration of a scan; None: from the marks of the antenna, else from the azimuths and times of the plots,
+              else from how often targets report
+    coarse_s  step of the times of plots, if they are rounded; a turn must last two
     """
     plots = messages.only(~messages.marks)
-    period_s = scan_s or _stated(messages) or _found(plots)
+    period_s = scan_s or _stated(messages) or _found(plots, coarse_s)
     if period_s is not None and np.all(plots.kind == Kind.POLAR):
-        beamed = _follows(plots, period_s) > ROTATES
+        beamed = bool(_follows(plots, period_s) > ROTATES * np.sinc(coarse_s / period_s))
         if beamed or messages.marks.any():
             return Turns(period_s, beamed=beamed)
     period_s = period_s or _usual(plots)
     return Rounds(period_s, float(plots.time_s.min()) - period_s / 2)
+
+
+def is_unknown(pace: Pace, messages: Messages) -> bool:
+    """Whether plots come one by one, as from a turning antenna, but nothing tells how long a turn takes."""
+    plots = messages.only(~messages.marks)
+    if isinstance(pace, Turns) or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
+        return False
+    return len(plots) > 2 and len(np.unique(plots.time_s)) >= ONE_BY_ONE * len(plots)
 
 
 def _stated(messages: Messages) -> float | None:
@@ -155,20 +174,59 @@ def _stated(messages: Messages) -> float | None:
     return float(np.median(periods)) if len(periods) else None
 
 
-def _found(plots: Messages) -> float | None:
-    """The duration of a turn that the azimuths of plots follow best: the highest peak of their periodogram.
-
-    None for targets with numbers, whose reports no beam times, and for a peak that chance could make.
+def _found(plots: Messages, coarse_s: float) -> float | None:
+    """The duration of a turn that the azimuths of plots follow best; None for targets with numbers, whose reports no
+    beam times, and if they follow none.
     """
     if len(plots) < 2 or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
         return None
-    begin = plots.only(plots.time_s <= plots.time_s.min() + 3 * SLOWEST_S)
+    quick = None if coarse_s and not _are_apart(plots) else _peak(plots, FASTEST_S, USUAL_S, coarse_s)
+    return quick or (_peak(plots, USUAL_S, SLOWEST_S, coarse_s) if _are_apart(plots) else None)
+
+
+def turn_within(plots: Messages, coarse_s: float) -> float | None:
+    """The duration of a turn that is too short, below two steps of rounded times, to tell which turn a plot is of.
+
+    plots in order of time
+    """
+    if len(plots) < 2 or not _are_apart(plots):
+        return None
+    begin = plots.only(np.arange(min(len(plots), LOOKED_AT)))
+    span = max(float(np.ptp(begin.time_s)), coarse_s)
+    return _highest(begin, np.arange(0.5, MOST_IN_A_STEP, 0.2 * coarse_s / span) / coarse_s, coarse_s)
+
+
+def _are_apart(plots: Messages) -> bool:
+    """Whether plots that follow each other are mostly too far apart to be of one target."""
+    order = np.argsort(plots.time_s, kind="stable")
+    step_m = np.abs(np.diff((plots.u * np.exp(1j * plots.v))[order]))
+    step_s = np.diff(plots.time_s[order])
+    later = step_s > 0
+    return bool(later.any() and np.median(step_m[later] / step_s[later]) > TARGETS_M_S)
+
+
+def _peak(plots: Messages, fastest_s: float, slowest_s: float, coarse_s: float) -> float | None:
+    """The duration of a turn, of those between two, at the highest peak of the periodogram of azimuths.
+
+    None for a peak that chance could make. Of times that are rounded to steps of coarse_s it is as much lower as the
+    antenna turns in a step; faster turns than one in two steps look like slower ones.
+    """
+    begin = plots.only(plots.time_s <= plots.time_s.min() + 3 * slowest_s)
     begin = begin.only(np.arange(min(len(begin), LOOKED_AT)))
     span = max(float(np.ptp(begin.time_s)), FASTEST_S)
-    rate = np.arange(1 / SLOWEST_S, 1 / FASTEST_S, min(1 / SLOWEST_S, 0.2 / span))
-    score = np.array([_resultant(begin, one) for one in rate])
-    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / len(begin))
-    return 1 / float(rate[score.argmax()]) if score.max() > max(ROTATES, chance) else None
+    fastest_s, slowest_s = max(fastest_s, 2 * coarse_s), min(slowest_s, max(span / ONCE_ROUND, USUAL_S))
+    if fastest_s >= slowest_s:
+        return None
+    return _highest(begin, np.arange(1 / slowest_s, 1 / fastest_s, min(1 / slowest_s, 0.2 / span)), coarse_s)
+
+
+def _highest(plots: Messages, rate: Floats, coarse_s: float) -> float | None:
+    """The duration of a turn at the highest peak, of these rates [1/s]; None for a peak that chance could make."""
+    left = np.sinc(coarse_s * rate)
+    score = np.array([_resultant(plots, one) for one in rate])
+    best = int((score / left).argmax())
+    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / len(plots))
+    return 1 / float(rate[best]) if score[best] > max(ROTATES * left[best], chance) else None
 
 
 def _resultant(plots: Messages, rate: float) -> float:

@@ -23,6 +23,7 @@ _log = logging.getLogger(__name__)
 _CATEGORIES = (48, 1, 62, 21, 0)
 """What is tracked, if a feed has several: plots, others' tracks, what ships and aircraft say themselves."""
 _KINDS = (Kind.POLAR, Kind.GEODETIC, Kind.CARTESIAN)
+_PLACES = {Kind.POLAR: "plots", Kind.GEODETIC: "positions", Kind.CARTESIAN: "positions"}
 _NAMES = {48: "CAT 048", 1: "CAT 001", 62: "CAT 062", 21: "CAT 021", 0: "NMEA"}
 
 
@@ -118,8 +119,15 @@ def warn_of_others(choice: Choice, messages: Messages, settings: RadarSettings, 
 
 def _contents(messages: Messages) -> str:
     positions = messages.only(~messages.marks)
-    found = Counter(zip(positions.category.tolist(), positions.source.tolist(), strict=True)).most_common(8)
-    return ", ".join(f"{n} of {_NAMES[category]} from {_sender(source)}" for (category, source), n in found) or "none"
+    columns = (one.tolist() for one in (positions.category, positions.source, positions.kind))
+    found = Counter(zip(*columns, strict=True)).most_common(8)
+    said = (f"{count} {_PLACES[kind]} of {_named_sender(*sender)}" for (*sender, kind), count in found)
+    return ", ".join(said) or "none"
+
+
+def _named_sender(category: int, source: int) -> str:
+    """A format, and the code of the radar that sent it; NMEA has none."""
+    return _NAMES[category] if category == 0 else f"{_NAMES[category]} from {_sender(source)}"
 
 
 def _sender(source: int) -> str:

@@ -15,7 +15,7 @@ from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError, PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
-from vidtrack.radar.feeds.pace import paced
+from vidtrack.radar.feeds.pace import Pace, is_unknown, paced
 from vidtrack.radar.feeds.packets import payloads
 from vidtrack.radar.feeds.plots import (
     Choice,
@@ -138,12 +138,22 @@ def read_recording(path: str | Path, settings: RadarSettings, known: Collection[
     if found is None:
         raise PlotFormatError(f"{name}: the plots have no time, and nothing else tells it")
     messages, pace = found
+    warn_of_unknown_turns(pace, messages, settings, name)
     plane = plane_of(choice, messages, settings, name)
     scan = closed_up(np.floor(pace.progress(messages)).astype(np.int64), messages.time_s)
     plots = plots_of(messages.only(~messages.marks), scan[~messages.marks], settings, plane, losses)
     if str(losses):
         _log.warning("%s: left out: %s", name, losses)
     return replace(plots, scan=plots.scan - plots.scan[0], losses=losses.as_dict(), plane=plane)
+
+
+def warn_of_unknown_turns(pace: Pace, messages: Messages, settings: RadarSettings, name: str) -> None:
+    """A warning, if neither the settings nor the messages say what a scan is of plots that come one by one."""
+    if settings.scan_s is None and is_unknown(pace, messages):
+        _log.warning(
+            "%s: neither marks nor azimuths tell how long the antenna takes for a turn; scans of %.3g s are assumed: "
+            "set radar.scan_s", name, pace.period_s,
+        )  # fmt: skip
 
 
 def plane_of(choice: Choice, messages: Messages, settings: RadarSettings, name: str) -> Plane | None:

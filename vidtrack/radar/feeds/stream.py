@@ -23,7 +23,7 @@ from vidtrack.radar.feeds.plots import (
     warn_of_assumed_errors,
     warn_of_others,
 )
-from vidtrack.radar.feeds.recording import Decoder, decoder_of, plane_of
+from vidtrack.radar.feeds.recording import Decoder, decoder_of, plane_of, warn_of_unknown_turns
 from vidtrack.radar.plane import Plane
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.scans import Measurements, measurements
@@ -143,6 +143,7 @@ class ScanStream:
             return
         warn_of_others(choice, heard, self._settings, self._name)
         warn_of_assumed_errors(choice, self._settings, self._name)
+        warn_of_unknown_turns(pace, believed, self._settings, self._name)
         self._choice, self._pace, self._heard = choice, pace, []
         self.losses.damaged += choice.damaged
         self._clock = Clock(self.losses, pace.disorder_s)

@@ -16,6 +16,8 @@ LATEST_S = 30.0
 """s; longest delay of a copy that is looked for."""
 MOSTLY = 0.5
 """Share of the plots of the smaller of two feeds; with more of them in the other feed the two are of one radar."""
+UNLIKELY = 4.0
+"""Standard deviations of the number of plots that two radars share by chance, beyond which they are one."""
 
 
 class Measured(NamedTuple):
@@ -34,34 +36,50 @@ class Measured(NamedTuple):
 
 
 class Copies(NamedTuple):
-    """Plots that two feeds share: `same` of the `fewer` plots of the smaller one, in the second `later_s` later."""
+    """Plots that two feeds share: `same` of the `fewer` plots of the smaller one, in the second `later_s` later.
+
+    chance  (fewer,) probability of each that two radars would share it, as one of an object that stands still
+    """
 
     same: int
     fewer: int
     later_s: float
+    chance: Floats
 
     @property
     def of_one_radar(self) -> bool:
-        """Whether they are most of them."""
-        return self.same > MOSTLY * self.fewer
+        """Whether they are most of those that chance would not share, and so many that chance could not make them."""
+        beyond = self.same - self.chance.sum()
+        likely = np.sqrt((self.chance * (1 - self.chance)).sum())
+        return bool(beyond > max(MOSTLY * (1 - self.chance).sum(), UNLIKELY * likely))
 
 
 def copies(first: Measured, second: Measured) -> Copies:
     """The plots of two feeds that are the same but for NEAR of their errors, at one delay of all.
 
     Each plot of the smaller feed has the nearest of the other as its partner. The delay is the median of the partners';
-    those that are off by half a scan are chance, as of an object that stands still.
+    those that are off by half a scan are chance.
     """
     sigma = np.minimum(first.sigma, second.sigma)
-    few, many = sorted((_scaled(first, sigma), _scaled(second, sigma)), key=len)
+    (few, _), (many, scan_s) = sorted(
+        ((_scaled(feed, sigma), feed.scan_s) for feed in (first, second)), key=lambda one: len(one[0])
+    )
     distance, partner = KDTree(many).query(few, p=np.inf, distance_upper_bound=1.0)
     found = np.isfinite(distance)
     if not found.any():
-        return Copies(0, len(few), 0.0)
+        return Copies(0, len(few), 0.0, np.zeros(len(few)))
     later_s = LATEST_S * (many[partner[found], 0] - few[found, 0])
     delay_s = float(np.median(later_s))
-    same = np.abs(later_s - delay_s) <= min(first.scan_s, second.scan_s) / 2
-    return Copies(int(same.sum()), len(few), delay_s if len(first.time_s) <= len(second.time_s) else -delay_s)
+    same = int((np.abs(later_s - delay_s) <= min(first.scan_s, second.scan_s) / 2).sum())
+    chance = _chance(few, many, scan_s) if same > MOSTLY * len(few) else np.zeros(len(few))
+    return Copies(same, len(few), delay_s if len(first.time_s) <= len(second.time_s) else -delay_s, chance)
+
+
+def _chance(few: Floats, many: Floats, scan_s: float) -> Floats:
+    """(N,) share of the other scans of a feed `many` (M, 4) with a plot where each of `few` (N, 4) is."""
+    there = KDTree(many[:, 1:]).query_ball_point(few[:, 1:], 1.0, p=np.inf, return_length=True)
+    scans = 1 + LATEST_S * np.ptp(many[:, 0]) / scan_s
+    return np.asarray(np.clip((there - 1) / max(scans - 1, 1), 0, 1))
 
 
 def _scaled(feed: Measured, sigma: Floats) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import logging
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -59,6 +59,16 @@ class Feed:
         return Sector(
             self.placed.xyz[:2], farthest, self.placed.turned, np.radians(radar.sector_deg), radar.slowest_m_s
         )
+
+    @property
+    def xy(self) -> Floats:
+        """(N, 2) m; where the plots are, on the common plane."""
+        return self.found.sensor.locate(self.found.z, self.found.R)[0][:, :2]
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """The times of the first and last plot."""
+        return float(self.plots.time_s.min()), float(self.plots.time_s.max())
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +171,51 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
         cartesian = next(feed.placed.name for feed in feeds if not feed.plots.polar)
         raise ConfigError(f"the plots of radar {cartesian!r} have x and y; several radars need range_m and azimuth_deg")
     _refuse_same(feeds)
+    _warn_of_apart(feeds)
     return feeds
+
+
+def _warn_of_apart(feeds: Sequence[Feed]) -> None:
+    """A warning names the radars that have no time, or no place, in common with another one."""
+    if len(feeds) < 2:
+        return
+    alone = _alone(feeds, _at_one_time)
+    if alone:
+        times = "; ".join("{} has {:.10g} to {:.10g} s".format(one.placed.name, *one.span_s) for one in feeds)
+        _log.warning(
+            "%s with no time in common with another radar (%s), so no track is of both: are the clocks right?",
+            _radars(alone), times,
+        )  # fmt: skip
+        return
+    alone = _alone(feeds, _at_one_place)
+    if alone:
+        _log.warning(
+            "%s with no place in common with another radar: none has plots where the other one detects targets, so no "
+            "track is of both: are their places and directions right?", _radars(alone),
+        )  # fmt: skip
+
+
+def _alone(feeds: Sequence[Feed], meet: Callable[[Feed, Feed], bool]) -> list[Feed]:
+    """The feeds that meet no other."""
+    met = [(one, other) for one, other in combinations(range(len(feeds)), 2) if meet(feeds[one], feeds[other])]
+    return [feed for k, feed in enumerate(feeds) if not any(k in pair for pair in met)]
+
+
+def _at_one_time(one: Feed, other: Feed) -> bool:
+    """Whether the times of two radars overlap, to within a scan."""
+    (begin, end), (first, last), scan_s = one.span_s, other.span_s, max(one.scan_s, other.scan_s)
+    return begin - scan_s <= last and first <= end + scan_s
+
+
+def _at_one_place(one: Feed, other: Feed) -> bool:
+    """Whether one of two radars has plots where the other one detects targets."""
+    return any((b.coverage.share(a.xy, np.zeros_like(a.xy)) > 0).any() for a, b in ((one, other), (other, one)))
+
+
+def _radars(feeds: Sequence[Feed]) -> str:
+    """The names of radars in a message."""
+    names = ", ".join(repr(feed.placed.name) for feed in feeds)
+    return f"radar{'s' if len(feeds) > 1 else ''} {names}"
 
 
 def _refuse_same(feeds: Sequence[Feed]) -> None:

@@ -18,7 +18,7 @@ from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lengths import length_sums, mean_length
 from vidtrack.traffic.lines import Crossing, Line, LineCounter, parse_line, parse_lines
-from vidtrack.traffic.measures.rows import rows_of
+from vidtrack.traffic.measures.rows import Rows
 from vidtrack.traffic.metres import UsedSite
 
 if TYPE_CHECKING:
@@ -118,17 +118,18 @@ class Counting:
         """Number of crossings that could not be written to the intervals."""
         return self._book.lost
 
-    def step(self, steps: Sequence[Step], rows: pa.Table | None) -> list[Crossing]:
+    def step(self, steps: Sequence[Step], rows: pa.Table | None, seen: Rows | None = None) -> list[Crossing]:
         """Count a batch of steps.
 
         rows  of their tracks, with the columns of ROAD; None without a calibrated site
+        seen  the same as the live reader has them: where they stand
         """
         self._set_clock()
         if rows is not None and len(rows):
             self._readings.add(rows)
         crossings = [
             crossing
-            for step, stand in zip(steps, self._stands(steps, rows), strict=True)
+            for step, stand in zip(steps, self._stands(steps, seen), strict=True)
             for crossing in self._counter.step(step.index, step.tracks, stand)
         ]
         self._note(crossings)
@@ -165,12 +166,11 @@ class Counting:
         """Finish the files of the intervals. Raises StoppedEarly."""
         self._book.close()
 
-    def _stands(self, steps: Sequence[Step], rows: pa.Table | None) -> Sequence[Floats | None]:
-        """(T, 2) px of the scene where the tracks of each step stand on the road, by their rows alone."""
-        if rows is None or self._road is None:
+    def _stands(self, steps: Sequence[Step], seen: Rows | None) -> Sequence[Floats | None]:
+        """(T, 2) px of the scene where the tracks of each step stand on the road."""
+        if seen is None or self._road is None:
             return [None] * len(steps)
-        ground = self._road.ground
-        xy = ground.pixels(rows_of(rows, ground).xy)
+        xy = self._road.ground.pixels(seen.xy)
         return np.split(xy, np.cumsum([len(step.tracks) for step in steps])[:-1])
 
     def _note(self, crossings: Sequence[Crossing]) -> None:

@@ -12,7 +12,6 @@ from time import monotonic, time
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
@@ -27,6 +26,7 @@ from vidtrack.output.sink import Step
 from vidtrack.recording.event_pictures import EventPictures
 from vidtrack.run.live.road_events import RoadEvents, prepare
 from vidtrack.run.sinks import Subject
+from vidtrack.traffic.measures.rows import Rows
 
 log = logging.getLogger(__name__)
 
@@ -161,15 +161,15 @@ class LiveEvents:
             known = self._road is not None and self._road.metres
             self._make(Kind.CROSSING, passage.unix_s, told | (speed if known else {}))
 
-    def step(self, steps: Sequence[Step], rows: pa.Table | None) -> None:
-        """Look for zone entries and conflicts; `rows` of the tracks on the road, None without a calibration."""
+    def step(self, steps: Sequence[Step], seen: Rows | None) -> None:
+        """Look for zone entries and conflicts; `seen`: the tracks on the road, None without a calibration."""
         if self._road is None:
             return
         offset_s = self._began_s()
-        for entry in self._road.entries(steps, rows):
+        for entry in self._road.entries(steps, seen):
             told = {"zone": entry.zone, "track_id": entry.track_id, "came": entry.came}
             self._make(Kind.ENTRY, offset_s + entry.time_s, told)
-        self._came_close(self._road.conflicts(steps, rows))
+        self._came_close(self._road.conflicts(steps, seen))
 
     def end(self) -> None:
         """Make events of the conflicts that are not over: nobody looks on."""

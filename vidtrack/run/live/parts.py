@@ -30,6 +30,7 @@ from vidtrack.run.live.part import Part, columns_of, count
 from vidtrack.run.live.site import FollowedSite
 from vidtrack.run.sinks import Subject
 from vidtrack.traffic.lines import Crossing
+from vidtrack.traffic.measures.rows import LiveReader
 from vidtrack.traffic.metres import UsedSite
 
 log = logging.getLogger(__name__)
@@ -70,6 +71,7 @@ class Parts:
         self._events = events
         self._root = root
         self._subject = subject
+        self._reader = _reader_of(subject)
         self._site = site
         self._decisions = decisions
         self._roll_s = roll_s
@@ -102,14 +104,15 @@ class Parts:
         rows = track_rows(filled, columns_of(self._subject), self._subject.road) if filled and needed else None
         if self._whole is not None:
             count(self._whole, steps)
+        on_road = None if self._reader is None else rows
+        seen = None if self._reader is None or rows is None else self._reader.read(rows)
         with ExitStack() as stack:  # called from the last to the first
             stack.callback(self._write_part, steps, rows)
             if self._counting is not None:
-                on_road = None if self._subject.road is None else rows
-                self._crossings.extend(self._counting.step(steps, on_road))
+                self._crossings.extend(self._counting.step(steps, on_road, seen))
                 stack.callback(self._counting.save)
             if self._events is not None:
-                self._events.step(steps, None if self._subject.road is None else rows)
+                self._events.step(steps, seen)
                 stack.callback(self._events.save)
 
     def finish(self) -> None:
@@ -180,6 +183,7 @@ class Parts:
     def _use(self, site: UsedSite) -> None:
         """Go on at another site; the next part is its first."""
         self._subject = self._subject.at(site)
+        self._reader = _reader_of(self._subject)
         if self._counting is not None:
             self._counting.use(site)
         if self._events is not None:
@@ -218,3 +222,8 @@ class Parts:
         thread = Thread(target=run, name="finish-part", daemon=True)
         thread.start()
         self._finishing.append(thread)
+
+
+def _reader_of(subject: Subject) -> LiveReader | None:
+    """Reads where its vehicles stand; None without a calibrated site."""
+    return None if subject.road is None else LiveReader(subject.road.ground)

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from vidtrack.output.linefile import Every
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.conflicts import PET, TTC, Conflicts, Meeting
-from vidtrack.traffic.measures.rows import Rows, rows_of
+from vidtrack.traffic.measures.rows import Rows
 from vidtrack.traffic.measures.staying import outlines_of
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import parse_site
@@ -40,7 +38,7 @@ class RoadEvents:
         self._zones = ZoneEntries(dict(zip(site.tracked_zones, outlines_of(site, self._ground), strict=True)))
         self._gap_s = gap_s
         self._meeting = Meeting()
-        self._unseen: list[pa.Table] = []
+        self._unseen: list[Rows] = []
         self._last_s: float | None = None
         self._due = Every(_LOOK_S)
 
@@ -49,14 +47,13 @@ class RoadEvents:
         """Whether the site is calibrated."""
         return self._ground is not None
 
-    def entries(self, steps: Sequence[Step], rows: pa.Table | None) -> list[Entry]:
-        """The zone entries of these steps; `rows` of their tracks on the road."""
+    def entries(self, steps: Sequence[Step], seen: Rows | None) -> list[Entry]:
+        """The zone entries of these steps; `seen`: their tracks on the road."""
         if self._ground is None:
             found = [self._zones.step(step.time_s, step.tracks.id, step.tracks.xy) for step in steps]
             return [entry for of_step in found for entry in of_step]
-        if rows is None or not len(rows):
+        if seen is None or not len(seen):
             return []
-        seen = rows_of(rows, self._ground)
         first = np.flatnonzero(np.diff(seen.t, prepend=-np.inf))
         found = [
             self._zones.step(float(seen.t[low]), seen.track[low:high], seen.xy[low:high])
@@ -64,27 +61,27 @@ class RoadEvents:
         ]
         return [entry for of_moment in found for entry in of_moment]
 
-    def conflicts(self, steps: Sequence[Step], rows: pa.Table | None) -> Iterator[tuple[float, dict[str, Any]]]:
-        """Time [s] and content of each conflict that is over; `rows` of the tracks of these steps on the road."""
+    def conflicts(self, steps: Sequence[Step], seen: Rows | None) -> Iterator[tuple[float, dict[str, Any]]]:
+        """Time [s] and content of each conflict that is over; `seen`: the tracks of these steps on the road."""
         if self._ground is None or not steps:
             return
         if self._last_s is not None and steps[0].time_s - self._last_s > self._gap_s:
             yield from self.unfinished()  # nobody knows what happened meanwhile
         self._last_s = steps[-1].time_s
-        if rows is not None and len(rows):
-            self._unseen.append(rows)
+        if seen is not None and len(seen):
+            self._unseen.append(seen)
         if self._due():
-            yield from self._over(self._ground, self._last_s)
+            yield from self._over(self._last_s)
 
     def unfinished(self) -> Iterator[tuple[float, dict[str, Any]]]:
         """The same of those that are not over, since nobody looks on."""
         if self._ground is not None:
-            yield from self._over(self._ground, np.inf)
+            yield from self._over(np.inf)
             self._meeting = Meeting()
 
-    def _over(self, ground: Ground, until_s: float) -> Iterator[tuple[float, dict[str, Any]]]:
+    def _over(self, until_s: float) -> Iterator[tuple[float, dict[str, Any]]]:
         if self._unseen:
-            self._meeting.add(rows_of(pa.concat_tables(self._unseen), ground))
+            self._meeting.add(Rows.together(self._unseen))
             self._unseen = []
         return _told(self._meeting.settled(until_s))
 

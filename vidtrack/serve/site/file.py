@@ -15,7 +15,8 @@ from pydantic import ValidationError
 from tomlkit.items import InlineTable
 
 from vidtrack.errors import ConfigError
-from vidtrack.output.folder import replacing
+from vidtrack.output.folder import replacing, writing
+from vidtrack.output.lock import by_turns
 from vidtrack.traffic.site import Site, faults_of
 
 Tree = dict[str, Any]
@@ -52,7 +53,7 @@ class SiteFile:
         Raises ChangedError, ConfigError for a tree that is no site, and StoppedEarly if it cannot be written.
         """
         self._check(tree)
-        with self._saving:
+        with self._saving, writing(self.path), by_turns(self.path):
             text, now = self._text()
             if now != digest:
                 raise ChangedError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields
 from os import SEEK_END
@@ -20,7 +20,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, Seen, footprint, uncut
+from vidtrack.traffic.footprint import Footprints, Seen, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
@@ -86,6 +86,11 @@ class Rows:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    @classmethod
+    def together(cls, parts: Sequence[Rows]) -> Rows:
+        """The rows of parts, one after the other."""
+        return cls(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(cls)))
 
     def only(self, chosen: Mask | Ints) -> Rows:
         """The rows of a mask or of indices."""
@@ -154,7 +159,7 @@ class Reader:
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
             return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
-            column |= _stand(road, track, column)
+            column |= _stand(road, track, column, merged)
         edge = edges(column, recording.size)
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
@@ -172,11 +177,30 @@ class Reader:
         return np.array(known, np.int64)[ids.indices.to_numpy(zero_copy_only=False)]
 
 
-def rows_of(table: pa.Table, ground: Ground) -> Rows:
-    """The rows of a table with ROAD_COLUMNS; the numbers of tracks are their ids, and no edges are known."""
-    column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
-    track, edge = table["track_id"].to_numpy(), np.full((len(table), 4), np.nan)
-    return _on_road(ground, column, track, column["time_s"], *_states(table), edge)
+class LiveReader:
+    """Reads the tables of vehicles that are still tracked, with ROAD_COLUMNS, one after the other in order of time.
+
+    The numbers of tracks are their ids, and no edges are known.
+    """
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._latest: dict[int, Floats] = {}
+
+    def read(self, table: pa.Table) -> Rows:
+        """The rows of the next table; vehicles without a place are carried as in `Reader`."""
+        column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
+        track, t, edge = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
+        rows = _on_road(self._ground, column, track, t, *_states(table), edge)
+        if len(t) == 0:
+            return rows
+        ids, number = np.unique(track, return_inverse=True)
+        unknown = np.full(5, np.nan)
+        latest = np.array([self._latest.get(one, unknown) for one in ids.tolist()])
+        _go_on(number, t, np.isnan(column["x_m"]), rows.seen & ~rows.merged, rows.v, rows.xy, latest)
+        known = self._latest | dict(zip(ids.tolist(), latest, strict=True))
+        self._latest = {one: last for one, last in known.items() if t[-1] - last[0] < _ONWARD_S}
+        return rows
 
 
 def _states(table: pa.Table) -> tuple[Mask, Mask]:
@@ -280,7 +304,7 @@ def _go_on(track: Ints, t: Floats, rough: Mask, alone: Mask, v: Floats, xy: Floa
             xy[i, 1] = latest[k, 2] + (t[i] - latest[k, 0]) * latest[k, 4]
 
 
-def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str, Floats]:
+def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask) -> dict[str, Floats]:
     """The columns of the road, computed from those of the picture."""
     sigma = np.column_stack([column[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
     corr = np.ones((len(track), 4, 4))
@@ -292,7 +316,8 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats]) -> dict[str
     box = np.column_stack([column[name] for name in _BOX])
     edge = [column[name] for name in EDGE_COLUMNS if name in column]
     seen = Seen(column["time_s"], np.column_stack(edge)) if edge else None
-    stand = road.place(track, xy, u, P, box, seen)
+    hidden = partly_hidden(column["time_s"], box, merged)
+    stand = road.place(track, xy, u, P, box, seen, hidden)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],

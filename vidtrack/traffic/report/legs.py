@@ -25,7 +25,7 @@ class LegDay:
 
 
 def legs_of(found: Findings) -> list[LegDay]:
-    """All legs that vehicles entered from, in the order of the site."""
+    """All legs with an entry gate, and those that vehicles entered from besides, in the order of the site."""
     bins = len(found.coverage)
     watched = found.coverage > 0
     hours = np.where(watched, found.coverage * np.diff(found.edges) / 3600, np.nan)
@@ -37,8 +37,9 @@ def legs_of(found: Findings) -> list[LegDay]:
     )
     first, last = found.interval(begin), found.interval(end)
     result = []
-    for leg in dict.fromkeys([*found.site.legs, *(leg for leg in start if leg is not None)]):
-        if not (start == leg).any():
+    shown = {*found.site.legs_with("entry"), *start} - {None}
+    for leg in dict.fromkeys([*found.site.legs, *start]):
+        if leg not in shown:
             continue
         flow = np.bincount(at[start == leg], minlength=bins) / hours
         queue, queue_m = np.where(watched, np.zeros((2, bins)), np.nan)

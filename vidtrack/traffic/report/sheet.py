@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -73,14 +74,19 @@ class PeakHour:
 
 
 def sheet_of(found: Findings, turns: Mapping[tuple[str, str], str]) -> Sheet:
-    """Movements that the site allows, and those that were seen besides, in order of legs and turns."""
+    """Movements that the site allows, and those that were seen besides, in order of legs and turns.
+
+    A site that does not say what it allows has a movement from each leg with an entry to each other one with an exit.
+    """
     start, end = found.words("trips", "from_leg"), found.words("trips", "to_leg")
     complete = found.numbers("trips", "complete") > 0
     pairs = [(str(a), str(b)) for a, b, whole in zip(start, end, complete.tolist(), strict=True) if whole]
     legs = list(dict.fromkeys([*found.site.legs, *(leg for pair in pairs for leg in pair)]))
     order = [*TURNS, ""]
+    ways = product(found.site.legs_with("entry"), found.site.legs_with("exit"))
+    possible = found.site.movements.allowed or tuple((a, b) for a, b in ways if a != b)
     shown = sorted(
-        {*found.site.movements.allowed, *pairs},
+        {*possible, *pairs},
         key=lambda pair: (legs.index(pair[0]), order.index(turns.get(pair, "")), legs.index(pair[1])),
     )
     number = {pair: column for column, pair in enumerate(shown)}

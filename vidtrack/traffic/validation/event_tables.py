@@ -77,8 +77,9 @@ def read_manual(path: Path, clocks: Iterable[str]) -> Events:
     if clock is None:
         if "utc" in names:
             raise ConfigError(
-                f"{path} has times of day, and the counted table has none: give time_s in seconds of the video, or "
-                "measure with a site that has a start"
+                f"{path} has times of day, and the counted table has none: give [site] the time of the first picture, "
+                "for example start = 2026-06-01T07:00:00+02:00, and measure again, or give time_s in seconds of the "
+                "video"
             )
         hint = "; separate columns by commas" if len(names) == 1 else ""
         raise ConfigError(f"{path} has no column time_s or utc; it has {', '.join(names) or 'none'}{hint}")
@@ -110,9 +111,9 @@ def table_of(folder: Path) -> Path:
 
 
 def clocks_of(path: Path) -> list[str]:
-    """The clocks that a table has times by."""
-    _, names = _read(path)
-    return [clock for clock in _CLOCKS if clock in names]
+    """The clocks that a table has times by; one of a site without a start has an empty column utc."""
+    rows, names = _read(path)
+    return [clock for clock in _CLOCKS if clock in names and (not rows or any(row[clock] for row in rows))]
 
 
 def seconds(text: str, clock: str, where: str) -> float:

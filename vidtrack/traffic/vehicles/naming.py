@@ -53,19 +53,28 @@ class Naming:
         self._classes = dict(classes)
         self._sums: dict[int, Floats] = {}
 
-    def named(self, track: Ints, length: Floats, sigma: Floats, speed: Floats) -> NDArray[np.str_]:
-        """(N,) classes; UNKNOWN where none is sure, "" before a track has a length.
+    def named(
+        self, track: Ints, length: Floats, sigma: Floats, speed: Floats
+    ) -> tuple[NDArray[np.str_], Floats, Floats]:
+        """(N,) classes, UNKNOWN where none is sure; (N,) m, the mean lengths of the tracks so far and their errors.
+
+        Before a track has a length its class is "", and its mean NaN.
 
         track (N,), length and sigma (N,) m, NaN where it is not known; speed (N,) m/s
         """
         weight = np.nan_to_num(1 / np.maximum(sigma, _LEAST_SIGMA_M) ** 2) * np.isfinite(length)
-        sums = self._added(track, np.column_stack([weight, weight * np.nan_to_num(length), weight > 0]))
-        known = sums[:, 2] > 0
-        total, by_length, rows = sums[known].T
-        mean, information = by_length / total, total / rows  # errors last: many rows are no better than one
+        length = np.nan_to_num(length)
+        sums = self._added(track, np.column_stack([weight, weight * length, weight * length**2, weight > 0]))
+        known = sums[:, 3] > 0
+        total, by_length, by_square, rows = sums[known].T
+        mean = by_length / total
+        apart = (by_square - by_length * mean) / rows  # mean square about it, 1 where errors are as stated
+        information = total / rows / np.maximum(apart, 1.0)  # errors last: many rows are no better than one
         names = np.full(len(track), "", dtype=object)
         names[known] = self._class_of(mean, information, np.nan_to_num(speed[known]))
-        return names.astype(str)
+        means = np.full((2, len(track)), np.nan)
+        means[:, known] = mean, 1 / np.sqrt(information)
+        return names.astype(str), *means
 
     def _class_of(self, mean: Floats, information: Floats, speed: Floats) -> list[str]:
         if self._classes:
@@ -76,7 +85,7 @@ class Naming:
         return [name or UNKNOWN for name in named(classified(about, vector, speed))[0]]
 
     def _added(self, track: Ints, terms: Floats) -> Floats:
-        """(N, 3) sums of the terms of each track to each row; those of tracks that are gone are forgotten."""
+        """(N, K) sums of the terms (N, K) of each track to each row; those of tracks that are gone are forgotten."""
         ids = np.unique(track)
         nothing = np.zeros(terms.shape[1])
         before = np.array([self._sums.get(one, nothing) for one in ids.tolist()]).reshape(-1, terms.shape[1])

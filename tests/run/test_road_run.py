@@ -1,0 +1,50 @@
+"""Radar and camera on one road: what a run says of sensors that never meet."""
+
+import numpy as np
+import pytest
+from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
+
+import vidtrack as vt
+from vidtrack.config.load import load
+from vidtrack.output.sink import Step
+from vidtrack.radar.network.network import read_feeds
+from vidtrack.radar.network.radars import read_radars
+from vidtrack.run.road import have_common_place, told_if_apart
+from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.road_scans import InPicture
+
+
+def steps(times_s):
+    """Steps of stations (N,) at times (N,), as pairs."""
+    return [
+        Step(k, t, vt.Scan(t, np.zeros((0, 2)), np.eye(2), station=station), None, None, None, {})
+        for k, (station, t) in enumerate(times_s)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("times_s", "said"),
+    [
+        ([(0, 0), (1, 1), (0, 2), (1, 3)], ""),
+        ([(0, 0), (0, 2), (1, 2)], ""),
+        ([(0, 0), (0, 2)], ""),
+        ([(1, 0), (1, 14), (0, 1000), (0, 1010)], "scans 1000 to 1010 s, pictures 0 to 14 s"),
+        ([(0, 0), (0, 10), (1, 20), (1, 30)], "scans 0 to 10 s, pictures 20 to 30 s"),
+    ],
+)
+def test_a_radar_and_a_camera_without_a_common_time_are_told(caplog, times_s, said):
+    given = steps(times_s)
+    assert list(told_if_apart(given, 1)) == given
+    assert ("have no common time" in caplog.text) is (said != "")
+    assert said in caplog.text
+
+
+@pytest.mark.parametrize(("x_m", "common"), [(0, True), (99999, False)])
+def test_a_radar_whose_plots_the_camera_does_not_show_has_no_common_place(tmp_path, x_m, common):
+    rows = [f"{k},{k},{20 + 2 * k},0,1,1" for k in range(5)]
+    header = "scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg"
+    (tmp_path / "radar.csv").write_text("\n".join([header, *rows]) + "\n")
+    (tmp_path / "radars.toml").write_text(f"[radars.radar]\nx_m = {x_m}\ny_m = 0\n")
+    feeds = read_feeds([str(tmp_path / "radar.csv")], read_radars(tmp_path / "radars.toml"), load().radar)
+    ground = calibrated(site_of(Pinhole().picture(POINTS), POINTS))
+    assert have_common_place(feeds, InPicture(ground, (WIDTH, HEIGHT))) is common

@@ -1,0 +1,42 @@
+"""Vehicles that are still tracked stand where `vidtrack measure` has them, also beyond where places are known."""
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from drawn_runs import CALIBRATED, FPS, SIZE, along, site, write_run
+
+from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.measures.rows import ROAD_COLUMNS, LiveReader, Reader, Rows
+from vidtrack.traffic.measures.runs import open_day
+
+RIM_PX = 560.0
+"""px; to the right of it nobody knows a place, and boxes end there"""
+
+
+def written(tmp_path):
+    """Two drive out to the right, one 3 s after the other; a third one's blob is shared from the rim on."""
+    t = np.arange(0, 4.8, 1 / FPS)
+    ways = [along(k, t + late, 300 + 90 * t, 100 + 90 * k) for k, late in ((1, 0.0), (2, 3.0), (3, 1.0))]
+    path = f"{write_run(tmp_path / 'run', ways, metres=True)}/tracks.parquet"
+    rows = pq.read_table(path)
+    column = {name: rows[name].to_numpy() for name in rows.column_names}
+    beyond = column["x_px"] > RIM_PX
+    for name in ("x_m", "y_m", "sigma_x_m", "sigma_y_m", "corr_xy_m", "length_m", "length_sigma_m", "width_m"):
+        column[name] = np.where(beyond, np.nan, column[name])
+    column["left_px"] = np.minimum(column["left_px"], RIM_PX)
+    column["width_px"] = np.where(beyond, RIM_PX + 20 - column["left_px"], column["width_px"])
+    column["status"] = np.where(beyond & (column["track_id"] == 3), "merged", "confirmed")
+    pq.write_table(pa.table(column), path)
+    return tmp_path / "run", column
+
+
+def test_the_live_reader_carries_vehicles_without_a_place_as_measure_does(tmp_path):
+    run, column = written(tmp_path)
+    ground = calibrated(site(CALIBRATED))
+    (whole,) = Reader(open_day([str(run)], None), {SIZE: ground})
+    reader, table = LiveReader(ground), pq.read_table(run / "tracks.parquet", columns=list(ROAD_COLUMNS))
+    live = Rows.together([reader.read(table.slice(first, 7)) for first in range(0, len(table), 7)])
+    np.testing.assert_allclose(live.xy, whole.xy)
+    alone = column["track_id"] != 3
+    np.testing.assert_allclose(live.xy[alone, 0], column["x_px"][alone] / 10, atol=1e-6)
+    assert live.xy[~alone, 0].max() < RIM_PX / 10 + 2  # a shared blob carries nobody
