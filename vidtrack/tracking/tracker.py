@@ -283,7 +283,8 @@ class Tracker:
         """
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
-        self.register.add_evidence(log_ratio, alone, self.stations.weight(problem.scan, since))
+        told = self.stations.told(problem.scan, log_ratio, self.bank.x, self.bank.P, self.model, since)
+        self.register.add_evidence(told, alone)
         if self.stations.estimate:
             self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
         self.register.seen(looked)
