@@ -6,6 +6,7 @@ from scipy.linalg import expm
 
 import vidtrack as vt
 from vidtrack.radar.network.coverage import Sector
+from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.station import Visibility
 
 
@@ -77,3 +78,19 @@ def test_a_target_that_one_of_two_stations_cannot_see_is_kept():
 
     assert confirmed_at_the_end(Visibility(10.0, 3.0)) == [1]
     assert confirmed_at_the_end(None) == []
+
+
+def test_what_stands_and_only_looks_like_a_target_is_not_confirmed_by_a_station_that_errs_for_long():
+    camera = vt.Station(vt.Rates(0.9, 1e-3, 4e6), lasting_s=1.0, lasting_m=5.0)
+
+    def status(speed):
+        tracker = vt.Tracker(
+            vt.ConstantVelocity(accel=1.0, speed=10.0), life=LogRatio(1e-2, 1e-2), picture=vt.NoPicture(),
+            stations=[camera],
+        )  # fmt: skip
+        for k in range(100):
+            tracks = tracker.step(vt.Scan(0.1 * k, np.array([[0.1 * speed * k, 0.0]]), 0.2 * np.eye(2)))
+        return tracks.status.tolist()
+
+    assert status(speed=10.0) == [vt.Status.CONFIRMED]
+    assert vt.Status.CONFIRMED not in status(speed=0.0)

@@ -47,9 +47,10 @@ ROAD: Mapping[str, Any] = {
 }  # fmt: skip
 """Defaults where vehicles are tracked and not aircraft."""
 CAMERA_DETECTION = 0.9
+LASTING_S = 1.0
+"""s; the light of headlamps, a reflection or a shadow looks like a vehicle for so long."""
 LASTING_M = 5.0
-"""m, a vehicle's length; light on the road, or a piece of the scene that was learnt wrongly, looks like a vehicle for
-long, but stays where it is."""
+"""m, a vehicle's length; what was learnt wrongly of the scene looks like a vehicle for long, but stays there."""
 BY_RADAR, BY_CAMERA = Visibility(visible_s=20.0, hidden_s=0.2), Visibility(visible_s=10.0, hidden_s=3.0)
 """A radar loses sight of slow vehicles, of others rarely; a camera of those behind others and in the dark."""
 
@@ -179,7 +180,9 @@ def build_road_tracker(
     ]
     if camera is not None:
         stations.append(
-            Station(Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, BY_CAMERA, LASTING_M)
+            Station(
+                Rates(CAMERA_DETECTION, None, camera.coverage.area()), camera.coverage, BY_CAMERA, LASTING_S, LASTING_M
+            )
         )
     return Tracker(
         model=motion(radar, 2),

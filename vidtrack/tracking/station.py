@@ -57,13 +57,15 @@ class Station:
     rates       detection probability of a visible target, and clutter density; given or estimated
     coverage    a target outside is neither seen nor missed; None: there is no outside
     visibility  None: targets inside are always visible
-    lasting_m   m or px; what is wrongly taken for a target is so again, at the same place: scans in which a track travels
-                less are together the evidence of one. 0: each scan counts
+    lasting_s   s; what looks like a target goes on to do so for this time: scans within it are together the evidence of
+                one. 0: each scan counts
+    lasting_m   m or px; and stays where it is: for a tentative track, so are scans within this travel. 0: as for others
     """
 
     rates: Rates = field(default_factory=Rates)
     coverage: Coverage | None = None
     visibility: Visibility | None = None
+    lasting_s: float = 0.0
     lasting_m: float = 0.0
 
     STATE = ("rates",)
@@ -86,18 +88,24 @@ class Stations:
     def __len__(self) -> int:
         return len(self.each)
 
-    def told(self, scan: Scan, log_ratio: Floats, x: Floats, P: Floats, model: Motion, since: float) -> Floats:
-        """(T,) evidence of a scan, from the log-likelihood ratios of rows (T,) with states x (T, n), P (T, n, n) of a
-        model, `since` seconds after the station's last scan.
+    def told(
+        self, scan: Scan, log_ratio: Floats, register: Register, x: Floats, P: Floats, model: Motion, since: float
+    ) -> Floats:
+        """(T,) evidence of a scan for the rows of a register, from their log-likelihood ratios (T,).
 
-        A track has travelled with the speed that it has beyond the error of its speed.
+        x (T, n), P (T, n, n) states of a model; since: seconds after the station's last scan. A track travels with the
+        speed that it has beyond the error of its speed.
         """
-        lasting_m = self.each[scan.station].lasting_m
-        if lasting_m == 0:
+        station = self.each[scan.station]
+        if station.lasting_s == 0:
             return log_ratio
-        speed2 = (x[:, model.velocity] ** 2).sum(axis=1) - P[:, model.velocity, model.velocity].sum(axis=1)
-        travelled = np.sqrt(np.maximum(speed2, 0.0)) * since
-        return np.asarray(np.clip(log_ratio, -BELIEF, BELIEF) * np.minimum(travelled / lasting_m, 1.0))
+        weight = np.full(len(log_ratio), min(1.0, since / station.lasting_s))
+        new = (register.status == TENTATIVE).nonzero()[0]
+        if station.lasting_m > 0 and len(new):
+            v, variance = x[new][:, model.velocity], P[new][:, model.velocity, model.velocity]
+            speed = np.sqrt(np.maximum((v**2 - variance).sum(axis=1), 0.0))
+            weight[new] = np.minimum(weight[new], speed * since / station.lasting_m)
+        return np.asarray(np.clip(log_ratio, -BELIEF, BELIEF) * weight)
 
     def share(self, scan: Scan, x: Floats, model: Motion) -> float | Floats:
         """Share of its detection probability with which the scan's station covers states x (T, n) of a model: (T,), or

@@ -283,7 +283,7 @@ class Tracker:
         """
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
-        told = self.stations.told(problem.scan, log_ratio, self.bank.x, self.bank.P, self.model, since)
+        told = self.stations.told(problem.scan, log_ratio, self.register, self.bank.x, self.bank.P, self.model, since)
         self.register.add_evidence(told, alone)
         if self.stations.estimate:
             self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
