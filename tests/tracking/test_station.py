@@ -94,3 +94,9 @@ def test_what_stands_and_only_looks_like_a_target_is_not_confirmed_by_a_station_
 
     assert status(speed=10.0) == [vt.Status.CONFIRMED]
     assert vt.Status.CONFIRMED not in status(speed=0.0)
+
+
+@pytest.mark.parametrize(("lasting_s", "lasting_m"), [(0.0, 5.0), (-1.0, 0.0), (1.0, np.nan)])
+def test_lasting_errors_that_have_no_effect_or_no_sense_are_refused(lasting_s, lasting_m):
+    with pytest.raises(vt.ConfigError, match="lasting_m"):
+        vt.Station(lasting_s=lasting_s, lasting_m=lasting_m)

@@ -141,9 +141,9 @@ class Register:
         """Begin to count misses anew for the rows that were looked at (T,) and seen."""
         _begin_anew(self.missed, self.history, looked)
 
-    def add_evidence(self, told: Floats, alone: Mask) -> None:
+    def add_evidence(self, log_ratio: Floats, alone: Mask) -> None:
         """Add evidence (T,) to the log-odds of existence of rows that are alone (T,): Bayes' rule."""
-        _believe(self.score, self.best, self.status, told, alone)
+        _believe(self.score, self.best, self.status, log_ratio, alone)
 
     def settle(self) -> None:
         """Set the status of confirmed rows by this scan: confirmed, coasting or merged."""
@@ -241,10 +241,10 @@ def _begin_anew(missed: Ints, history: Ints, looked: Mask) -> None:
 
 
 @kernel
-def _believe(score: Floats, best: Floats, status: np.ndarray, told: Floats, alone: Mask) -> None:
+def _believe(score: Floats, best: Floats, status: np.ndarray, log_ratio: Floats, alone: Mask) -> None:
     for i in range(len(score)):
-        more = told[i] if alone[i] else 0.0
-        score[i] = min(max(score[i] + more, -BELIEF), BELIEF)
+        told = log_ratio[i] if alone[i] else 0.0
+        score[i] = min(max(score[i] + told, -BELIEF), BELIEF)
         if status[i] != TENTATIVE:
             best[i] = max(best[i], score[i])
 

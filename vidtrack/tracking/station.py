@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
-from vidtrack.errors import ScanError
+from vidtrack.errors import ConfigError, ScanError
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
@@ -59,7 +59,8 @@ class Station:
     visibility  None: targets inside are always visible
     lasting_s   s; what looks like a target goes on to do so for this time: scans within it are together the evidence of
                 one. 0: each scan counts
-    lasting_m   m or px; and stays where it is: for a tentative track, so are scans within this travel. 0: as for others
+    lasting_m   m or px; the same for travel: of a tentative track, scans within this distance are together the evidence
+                of one, with `lasting_s` only. 0: its travel does not count
     """
 
     rates: Rates = field(default_factory=Rates)
@@ -69,6 +70,13 @@ class Station:
     lasting_m: float = 0.0
 
     STATE = ("rates",)
+
+    def __post_init__(self) -> None:
+        """Raises ConfigError."""
+        if not (self.lasting_s >= 0 and self.lasting_m >= 0):
+            raise ConfigError(f"lasting_s and lasting_m are 0 or more, not {self.lasting_s:g} and {self.lasting_m:g}")
+        if self.lasting_m > 0 and self.lasting_s == 0:
+            raise ConfigError("lasting_m has no effect without lasting_s")
 
 
 class Stations:
@@ -88,13 +96,14 @@ class Stations:
     def __len__(self) -> int:
         return len(self.each)
 
-    def told(
+    def evidence(
         self, scan: Scan, log_ratio: Floats, register: Register, x: Floats, P: Floats, model: Motion, since: float
     ) -> Floats:
         """(T,) evidence of a scan for the rows of a register, from their log-likelihood ratios (T,).
 
         x (T, n), P (T, n, n) states of a model; since: seconds after the station's last scan. A track travels with the
-        speed that it has beyond the error of its speed.
+        speed that it has beyond the error of its speed. A ratio is limited to what is believed at all: a share of an
+        infinite one would be infinite, too.
         """
         station = self.each[scan.station]
         if station.lasting_s == 0:

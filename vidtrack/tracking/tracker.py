@@ -283,8 +283,10 @@ class Tracker:
         """
         problem, alone = found.problem, found.shared < 0
         log_ratio, nis = evidence(problem, found.decision, found.taken)
-        told = self.stations.told(problem.scan, log_ratio, self.register, self.bank.x, self.bank.P, self.model, since)
-        self.register.add_evidence(told, alone)
+        weighed = self.stations.evidence(
+            problem.scan, log_ratio, self.register, self.bank.x, self.bank.P, self.model, since
+        )
+        self.register.add_evidence(weighed, alone)
         if self.stations.estimate:
             self.stations.learn(found, self.register, alone & self.timing.shown(problem.rows), looked, dt)
         self.register.seen(looked)
