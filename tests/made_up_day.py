@@ -171,6 +171,9 @@ def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("nort
         "tracks": len(begin),
         "joins": 0,
         "impossible_movements": [],
+        "scale": None,
+        "straightness": None,
+        "sections": [],
         **changed,
     }
     folder.mkdir(parents=True, exist_ok=True)

@@ -53,12 +53,12 @@ def command(options: CalibrateOptions) -> int:
 
     The exit code is 1 when the points contradict each other, or camera_height_m or the traffic contradicts them.
     """
-    from vidtrack.cli.by_traffic import doubts
     from vidtrack.errors import ConfigError
     from vidtrack.output.folder import open_folder
     from vidtrack.traffic.calibration.account import examined
     from vidtrack.traffic.calibration.sections import section_doubts
     from vidtrack.traffic.measures.by_traffic import by_traffic
+    from vidtrack.traffic.measures.doubts import doubts
     from vidtrack.traffic.site import read_site
 
     start_log(options.verbose, options.quiet)
@@ -114,7 +114,7 @@ def _print(report: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from vidtrack.cli.by_traffic import sayings
+    from vidtrack.traffic.measures.doubts import sayings
 
     console = Console()
     if report["pairs"]:

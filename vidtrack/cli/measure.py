@@ -49,13 +49,13 @@ def command(options: MeasureOptions) -> None:
     A single RUN may be the folder or address of a batch: then each site and day is measured by itself.
     """
     from vidtrack.cli.archive import measure_archive
-    from vidtrack.cli.by_traffic import doubts
     from vidtrack.cli.json_file import write_json
     from vidtrack.errors import ConfigError
     from vidtrack.output.figures import write_figures
     from vidtrack.output.folder import open_folder, replacing
     from vidtrack.recording.retention import parts_of
     from vidtrack.run.batch.archive import is_archive
+    from vidtrack.traffic.measures.doubts import doubts
     from vidtrack.traffic.measures.measure import measured
     from vidtrack.traffic.measures.runs import parts_with_tracks, site_of
     from vidtrack.traffic.site import read_site

@@ -198,8 +198,8 @@ class Movements(Group):
 class Report(Group):
     """How figures are summed up."""
 
-    interval_s: float = Field(900.0, gt=0)
-    """s"""
+    interval_s: float = Field(900.0, ge=1, le=86_400)
+    """s, from a second to a day"""
 
 
 class Site(Group):

@@ -65,6 +65,19 @@ def test_the_page_needs_nothing_from_elsewhere(made):
     assert set(sources) == {"data:image/png;base64,"}
 
 
+def test_the_page_says_what_contradicts_the_calibration(tmp_path, made):
+    assert "calibration is contradicted" not in words(made[1])
+    scale = {"factor": 1.26, "sigma": 0.05, "vehicles": 20, "off": True}
+    sections = ["sections.main.length_m = 24, but by the calibration the gates are 31 m apart"]
+    folder = write_day(tmp_path / "day", [[3], [5]], scale=scale, sections=sections)
+    site = folder / "site.toml"
+    site.write_text(site.read_text().replace("[0, 0], [-20, 18]]", "[3, 0], [-20, 18]]"))
+    page = words(report(folder))
+    told = page.index("The calibration is contradicted, so speeds, lengths and places may be wrong:")
+    for reason in ("pair 5 of the calibration", "vehicles come out 1.26 times as large", sections[0]):
+        assert told < page.index(reason) < page.index("Turning movements")
+
+
 def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made):
     assert "Conflicts" not in words(made[1])
     assert not (made[1] / "conflicts.csv").exists()

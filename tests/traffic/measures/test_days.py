@@ -269,6 +269,24 @@ def test_a_damaged_table_is_told(tmp_path):
         measured([str(run)], site())
 
 
+def test_a_table_of_a_run_that_ended_is_whole(tmp_path):
+    """What is missing would be taken for a time in which nobody came."""
+    run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
+    table = pq.read_table(run / "tracks.parquet")
+    (run / "tracks.parquet").unlink()
+    rows = zip(*table.to_pydict().values(), strict=True)
+    lines = [",".join(map(str, row)) for row in (table.column_names, *rows)]
+    (run / "tracks.csv").write_text("\n".join(lines) + "\n")
+    summary = json.loads((run / "summary.json").read_text())
+    (run / "summary.json").write_text(json.dumps(summary | {"interrupted": False}))
+    assert measured([str(run)], site()).report["tracks"] == 1
+    (run / "tracks.csv").write_text("\n".join(lines)[:-3])
+    with pytest.raises(FormatError, match="cut off in its last line, though the run ended"):
+        measured([str(run)], site())
+    (run / "summary.json").write_text(json.dumps(summary | {"interrupted": True}))
+    assert measured([str(run)], site()).report["tracks"] == 1  # it was killed, or goes on
+
+
 def test_a_line_that_is_being_written_is_not_read(tmp_path):
     text = "time_s,status,track_id\n"
     for rows in ("", "0.0,confirmed,1\n", "0.0,confirmed,1\n0.04,confirmed,12\n"):

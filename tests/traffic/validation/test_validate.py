@@ -57,6 +57,29 @@ def test_at_the_ends_of_the_time_nothing_is_lost_and_nothing_is_invented():
     assert (figures.hit, figures.missed, figures.false, figures.uncertain) == (1, 0, 0, 1)
 
 
+def day(shift_s=0.0, share=1.0, seed=3):
+    """Crossings of six hours by the clock, 300 an hour; of each that share."""
+    random = np.random.default_rng(seed)
+    t = np.sort(random.uniform(0, 6 * 3600, 1800))
+    t = t[random.uniform(size=len(t)) < share] + shift_s
+    names = np.array(["a", "b"], object)[(t - shift_s > 3 * 3600).astype(int)]
+    return Events("utc", t, names, np.full(len(t), "up", object), np.ones(len(t), bool))
+
+
+@pytest.mark.parametrize(("shift_s", "words"), [(3600, "1 h late"), (-5400, "1.5 h early")])
+def test_a_count_by_hand_in_another_zone_is_refused_though_it_overlaps(shift_s, words):
+    noted = day(shift_s)
+    hour = noted.select(np.abs(noted.time - shift_s - 9000) < 1800)
+    with pytest.raises(ConfigError, match=f"by hand is {words}: 283 of its 283 crossings .* check its zone"):
+        validate(day(), hour, 1.0)
+
+
+def test_a_bad_count_is_of_no_other_zone():
+    figures = validate(day(share=0.3), day(), 1.0).pooled
+    assert figures.recall.value < 0.5
+    assert validate(day(seed=4), day(), 1.0).pooled.hit < 1000  # of another day
+
+
 def test_what_does_not_overlap_is_refused():
     early, late = events((1, "a", "up")), events((100, "a", "up"))
     with pytest.raises(ConfigError, match=r"no overlap in time: what was counted lies between 1\.000 s"):

@@ -10,7 +10,7 @@ import pytest
 from vidtrack.cli import cli
 from vidtrack.errors import Error
 
-COUNTS = "time_s,frame,line,direction,track_id\n1.0,25,north,up,1\n2.0,50,north,down,2\n3.5,88,south,up,3\n"
+COUNTS = "time_s,frame,line,direction,track_id\n1.0,25,north,up,1\n2.0,50,north,down,2\n3.5,88,south,up,3\n4,100,west,left,4\n"
 CROSSINGS = (
     "time_s,utc,gate,direction,track_id\n"
     "1.0,2026-06-01T05:00:01+00:00,north,up,1\n2.0,2026-06-01T05:00:02+00:00,north,down,2\n"
@@ -81,7 +81,9 @@ def test_measures_of_a_site_without_start_are_compared_by_seconds_or_the_user_is
     [
         ("time_s,gate,direction\n1,nort,up\n", "run", 2, "gate 'nort' is not in"),
         ("time_s,gate,direction\n1,nort,up\n", "run", 2, "did you mean north?"),
-        ("time_s,gate,direction\n1,north,upp\n", "run", 2, "direction 'upp' is not in"),
+        ("time_s,gate,direction\n1,north,upp\n", "run", 2, "direction 'upp' of gate north is not in"),
+        ("time_s,gate,direction\n1,west,up\n", "run", 2, "direction 'up' of gate west is not in"),
+        ("time_s,gate,direction\n1,north,left\n", "run", 2, "counts.csv; there is up, down"),
         ("time_s,gate,direction\n100,north,up\n", "run", 2, "no overlap in time"),
         ("time_s,gate,direction\n", "run", 2, "is empty"),
         ("", "run", 2, "has no column time_s or utc"),
@@ -91,7 +93,7 @@ def test_measures_of_a_site_without_start_are_compared_by_seconds_or_the_user_is
         ("time_s,gate\n1,north\n", "run", 2, "has no column direction"),
         ("time_s,gate,direction\nsoon,north,up\n", "run", 2, "line 2: time_s is 'soon'; write seconds"),
         ("time_s,gate,direction\nnan,north,up\n", "run", 2, "line 2: time_s is 'nan'"),
-        ("time_s,gate,direction\n1,north\n", "run", 2, "direction '' is not in"),
+        ("time_s,gate,direction\n1,north\n", "run", 2, "direction '' of gate north is not in"),
         ("time_s,gate,direction,certain\n1,north,up,perhaps\n", "run", 2, "certain is 'perhaps'; write 1 or 0"),
         (
             "utc,gate,direction\n2026-06-01T05:00:01,north,up\n",

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from vidtrack.traffic.calibration.account import examined
+from vidtrack.traffic.measures.doubts import doubts
 from vidtrack.traffic.report.close import Close
 from vidtrack.traffic.report.findings import CONFLICTS, Findings
 from vidtrack.traffic.report.legs import LegDay
@@ -52,6 +54,15 @@ class Page:
     def times(self) -> list[str]:
         """(I + 1,) the ends of the intervals in words."""
         return [self.found.clock.label(t) for t in self.found.edges]
+
+    @property
+    def doubts(self) -> list[str]:
+        """What contradicts the calibration: its own points, the traffic, the lengths of sections."""
+        if not self.found.metres:
+            return []
+        account, measured = examined(self.found.site).report, self.found.report
+        by_points = account["warnings"] if account["contradiction"] else []
+        return [*by_points, *doubts(measured), *measured["sections"]]
 
     @property
     def peaks(self) -> list[tuple[str, float, float, float, float]]:

@@ -8,13 +8,14 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import pairwise
+from os import SEEK_END
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.errors import ConfigError, SourceError
+from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.metres import SITE_COPY
 
 _JOINED_S = 1.0
@@ -219,6 +220,8 @@ def _found(run: str) -> _Found:
         raise ConfigError(f"{folder} is not a run over video: its summary.json has no frames, size and times") from None
     if frames < 1 or fps <= 0 or min(size) < 1:
         raise SourceError(f"{folder} has no frames; there is nothing to measure")
+    if summary.get("interrupted") is False and _cut_off(folder):
+        raise FormatError(f"{folder / 'tracks.csv'} is cut off in its last line, though the run ended; copy it again")
     began = summary.get("began")
     zero = time or (datetime.fromisoformat(began) if began else None)
     begin = float(source.get("start_s") or 0.0)
@@ -226,6 +229,15 @@ def _found(run: str) -> _Found:
         begin = spans[0][0] if spans else end - (frames - 1) / fps
     breaks = tuple((before[1] + 1 / fps, after[0]) for before, after in pairwise(spans))
     return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks)
+
+
+def _cut_off(folder: Path) -> bool:
+    """Whether the only table of a run does not end with a whole line."""
+    if (folder / "tracks.parquet").is_file():
+        return False
+    with (folder / "tracks.csv").open("rb") as file:
+        file.seek(max(0, file.seek(0, SEEK_END) - 1))
+        return file.read() != b"\n"
 
 
 def _split(run: str) -> tuple[Path, datetime | None]:

@@ -30,7 +30,10 @@ CONFLICTS = (
     *("ttc_s", "ttc_sigma_s", "pet_s", "pet_sigma_s", "reason"),
 )
 """What is read of the table of conflicts, which only calibrated sites have"""
-KEYS = ("site", "metres", "runs", "utc_of_time_0", "watched_s", "tracks", "joins", "impossible_movements")
+KEYS = (
+    *("site", "metres", "runs", "utc_of_time_0", "watched_s", "tracks", "joins", "impossible_movements"),
+    *("scale", "straightness", "sections"),
+)
 """What is read of measures.json."""
 
 

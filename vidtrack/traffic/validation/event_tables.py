@@ -18,6 +18,7 @@ from vidtrack.errors import ConfigError, SourceError
 
 _GATE = ("gate", "line")
 _CLOCKS = ("time_s", "utc")
+_OPPOSITE = {"up": "down", "down": "up", "left": "right", "right": "left"}
 _CERTAIN = {"1": True, "true": True, "yes": True, "": True, "0": False, "false": False, "no": False}
 
 
@@ -48,21 +49,22 @@ class Events:
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """What was counted, and the gates and directions that there are, also those that nobody crossed."""
+    """What was counted, and the directions of each gate, also of those that nobody crossed."""
 
     path: Path
     events: Events
-    gates: tuple[str, ...]
-    directions: tuple[str, ...]
+    directions: dict[str, tuple[str, ...]]
 
     def check(self, manual: Events, path: Path) -> None:
-        """Raise ConfigError for a gate or a direction in a manual count that the counted table cannot have."""
-        for what, known, used in (("gate", self.gates, manual.gate), ("direction", self.directions, manual.direction)):
-            for name in dict.fromkeys(used.tolist()):
-                if name not in known:
-                    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-                    hint = f"did you mean {near[0]}?" if near else f"there is {', '.join(known)}"
-                    raise ConfigError(f"{path}: {what} {name!r} is not in {self.path}; {hint}")
+        """Raise ConfigError for a gate, or a direction of it, in a manual count that the counted table cannot have."""
+        for gate, direction in dict.fromkeys(zip(manual.gate.tolist(), manual.direction.tolist(), strict=True)):
+            ways = self.directions.get(gate)
+            what, name, known = ("gate", gate, [*self.directions]) if ways is None else ("direction", direction, ways)
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+                hint = f"did you mean {near[0]}?" if near else f"there is {', '.join(known)}"
+                of = "" if ways is None else f" of gate {gate}"
+                raise ConfigError(f"{path}: {what} {name!r}{of} is not in {self.path}; {hint}")
 
 
 def read_manual(path: Path, clocks: Iterable[str]) -> Events:
@@ -94,10 +96,12 @@ def read_counted(folder: Path, path: Path, clock: str) -> Counted:
     if not rows:
         raise ConfigError(f"{path} is empty: nothing was counted, so there is nothing to compare")
     events = _events(path, rows, names, clock)
-    gates, directions = dict.fromkeys(events.gate.tolist()), dict.fromkeys(events.direction.tolist())
-    for gate, direction in _ways(folder):
-        gates[gate] = directions[direction] = None
-    return Counted(path, events, tuple(gates), tuple(directions))
+    directions: dict[str, tuple[str, ...]] = {}
+    ways = chain(zip(events.gate.tolist(), events.direction.tolist(), strict=True), _ways(folder))
+    for gate, direction in ways:
+        both = direction, _OPPOSITE.get(direction, direction)
+        directions[gate] = tuple(dict.fromkeys((*directions.get(gate, ()), *both)))
+    return Counted(path, events, directions)
 
 
 def table_of(folder: Path) -> Path:

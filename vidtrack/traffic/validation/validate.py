@@ -21,6 +21,10 @@ from vidtrack.traffic.validation.event_tables import Events, written
 _TAIL = 0.025
 WANTED_BIAS = 0.05
 """Half the width of the bias's interval that a count by hand shall reach."""
+_ZONES_S = 900 * np.arange(-56, 57)
+"""s; by which clocks of two zones differ: quarters of an hour, up to 14 hours"""
+_FEWEST = 10
+"""Crossings that must be found in another zone before it is named: fewer meet by chance"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +94,7 @@ def validate(
     begin, end   of the count by hand; None: the first and the last noted crossing, and the tolerance around them
 
     What was noted outside this time counts as uncertain. Raises ConfigError for a tolerance that is not above 0, and
-    where the two do not overlap in time.
+    where the two do not overlap in time, or are of two zones.
     """
     if not 0 < tolerance_s < np.inf:
         raise ConfigError(f"a tolerance of {tolerance_s} s; give a number of seconds above 0")
@@ -121,6 +125,8 @@ def validate(
     hours = (end - begin) / 3600
     figures = {gate: figures_of(tally, hours) for gate, tally in zip(gates, tallies, strict=True)}
     pooled = figures_of(np.sum(tallies, axis=0), hours)
+    if noted.clock == "utc" and 2 * pooled.hit < pooled.noted:
+        _check_zone(counted, noted.select(sure), pooled.hit, tolerance_s)
     unnoted = tuple(sorted({*counted.gate.tolist()} - {*gates}))
     return Validation(noted.clock, tolerance_s, begin, end, figures, pooled, unnoted)
 
@@ -213,6 +219,22 @@ def _check_overlap(counted: Events, noted: Events, begin: float, end: float, tol
                 f"no overlap in time: what was {what} lies between {_span(times, noted.clock)}, the count by hand "
                 f"between {_span((begin, end), noted.clock)}; check the clock and the zone"
             )
+
+
+def _check_zone(counted: Events, noted: Events, hit: int, tolerance_s: float) -> None:
+    """Raise ConfigError where most of what was noted, and twice as much as `hit`, is found in another zone."""
+    found = np.zeros(len(_ZONES_S), int)
+    for gate, direction in dict.fromkeys(zip(noted.gate.tolist(), noted.direction.tolist(), strict=True)):
+        there, here = ((one.gate == gate) & (one.direction == direction) for one in (noted, counted))
+        certain = np.ones(int(there.sum()), bool)
+        for k, shift in enumerate(_ZONES_S):
+            found[k] += (match(counted.time[here], noted.time[there] + shift, certain, tolerance_s) >= 0).sum()
+    best = int(found.argmax())
+    if found[best] >= _FEWEST and found[best] > max(2 * hit, len(noted) / 2):
+        raise ConfigError(
+            f"the count by hand is {abs(_ZONES_S[best]) / 3600:g} h {'early' if _ZONES_S[best] > 0 else 'late'}: "
+            f"{found[best]} of its {len(noted)} crossings are found then, and {hit} as it is; check its zone"
+        )
 
 
 def _span(times: Sequence[float] | Floats, clock: str) -> str:

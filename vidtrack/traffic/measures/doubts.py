@@ -1,4 +1,4 @@
-"""What the traffic says about a calibration, in words: for `vidtrack calibrate --run` and `vidtrack measure`."""
+"""What the traffic says about a calibration, in words."""
 
 from __future__ import annotations
 
