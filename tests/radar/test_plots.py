@@ -150,13 +150,17 @@ def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path)
     assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
 
 
-@pytest.mark.parametrize("order", ["shuffled", "downwards", "by sensor", "by target", "late", "one wrong time"])
+@pytest.mark.parametrize(
+    "order", ["shuffled", "downwards", "downwards with a missed scan", "by sensor", "by target", "late", "wrong time"]
+)
 def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tmp_path, caplog, order):
     rows = [row + ",0" for row in _rows_of_scans()]
     if order == "shuffled":
         rows = [rows[k] for k in np.random.default_rng(0).permutation(len(rows))]
     elif order == "downwards":
         rows = rows[::-1]
+    elif order == "downwards with a missed scan":
+        rows = (rows[:100] + rows[105:])[::-1]
     elif order == "by sensor":
         rows = [row[:-1] + "north" for row in rows[::2]] + [row[:-1] + "south" for row in rows[1::2]]
     elif order == "by target":
@@ -167,7 +171,11 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
         rows[50] = "9000,1500,0,0"
     plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,source"))
     times = [4.0 * k for k in range(40) for _ in range(5)]
-    assert plots.time_s.tolist() == (times if order != "one wrong time" else [*times[:50], *times[51:], 9000])
+    if "missed" in order:
+        times[100:105] = []
+    elif "wrong" in order:
+        times = [*times[:50], *times[51:], 9000]
+    assert plots.time_s.tolist() == times
     assert "goes back" not in caplog.text
 
 
