@@ -111,6 +111,15 @@ def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told)
     assert ("too coarse to tell its turns: give a column 'scan'" in caplog.text) is told
 
 
+def test_scans_in_bursts_are_no_turns_of_an_antenna(tmp_path, caplog):
+    rng = np.random.default_rng(0)
+    scans_s = [60 * k + j for k in range(4) for j in range(10)]
+    rows = [f"{t},{rng.uniform(3e3, 11e3):.1f},{rng.uniform(70, 110):.3f}" for t in scans_s for _ in range(4)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [t for t in scans_s for _ in range(4)]
+    assert "antenna" not in caplog.text
+
+
 @pytest.mark.parametrize("targets", [1, 3])
 @pytest.mark.parametrize("scan_s", [1, 4, 30])
 def test_targets_that_stay_in_their_direction_are_no_turning_antenna(tmp_path, caplog, targets, scan_s):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import Rounds, Turns, is_unknown, pace_of
+from vidtrack.radar.feeds.pace import Rounds, Turns, is_unknown, pace_of, turn_within
 
 TURN_S = 4.7
 
@@ -79,6 +79,32 @@ def test_turns_are_found_where_several_plots_share_a_rounded_time(coarse_s):
     scan = np.floor(pace.progress(messages)).astype(int)
     assert isinstance(pace, Turns)
     assert (scan - scan[0] == np.array(turn) - turn[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("on_s", "every_s", "bursts"), [(10, 60, 4), (5, 30, 8), (10, 40, 6), (8, 30, 6), (None, 0, 0)]
+)
+def test_scans_in_bursts_or_at_irregular_times_in_a_sector_are_no_antenna(on_s, every_s, bursts):
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        scans_s = [every_s * k + np.arange(on_s) for k in range(bursts)] if on_s else [rng.uniform(0.5, 8, 60).cumsum()]
+        time_s = np.repeat(np.concatenate(scans_s), rng.integers(4, 11)).astype(float)
+        place = rng.uniform(3e3, 1.1e4, len(time_s)), np.radians(90 + rng.uniform(-20, 20, len(time_s)))
+        plots = Messages.of([Message(Kind.POLAR, 0, 48, *one) for one in zip(time_s, *place, strict=True)])
+        coarse_s = float(np.quantile(np.diff(np.unique(time_s)), 0.1))
+        assert isinstance(pace_of(plots, None, coarse_s), Rounds)
+        assert turn_within(plots, coarse_s) is None
+
+
+def test_turns_are_found_from_plots_in_a_sector():
+    messages, turn = swept(np.random.default_rng(1), marks=())
+    messages.u[:] = np.random.default_rng(2).uniform(2e3, 6e4, len(messages))
+    messages = messages.only(kept := np.abs(messages.v - np.pi / 2) < np.radians(45))
+    messages.time_s[:] = np.floor(messages.time_s / 0.5) * 0.5
+    pace = pace_of(messages, None, 0.5)
+    scan = np.floor(pace.progress(messages)).astype(int)
+    assert pace.period_s == pytest.approx(TURN_S, rel=0.02)
+    assert (scan - scan[0] == np.array(turn)[kept] - np.array(turn)[kept][0]).all()
 
 
 def test_scattered_azimuths_do_not_turn_the_antenna():
