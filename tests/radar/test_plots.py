@@ -101,6 +101,17 @@ def test_turns_of_the_antenna_are_scans_where_times_are_in_whole_seconds(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+def test_turns_in_another_order_than_their_times_are_not_taken(tmp_path, caplog):
+    rng = np.random.default_rng(24)
+    turns = np.sort(rng.uniform(0, 60, 120))
+    azimuth, false = 360 * turns % 360, rng.random(120) < 0.1
+    azimuth[false] = rng.uniform(0, 360, false.sum())
+    rows = [f"{int(4 * t)},{rng.uniform(3e3, 5e4):.1f},{a:.3f}" for t, a in zip(turns, azimuth, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == np.floor(4 * turns).tolist()
+    assert "antenna" not in caplog.text
+
+
 @pytest.mark.parametrize(("turn_s", "told"), [(1.5, True), (1.8, True), (4.0, False)])
 def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told):
     rng = np.random.default_rng(0)

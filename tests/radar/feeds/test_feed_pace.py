@@ -81,19 +81,29 @@ def test_turns_are_found_where_several_plots_share_a_rounded_time(coarse_s):
     assert (scan - scan[0] == np.array(turn) - turn[0]).all()
 
 
-@pytest.mark.parametrize(
-    ("on_s", "every_s", "bursts"), [(10, 60, 4), (5, 30, 8), (10, 40, 6), (8, 30, 6), (None, 0, 0)]
-)
-def test_scans_in_bursts_or_at_irregular_times_in_a_sector_are_no_antenna(on_s, every_s, bursts):
+def of_times(rng, time_s, half_deg):
+    """Plots (N,) at times (N,) in a sector about east, and the tenth percentile of the steps between their times."""
+    place = rng.uniform(3e3, 1.1e4, len(time_s)), np.radians(90 + rng.uniform(-half_deg, half_deg, len(time_s)))
+    plots = Messages.of([Message(Kind.POLAR, 0, 48, *one) for one in zip(time_s, *place, strict=True)])
+    return plots, float(np.quantile(np.diff(np.unique(time_s)), 0.1))
+
+
+@pytest.mark.parametrize(("on_s", "every_s", "bursts"), [(10, 60, 4), (5, 30, 8), (10, 40, 6), (8, 30, 6)])
+def test_scans_in_bursts_in_a_sector_are_no_antenna(on_s, every_s, bursts):
     for seed in range(20):
         rng = np.random.default_rng(seed)
-        scans_s = [every_s * k + np.arange(on_s) for k in range(bursts)] if on_s else [rng.uniform(0.5, 8, 60).cumsum()]
-        time_s = np.repeat(np.concatenate(scans_s), rng.integers(4, 11)).astype(float)
-        place = rng.uniform(3e3, 1.1e4, len(time_s)), np.radians(90 + rng.uniform(-20, 20, len(time_s)))
-        plots = Messages.of([Message(Kind.POLAR, 0, 48, *one) for one in zip(time_s, *place, strict=True)])
-        coarse_s = float(np.quantile(np.diff(np.unique(time_s)), 0.1))
-        assert isinstance(pace_of(plots, None, coarse_s), Rounds)
-        assert turn_within(plots, coarse_s) is None
+        scans_s = np.concatenate([every_s * k + np.arange(on_s) for k in range(bursts)])
+        plots, step_s = of_times(rng, np.repeat(scans_s, rng.integers(4, 11)).astype(float), half_deg=20)
+        assert isinstance(pace_of(plots, None, step_s), Rounds)
+        assert turn_within(plots, step_s) is None
+
+
+def test_scans_at_irregular_times_in_a_sector_are_no_antenna():
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        plots, step_s = of_times(rng, np.repeat(rng.uniform(0.5, 8, 40).cumsum(), 6), half_deg=30)
+        assert isinstance(pace_of(plots, None, step_s), Rounds)
+        assert turn_within(plots, step_s) is None
 
 
 def test_turns_are_found_from_plots_in_a_sector():
