@@ -199,6 +199,15 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
     assert "goes back" not in caplog.text
 
 
+@pytest.mark.parametrize(("column", "begin_s", "back_s"), [("date", 86_320, 86_400), ("file", 0, 60)])
+def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, caplog, column, begin_s, back_s):
+    scans_s = [begin_s + 4 * k - back_s * (k >= 20) for k in range(40)]
+    rows = [f"{t},{1000 + 10 * k + n},{72 * n},{'ab'[k >= 20]}" for k, t in enumerate(scans_s) for n in range(5)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{column}"))
+    assert plots.time_s.tolist() == sorted(t for t in scans_s for _ in range(5))
+    assert f"at line 102, where column '{column}' changes: rows are sorted by time_s" in caplog.text
+
+
 @pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])
 def test_a_time_that_cannot_be_one_does_not_hide_the_turns_of_the_antenna(tmp_path, caplog, stray):
     times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))

@@ -18,6 +18,8 @@ LATE_S = 5.0
 """s; a row of a table that is later in it by more than this is out of order, or its clock was set back."""
 FEW = 3
 """Steps back in a table in order of arrival; with more of them its rows are in another order."""
+SAME = 0.9
+"""Share of the longest piece of a table, from one step back to the next, that all cover, if each is of one sensor."""
 AGREED, KEPT = 3, 10
 """Rows before a clock was set back, and rows after it, that agree about it."""
 
@@ -80,6 +82,13 @@ def _stays_back(time_s: Floats, row: int, end: int) -> bool:
     ahead = time_s[row:end] >= before_s
     kept = time_s[row : row + int(ahead.argmax()) if ahead.any() else end]
     return len(kept) >= KEPT and len(np.unique(kept)) >= AGREED
+
+
+def cover_the_same(time_s: Floats, back: Ints) -> bool:
+    """Whether the pieces of times (N,) between the rows (K,) at which they go back cover nearly the same times."""
+    pieces = np.split(time_s, back)
+    begin_s, end_s = (np.array([one(piece) for piece in pieces]) for one in (np.min, np.max))
+    return bool(end_s.min() - begin_s.max() >= SAME * (end_s - begin_s).max())
 
 
 def longest_step(step_s: Floats) -> float:
