@@ -208,6 +208,15 @@ def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, ca
     assert f"at line 102, where column '{column}' changes: rows are sorted by time_s" in caplog.text
 
 
+@pytest.mark.parametrize("targets", [2, 3, 4])
+def test_targets_one_after_the_other_are_of_one_time_without_a_column_that_names_them(tmp_path, caplog, targets):
+    rows = [f"{4 * k + n},{1000 + 10 * k},{72 * n}" for n in range(targets) for k in range(40)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == sorted(4 * k + n for n in range(targets) for k in range(40))
+    assert "goes back from 156 to 1 s at line 42" in caplog.text
+    assert "where it began before: rows are sorted by time_s" in caplog.text
+
+
 @pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])
 def test_a_time_that_cannot_be_one_does_not_hide_the_turns_of_the_antenna(tmp_path, caplog, stray):
     times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))

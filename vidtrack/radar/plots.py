@@ -19,7 +19,7 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
 from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import closed_up, cover_the_same, longest_step, set_back
+from vidtrack.radar.rhythm import begins_again, closed_up, cover_the_same, longest_step, set_back
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -153,6 +153,12 @@ def _on_one_clock(table: Table) -> Table:
                 "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock "
                 "was set, give times that go on", where, column, column,
             )  # fmt: skip
+        return table
+    if begins_again(time_s, back):
+        _log.warning(
+            "%s, where it began before: rows are sorted by time_s, as if they were of one target or sensor after the "
+            "other; if the clock was set, give times that go on", where,
+        )  # fmt: skip
         return table
     step_s = np.diff(time_s)
     offset = np.zeros(len(table.line))

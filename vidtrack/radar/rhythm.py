@@ -84,6 +84,11 @@ def _stays_back(time_s: Floats, row: int, end: int) -> bool:
     return len(kept) >= KEPT and len(np.unique(kept)) >= AGREED
 
 
+def begins_again(time_s: Floats, back: Ints) -> bool:
+    """Whether times (N,) go back, at one of the rows (K,), to where they began or went back to before."""
+    return bool((np.abs(np.diff(time_s[[0, *back]])) <= LATE_S).any())
+
+
 def cover_the_same(time_s: Floats, back: Ints) -> bool:
     """Whether the pieces of times (N,) between the rows (K,) at which they go back cover nearly the same times."""
     pieces = np.split(time_s, back)
