@@ -9,7 +9,7 @@ from vidtrack.config.load import load
 from vidtrack.output.sink import Step
 from vidtrack.radar.network.network import read_feeds
 from vidtrack.radar.network.radars import read_radars
-from vidtrack.run.road import have_common_place, told_if_apart
+from vidtrack.run.road import is_shown, told_if_apart
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.road_scans import InPicture
 
@@ -47,4 +47,4 @@ def test_a_radar_whose_plots_the_camera_does_not_show_has_no_common_place(tmp_pa
     (tmp_path / "radars.toml").write_text(f"[radars.radar]\nx_m = {x_m}\ny_m = 0\n")
     feeds = read_feeds([str(tmp_path / "radar.csv")], read_radars(tmp_path / "radars.toml"), load().radar)
     ground = calibrated(site_of(Pinhole().picture(POINTS), POINTS))
-    assert have_common_place(feeds, InPicture(ground, (WIDTH, HEIGHT))) is common
+    assert is_shown(feeds[0], InPicture(ground, (WIDTH, HEIGHT))) is common
