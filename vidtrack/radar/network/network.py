@@ -70,11 +70,6 @@ class Feed:
         """The times of the first and last plot."""
         return float(self.plots.time_s.min()), float(self.plots.time_s.max())
 
-    @property
-    def coasted_s(self) -> float:
-        """So long a track goes on without a plot of this radar."""
-        return self.settings.coast_scans * self.scan_s
-
 
 @dataclass(frozen=True, slots=True)
 class Turn:
@@ -214,8 +209,8 @@ def overlap(one: tuple[float, float], other: tuple[float, float], within_s: floa
 
 
 def _at_one_time(one: Feed, other: Feed) -> bool:
-    """Whether the times of two radars overlap, to within what a track coasts."""
-    return overlap(one.span_s, other.span_s, max(one.coasted_s, other.coasted_s))
+    """Whether the times of two radars overlap, to within a scan."""
+    return overlap(one.span_s, other.span_s, max(one.scan_s, other.scan_s))
 
 
 def _at_one_place(one: Feed, other: Feed) -> bool:
@@ -225,8 +220,8 @@ def _at_one_place(one: Feed, other: Feed) -> bool:
 
 def _near(feed: Feed) -> Sector:
     """What a radar covers, and as far beyond as a track coasts."""
-    coverage = feed.coverage
-    return replace(coverage, farthest=coverage.farthest + feed.settings.max_speed * feed.coasted_s)
+    coasted_s = feed.settings.coast_scans * feed.scan_s
+    return replace(feed.coverage, farthest=feed.coverage.farthest + feed.settings.max_speed * coasted_s)
 
 
 def _radars(feeds: Sequence[Feed]) -> str:
