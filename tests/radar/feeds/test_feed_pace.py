@@ -67,7 +67,14 @@ def test_a_target_round_the_radar_is_no_slow_antenna(turns):
     found = [Message(Kind.POLAR, 0, 48, 60 * one, 300 + rng.normal(0, 3), 2 * np.pi * one) for one in part]
     pace, _ = scans(Messages.of(found))
     assert isinstance(pace, Rounds)
-    assert is_unknown(pace, Messages.of(found))
+    assert is_unknown(pace, Messages.of(found)) is (turns >= 1)
+
+
+def test_a_radar_that_stares_in_one_direction_is_not_asked_for_its_turns():
+    rng = np.random.default_rng(0)
+    azimuth = np.radians(40 + rng.normal(0, 0.3, 200))
+    plots = Messages.of([Message(Kind.POLAR, 0, 48, 0.1 * k, 5000 + 3 * k, v) for k, v in enumerate(azimuth)])
+    assert not is_unknown(pace_of(plots, None), plots)
 
 
 @pytest.mark.parametrize("coarse_s", [0.1, 1.0, 2.0])

@@ -157,11 +157,15 @@ def pace_of(messages: Messages, scan_s: float | None, coarse_s: float = 0.0) -> 
 
 
 def is_unknown(pace: Pace, messages: Messages) -> bool:
-    """Whether plots come one by one, as from a turning antenna, but nothing tells how long a turn takes."""
+    """Whether plots come one by one from all round, as from a turning antenna, but nothing tells how long a turn takes.
+
+    Those of a radar that stares stay in some quarters.
+    """
     plots = messages.only(~messages.marks)
     if isinstance(pace, Turns) or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
         return False
-    return len(plots) > 2 and len(np.unique(plots.time_s)) >= ONE_BY_ONE * len(plots)
+    quarters = np.unique(np.floor(plots.v / (np.pi / 2)) % 4)
+    return len(quarters) == 4 and len(np.unique(plots.time_s)) >= ONE_BY_ONE * len(plots)
 
 
 def _stated(messages: Messages) -> float | None:
