@@ -101,6 +101,17 @@ def test_turns_of_the_antenna_are_scans_where_times_are_in_whole_seconds(tmp_pat
     assert "40 scans, 4" in caplog.text
 
 
+def test_turns_in_another_order_than_their_times_are_not_taken(tmp_path, caplog):
+    rng = np.random.default_rng(24)
+    turns = np.sort(rng.uniform(0, 60, 120))
+    azimuth, false = 360 * turns % 360, rng.random(120) < 0.1
+    azimuth[false] = rng.uniform(0, 360, false.sum())
+    rows = [f"{int(4 * t)},{rng.uniform(3e3, 5e4):.1f},{a:.3f}" for t, a in zip(turns, azimuth, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == np.floor(4 * turns).tolist()
+    assert "antenna" not in caplog.text
+
+
 @pytest.mark.parametrize(("turn_s", "told"), [(1.5, True), (1.8, True), (4.0, False)])
 def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told):
     rng = np.random.default_rng(0)
@@ -109,6 +120,15 @@ def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told)
     rows = [f"{int(turn_s * t)},{r:.1f},{360 * t % 360:.3f}" for t, r in ranged]
     read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
     assert ("too coarse to tell its turns: give a column 'scan'" in caplog.text) is told
+
+
+def test_scans_in_bursts_are_no_turns_of_an_antenna(tmp_path, caplog):
+    rng = np.random.default_rng(0)
+    scans_s = [60 * k + j for k in range(4) for j in range(10)]
+    rows = [f"{t},{rng.uniform(3e3, 11e3):.1f},{rng.uniform(70, 110):.3f}" for t in scans_s for _ in range(4)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [t for t in scans_s for _ in range(4)]
+    assert "antenna" not in caplog.text
 
 
 @pytest.mark.parametrize("targets", [1, 3])
@@ -150,13 +170,17 @@ def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path)
     assert plots.scan.tolist() == np.floor(times / 4).astype(int).tolist()
 
 
-@pytest.mark.parametrize("order", ["shuffled", "downwards", "by sensor", "by target", "late", "one wrong time"])
+@pytest.mark.parametrize(
+    "order", ["shuffled", "downwards", "downwards with a missed scan", "by sensor", "by target", "late", "wrong time"]
+)
 def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tmp_path, caplog, order):
     rows = [row + ",0" for row in _rows_of_scans()]
     if order == "shuffled":
         rows = [rows[k] for k in np.random.default_rng(0).permutation(len(rows))]
     elif order == "downwards":
         rows = rows[::-1]
+    elif order == "downwards with a missed scan":
+        rows = (rows[:100] + rows[105:])[::-1]
     elif order == "by sensor":
         rows = [row[:-1] + "north" for row in rows[::2]] + [row[:-1] + "south" for row in rows[1::2]]
     elif order == "by target":
@@ -167,8 +191,30 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
         rows[50] = "9000,1500,0,0"
     plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,source"))
     times = [4.0 * k for k in range(40) for _ in range(5)]
-    assert plots.time_s.tolist() == (times if order != "one wrong time" else [*times[:50], *times[51:], 9000])
+    if "missed" in order:
+        times[100:105] = []
+    elif "wrong" in order:
+        times = [*times[:50], *times[51:], 9000]
+    assert plots.time_s.tolist() == times
     assert "goes back" not in caplog.text
+
+
+@pytest.mark.parametrize(("column", "begin_s", "back_s"), [("date", 86_320, 86_400), ("file", 0, 60)])
+def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, caplog, column, begin_s, back_s):
+    scans_s = [begin_s + 4 * k - back_s * (k >= 20) for k in range(40)]
+    rows = [f"{t},{1000 + 10 * k + n},{72 * n},{'ab'[k >= 20]}" for k, t in enumerate(scans_s) for n in range(5)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{column}"))
+    assert plots.time_s.tolist() == sorted(t for t in scans_s for _ in range(5))
+    assert f"at line 102, where column '{column}' changes: rows are sorted by time_s" in caplog.text
+
+
+@pytest.mark.parametrize("targets", [2, 3, 4])
+def test_targets_one_after_the_other_are_of_one_time_without_a_column_that_names_them(tmp_path, caplog, targets):
+    rows = [f"{4 * k + n},{1000 + 10 * k},{72 * n}" for n in range(targets) for k in range(40)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == sorted(4 * k + n for n in range(targets) for k in range(40))
+    assert "goes back from 156 to 1 s at line 42" in caplog.text
+    assert "where it began before: rows are sorted by time_s" in caplog.text
 
 
 @pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])

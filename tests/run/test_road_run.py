@@ -9,7 +9,9 @@ from vidtrack.config.load import load
 from vidtrack.output.sink import Step
 from vidtrack.radar.network.network import read_feeds
 from vidtrack.radar.network.radars import read_radars
-from vidtrack.run.road import have_common_place, told_if_apart
+from vidtrack.run.road import ROAD, is_shown, run_road, told_if_apart
+from vidtrack.simulate import simulate_road
+from vidtrack.simulate.roads.write import write_road
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.road_scans import InPicture
 
@@ -27,6 +29,7 @@ def steps(times_s):
     [
         ([(0, 0), (1, 1), (0, 2), (1, 3)], ""),
         ([(0, 0), (0, 2), (1, 2)], ""),
+        ([(0, 0), (0, 2), (1, 6)], ""),  # a track goes on for so long
         ([(0, 0), (0, 2)], ""),
         ([(1, 0), (1, 14), (0, 1000), (0, 1010)], "scans 1000 to 1010 s, pictures 0 to 14 s"),
         ([(0, 0), (0, 10), (1, 20), (1, 30)], "scans 0 to 10 s, pictures 20 to 30 s"),
@@ -34,7 +37,7 @@ def steps(times_s):
 )
 def test_a_radar_and_a_camera_without_a_common_time_are_told(caplog, times_s, said):
     given = steps(times_s)
-    assert list(told_if_apart(given, 1)) == given
+    assert list(told_if_apart(given, 1, 5.0)) == given
     assert ("have no common time" in caplog.text) is (said != "")
     assert said in caplog.text
 
@@ -47,4 +50,23 @@ def test_a_radar_whose_plots_the_camera_does_not_show_has_no_common_place(tmp_pa
     (tmp_path / "radars.toml").write_text(f"[radars.radar]\nx_m = {x_m}\ny_m = 0\n")
     feeds = read_feeds([str(tmp_path / "radar.csv")], read_radars(tmp_path / "radars.toml"), load().radar)
     ground = calibrated(site_of(Pinhole().picture(POINTS), POINTS))
-    assert have_common_place(feeds, InPicture(ground, (WIDTH, HEIGHT))) is common
+    assert is_shown(feeds[0], InPicture(ground, (WIDTH, HEIGHT))) is common
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    """A folder with a second of a simulated road."""
+    folder = tmp_path_factory.mktemp("road")
+    write_road(simulate_road("road", seed=2, fps=10.0, size=(320, 180), seconds=1.0), folder)
+    return folder
+
+
+def test_a_run_tells_of_a_radar_that_the_camera_never_meets(clip, tmp_path, caplog):
+    header = "scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg"
+    (tmp_path / "radar.csv").write_text("\n".join([header, *(f"{k},{5000 + k},{20 + 2 * k},0,1,1" for k in range(5))]))
+    (tmp_path / "radars.toml").write_text("[radars.radar]\nx_m = 99999\ny_m = 0\n")
+    given = [str(tmp_path / "radar.csv")], tmp_path / "radars.toml", str(clip / "video.avi"), clip / "site.toml"
+    with run_road(*given, load(base=ROAD), tmp_path / "run") as run:
+        assert len(list(run)) == 15
+    assert "no plot of a radar is where the camera shows the road" in caplog.text
+    assert "scans 5000 to 5004 s, pictures 0 to 0.9 s" in caplog.text

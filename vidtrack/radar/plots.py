@@ -17,9 +17,9 @@ from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order, possible_times
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import ONE_BY_ONE, Turns, pace_of, turn_within
+from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import closed_up, longest_step, set_back
+from vidtrack.radar.rhythm import begins_again, closed_up, cover_the_same, longest_step, set_back
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -139,26 +139,45 @@ def _on_one_clock(table: Table) -> Table:
     rows = np.flatnonzero(np.isfinite(possible_times(table.columns[name])))
     time_s = table.columns[name][rows]
     back = set_back(time_s)
-    if not len(back) or _grouped(table, rows[back]):
+    if not len(back):
+        return table
+    first, others = back[0], f", the first of {len(back)} such steps" if len(back) > 1 else ""
+    where = (
+        f"{table.path}: time_s goes back from {time_s[first - 1]:.10g} to {time_s[first]:.10g} s at {table.unit} "
+        f"{table.line[rows[first]]}{others}"
+    )
+    column = _changing(table, rows[back])
+    if column is not None:
+        if not cover_the_same(time_s, back):
+            _log.warning(
+                "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock "
+                "was set, give times that go on", where, column, column,
+            )  # fmt: skip
+        return table
+    if begins_again(time_s, back):
+        _log.warning(
+            "%s, where it began before: rows are sorted by time_s, as if they were of one target or sensor after the "
+            "other; if the clock was set, give times that go on", where,
+        )  # fmt: skip
         return table
     step_s = np.diff(time_s)
     offset = np.zeros(len(table.line))
     for k in back.tolist():
         offset[rows[k] :] += np.median(step_s[step_s > 0]) - step_s[k - 1]
-    first, others = back[0], f", the first of {len(back)} such steps" if len(back) > 1 else ""
     _log.warning(
-        "%s: time_s goes back from %.10g to %.10g s at %s %d%s, as if the clock was set: time goes on there; if the "
-        "rows are only out of order, sort them by time_s",
-        table.path, time_s[first - 1], time_s[first], table.unit, table.line[rows[first]], others,
-    )  # fmt: skip
+        "%s, as if the clock was set: time goes on there; if the rows are only out of order, sort them by time_s", where
+    )
     return replace(table, columns=table.columns | {name: table.columns[name] + offset})
 
 
-def _grouped(table: Table, back: Ints) -> bool:
-    """Whether rows are in order of another column, as a sensor or target, which changes where their time goes back."""
+def _changing(table: Table, back: Ints) -> str | None:
+    """The name of another column, as of a sensor or target, that changes where time goes back and hardly elsewhere."""
     measured = {TIME[1], *MEASURED}
-    changes = (table.changes(name) for name in table.names if name not in measured)
-    return any(bool(new[back].all()) and new.sum() <= 2 * len(back) for new in changes)
+    for name in table.names:
+        new = None if name in measured else table.changes(name)
+        if new is not None and new[back].all() and new.sum() <= 2 * len(back):
+            return name
+    return None
 
 
 def _one_by_one(steps: Floats, plots: int) -> bool:
@@ -199,6 +218,8 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
             )  # fmt: skip
         return None
     turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
+    if (coarse_s > 0 or pace.period_s > USUAL_S) and not _in_order(turn, plots.time_s):
+        return None
     scan = np.zeros(len(time_s))
     scan[rows] = turn - turn.min()
     _log.warning(
@@ -206,6 +227,12 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
         table.path, scan.max() + 1, pace.period_s,
     )  # fmt: skip
     return scan
+
+
+def _in_order(scan: Ints, time_s: Floats) -> bool:
+    """Whether scans, numbered (N,), follow each other by the means of their times (N,), as the check of order needs."""
+    _, member = np.unique(scan, return_inverse=True)
+    return bool((np.diff(np.bincount(member, time_s) / np.bincount(member)) >= 0).all())
 
 
 def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:

@@ -17,7 +17,7 @@ from vidtrack.output.linked import refuse_link
 from vidtrack.output.registration import RegistrationTable
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
-from vidtrack.radar.network.network import Feed, Network, read_feeds
+from vidtrack.radar.network.network import Feed, Network, read_feeds, warn_if_apart
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.run.radar import build_point_tracker, radar_sinks, rates
 from vidtrack.run.run import Extras, Pipeline, Run
@@ -50,6 +50,7 @@ def network_pipeline(
     """The pipeline of several plot tables. Raises SourceError, PlotFormatError, ConfigError."""
     origin = _origin(radars, settings.radar)
     network = Network(read_feeds(paths, radars, settings.radar))
+    warn_if_apart(network.feeds)
     refuse_link(settings.output, "radar runs")
     learn_ahead(settings, network, seed)
     tracker = build_network_tracker(settings, network, explain=extras.explain, seed=seed)

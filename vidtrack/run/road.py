@@ -20,7 +20,7 @@ from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.radar.filters import estimator, motion
-from vidtrack.radar.network.network import Feed, Network, Turn, read_feeds
+from vidtrack.radar.network.network import Feed, Network, Turn, overlap, read_feeds, warn_if_apart
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.radar.scans import surveyed
 from vidtrack.run.radar import radar_sinks, refuse_smoothing
@@ -92,10 +92,12 @@ def _pipeline(
     network = Network(read_feeds(paths, radars, settings.radar))
     with open_camera(video, site, settings) as camera:
         tracker = build_road_tracker(settings, network.feeds, camera, explain=extras.explain, seed=seed)
-        if not have_common_place(network.feeds, camera.coverage):
+        shown = [k for k, feed in enumerate(network.feeds) if is_shown(feed, camera.coverage)]
+        warn_if_apart(network.feeds, shown)
+        if not shown:
             _log.warning(
-                "no plot of a radar is where the camera shows the road, so no track is of both: are the places in %s "
-                "in the metres of %s, and the directions right?", radars.path, site,
+                "no plot of a radar is where the camera shows the road: are the places in %s in the metres of %s, and "
+                "the directions right?", radars.path, site,
             )  # fmt: skip
 
         def reading() -> dict[str, object]:
@@ -110,7 +112,11 @@ def _pipeline(
             name=Path(video).stem,
             place=Path(video),
             count=None,
-            steps=told_if_apart(road_steps(network, camera, tracker), len(network.feeds)),
+            steps=told_if_apart(
+                road_steps(network, camera, tracker),
+                len(network.feeds),
+                max(feed.scan_s for feed in network.feeds),
+            ),
             summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
             sinks=lambda folder: radar_sinks(
                 settings, extras, 2, [feed.placed.xyz[:2] for feed in network.feeds], folder
@@ -136,22 +142,24 @@ def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
         yield Camera(steps, RoadScans(ground, size), InPicture(ground, size))
 
 
-def have_common_place(feeds: Sequence[Feed], coverage: InPicture) -> bool:
-    """Whether any plot is in the picture."""
-    return any(coverage.share(feed.xy, np.zeros_like(feed.xy)).any() for feed in feeds)
+def is_shown(feed: Feed, coverage: InPicture) -> bool:
+    """Whether any plot of a radar is in the picture."""
+    return bool(coverage.share(feed.xy, np.zeros_like(feed.xy)).any())
 
 
-def told_if_apart(steps: Iterable[Step], radars: int) -> Iterator[Step]:
-    """The steps of so many radars, then a camera; after the last a warning, if they have no common time."""
-    first, last = np.full(2, np.inf), np.full(2, -np.inf)  # of radars, and of the camera
+def told_if_apart(steps: Iterable[Step], radars: int, within_s: float) -> Iterator[Step]:
+    """The steps of so many radars, then a camera; after the last a warning, if their times are more than that apart."""
+    spans: list[tuple[float, float] | None] = [None, None]  # of the radars together, and of the camera
     for step in steps:
         kind = int(step.scan.station >= radars)
-        first[kind], last[kind] = min(first[kind], step.time_s), max(last[kind], step.time_s)
+        begin, end = spans[kind] or (step.time_s, step.time_s)
+        spans[kind] = min(begin, step.time_s), max(end, step.time_s)
         yield step
-    if first.max() > last.min() and np.isfinite(last).all():
+    scans, pictures = spans
+    if scans and pictures and not overlap(scans, pictures, within_s):
         _log.warning(
-            "the radar and the camera have no common time (scans %.10g to %.10g s, pictures %.10g to %.10g s), so no "
-            "track is of both: times of plots count from the first picture", first[0], last[0], first[1], last[1],
+            "the radar and the camera have no common time (scans %.10g to %.10g s, pictures %.10g to %.10g s): times "
+            "of plots count from the first picture", *scans, *pictures,
         )  # fmt: skip
 
 

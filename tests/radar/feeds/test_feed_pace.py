@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import Rounds, Turns, is_unknown, pace_of
+from vidtrack.radar.feeds.pace import Rounds, Turns, is_unknown, pace_of, turn_within
 
 TURN_S = 4.7
 
@@ -67,7 +67,14 @@ def test_a_target_round_the_radar_is_no_slow_antenna(turns):
     found = [Message(Kind.POLAR, 0, 48, 60 * one, 300 + rng.normal(0, 3), 2 * np.pi * one) for one in part]
     pace, _ = scans(Messages.of(found))
     assert isinstance(pace, Rounds)
-    assert is_unknown(pace, Messages.of(found))
+    assert is_unknown(pace, Messages.of(found)) is (turns >= 1)
+
+
+def test_a_radar_that_stares_in_one_direction_is_not_asked_for_its_turns():
+    rng = np.random.default_rng(0)
+    azimuth = np.radians(40 + rng.normal(0, 0.3, 200))
+    plots = Messages.of([Message(Kind.POLAR, 0, 48, 0.1 * k, 5000 + 3 * k, v) for k, v in enumerate(azimuth)])
+    assert not is_unknown(pace_of(plots, None), plots)
 
 
 @pytest.mark.parametrize("coarse_s", [0.1, 1.0, 2.0])
@@ -79,6 +86,42 @@ def test_turns_are_found_where_several_plots_share_a_rounded_time(coarse_s):
     scan = np.floor(pace.progress(messages)).astype(int)
     assert isinstance(pace, Turns)
     assert (scan - scan[0] == np.array(turn) - turn[0]).all()
+
+
+def of_times(rng, time_s, half_deg):
+    """Plots (N,) at times (N,) in a sector about east, and the tenth percentile of the steps between their times."""
+    place = rng.uniform(3e3, 1.1e4, len(time_s)), np.radians(90 + rng.uniform(-half_deg, half_deg, len(time_s)))
+    plots = Messages.of([Message(Kind.POLAR, 0, 48, *one) for one in zip(time_s, *place, strict=True)])
+    return plots, float(np.quantile(np.diff(np.unique(time_s)), 0.1))
+
+
+@pytest.mark.parametrize(("on_s", "every_s", "bursts"), [(10, 60, 4), (5, 30, 8), (10, 40, 6), (8, 30, 6)])
+def test_scans_in_bursts_in_a_sector_are_no_antenna(on_s, every_s, bursts):
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        scans_s = np.concatenate([every_s * k + np.arange(on_s) for k in range(bursts)])
+        plots, step_s = of_times(rng, np.repeat(scans_s, rng.integers(4, 11)).astype(float), half_deg=20)
+        assert isinstance(pace_of(plots, None, step_s), Rounds)
+        assert turn_within(plots, step_s) is None
+
+
+def test_scans_at_irregular_times_in_a_sector_are_no_antenna():
+    for seed in range(300):
+        rng = np.random.default_rng(seed)
+        plots, step_s = of_times(rng, np.repeat(rng.uniform(0.5, 8, 40).cumsum(), 6), half_deg=30)
+        assert isinstance(pace_of(plots, None, step_s), Rounds)
+        assert turn_within(plots, step_s) is None
+
+
+def test_turns_are_found_from_plots_in_a_sector():
+    messages, turn = swept(np.random.default_rng(1), marks=())
+    messages.u[:] = np.random.default_rng(2).uniform(2e3, 6e4, len(messages))
+    messages = messages.only(kept := np.abs(messages.v - np.pi / 2) < np.radians(45))
+    messages.time_s[:] = np.floor(messages.time_s / 0.5) * 0.5
+    pace = pace_of(messages, None, 0.5)
+    scan = np.floor(pace.progress(messages)).astype(int)
+    assert pace.period_s == pytest.approx(TURN_S, rel=0.02)
+    assert (scan - scan[0] == np.array(turn)[kept] - np.array(turn)[kept][0]).all()
 
 
 def test_scattered_azimuths_do_not_turn_the_antenna():

@@ -12,7 +12,7 @@ import vidtrack as vt
 from vidtrack.cli import cli
 from vidtrack.config.load import load
 from vidtrack.formats import read
-from vidtrack.radar.network.network import Network, read_feeds
+from vidtrack.radar.network.network import Network, read_feeds, warn_if_apart
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.fuse import common_plane, run_fusion
 from vidtrack.run.network import AHEAD_S, build_network_tracker, learn_ahead, run_network
@@ -301,19 +301,22 @@ def placed(folder, begins_s, places_m):
 
 
 @pytest.mark.parametrize(
-    ("begins_s", "places_m", "said"),
+    ("begins_s", "places_m", "shown", "said"),
     [
-        ((0, 10), (0, 20000), ""),
-        ((0, 30, 60), (0, 0, 0), ""),  # each meets the next
-        ((0, 0, 0), (0, 35000, 70000), ""),
-        ((0, 5000), (0, 20000), "radars 'a', 'b' with no time in common with another radar (a has 0 to 36 s; b"),
-        ((0, 5000, 10), (0, 20000, 0), "radar 'b' with no time in common"),
-        ((0, 10), (0, 200000), "radars 'a', 'b' with no place in common"),
-        ((0, 10, 0), (0, 0, 200000), "radar 'c' with no place in common"),
+        ((0, 10), (0, 20000), (), ""),
+        ((0, 30, 60), (0, 0, 0), (), ""),  # each meets the next
+        ((0, 0, 0), (0, 35000, 70000), (), ""),
+        ((0, 0), (0, 50000), (), ""),  # as near as a track coasts
+        ((0, 10), (0, 200000), (0, 1), ""),  # a camera may join them
+        ((0, 10), (0, 200000), (0,), "radar 'b' with no place in common"),
+        ((0, 5000), (0, 20000), (), "radars 'a', 'b' with no time in common with another radar (a has 0 to 36 s; b"),
+        ((0, 5000, 10), (0, 20000, 0), (), "radar 'b' with no time in common"),
+        ((0, 10), (0, 200000), (), "radars 'a', 'b' with no place in common"),
+        ((0, 10, 0), (0, 0, 200000), (), "radar 'c' with no place in common"),
     ],
 )
-def test_radars_that_never_meet_are_named(tmp_path, caplog, begins_s, places_m, said):
-    placed(tmp_path, begins_s, places_m)
+def test_radars_that_never_meet_are_named(tmp_path, caplog, begins_s, places_m, shown, said):
+    warn_if_apart(placed(tmp_path, begins_s, places_m), shown)
     assert len(caplog.messages) == (said != "")
     assert said in caplog.text
 

@@ -6,6 +6,7 @@ import math
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats
 from vidtrack.radar.feeds.clock import JUMP_S, Clock
@@ -21,8 +22,15 @@ TARGETS_M_S = 1000.0
 """m/s; plots that follow each other at less may be of one target round the radar, and tell no slow antenna."""
 ROTATES = 0.8
 """Mean resultant length from which the azimuths follow a turning antenna."""
+RELATED = 0.5
+"""Correlation of azimuths with the antenna's angles from which they follow it: of plots in a sector, in scans that come
+in bursts, both stay near their means at some rate, but do not vary with each other."""
+STAYS = 1e-6
+"""Product of standard deviations of two directions, as numbers of length 1, up to which one of them does not vary."""
 UNLIKELY = 6.0
 """Negative logarithm of the probability that azimuths at random seem to follow an antenna."""
+ONE_BY_ONE = 0.9
+"""Share of plots with their own time from which an antenna seems to turn."""
 LOOKED_AT = 1000
 """Plots from which the duration of a turn is found."""
 PULL, FARTHEST = 0.2, 0.05
@@ -100,10 +108,6 @@ class Turns:
         return nearest if follows else turn + FARTHEST
 
 
-ONE_BY_ONE = 0.9
-"""Share of plots with their own time from which an antenna seems to turn."""
-
-
 class Rounds:
     """Scans of equal durations.
 
@@ -153,11 +157,15 @@ def pace_of(messages: Messages, scan_s: float | None, coarse_s: float = 0.0) -> 
 
 
 def is_unknown(pace: Pace, messages: Messages) -> bool:
-    """Whether plots come one by one, as from a turning antenna, but nothing tells how long a turn takes."""
+    """Whether plots come one by one from all round, as from a turning antenna, but nothing tells how long a turn takes.
+
+    Those of a radar that stares stay in some quarters.
+    """
     plots = messages.only(~messages.marks)
     if isinstance(pace, Turns) or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
         return False
-    return len(plots) > 2 and len(np.unique(plots.time_s)) >= ONE_BY_ONE * len(plots)
+    quarters = np.unique(np.floor(plots.v / (np.pi / 2)) % 4)
+    return len(quarters) == 4 and len(np.unique(plots.time_s)) >= ONE_BY_ONE * len(plots)
 
 
 def _stated(messages: Messages) -> float | None:
@@ -221,16 +229,33 @@ def _peak(plots: Messages, fastest_s: float, slowest_s: float, coarse_s: float) 
 
 
 def _highest(plots: Messages, rate: Floats, coarse_s: float) -> float | None:
-    """The duration of a turn at the highest peak, of these rates [1/s]; None for a peak that chance could make."""
-    left = np.sinc(coarse_s * rate)
-    score = np.array([_resultant(plots, one) for one in rate])
-    best = int((score / left).argmax())
-    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / len(plots))
-    return 1 / float(rate[best]) if score[best] > max(ROTATES * left[best], chance) else None
+    """The duration of a turn at the highest peak, of these rates [1/s]; None for a peak that chance could make.
+
+    Plots of one time count as one. Where they share times, or a turn is slow, azimuths must vary with the antenna.
+    """
+    seen, passed_s = np.exp(1j * plots.v), plots.time_s - plots.time_s[0]
+    times = len(np.unique(passed_s))
+
+    def score(rates: Floats) -> Floats:
+        return np.array([abs((seen * np.exp(-2j * np.pi * one * passed_s)).mean()) for one in rates])
+
+    left, height = np.sinc(coarse_s * rate), score(rate)
+    at = int((height / left).argmax())
+    chance = np.sqrt((np.log(len(rate)) + UNLIKELY) / times)
+    if height[at] <= max(ROTATES * left[at], chance):
+        return None
+    if coarse_s == 0 and rate[0] >= 1 / USUAL_S and times >= ONE_BY_ONE * len(plots):
+        return 1 / float(rate[at])
+    near = rate[at] + np.linspace(-0.1, 0.1, 9) / max(float(passed_s.max()), FASTEST_S)
+    best = float(near[score(near).argmax()])
+    related = _correlation(seen, np.exp(2j * np.pi * best * passed_s))
+    return 1 / best if related > max(RELATED * left[at], chance) else None
 
 
-def _resultant(plots: Messages, rate: float) -> float:
-    return float(abs(np.exp(1j * (plots.v - 2 * np.pi * rate * (plots.time_s - plots.time_s[0]))).mean()))
+def _correlation(a: NDArray[np.complex128], b: NDArray[np.complex128]) -> float:
+    """How much two series (N,) of directions, as numbers of length 1, vary with each other, 0 to 1; 0 if one stays."""
+    spread = np.sqrt((1 - abs(a.mean()) ** 2) * (1 - abs(b.mean()) ** 2))
+    return float(abs((a * b.conj()).mean() - a.mean() * b.mean().conj()) / spread) if spread > STAYS else 0.0
 
 
 def _follows(plots: Messages, period_s: float) -> float:

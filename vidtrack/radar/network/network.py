@@ -171,45 +171,57 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
         cartesian = next(feed.placed.name for feed in feeds if not feed.plots.polar)
         raise ConfigError(f"the plots of radar {cartesian!r} have x and y; several radars need range_m and azimuth_deg")
     _refuse_same(feeds)
-    _warn_of_apart(feeds)
     return feeds
 
 
-def _warn_of_apart(feeds: Sequence[Feed]) -> None:
-    """A warning names the radars that have no time, or no place, in common with another one."""
+def warn_if_apart(feeds: Sequence[Feed], shown: Collection[int] = ()) -> None:
+    """A warning names the radars that have no time, or no place, in common with another one.
+
+    shown  numbers of those that have plots where a camera shows the road: it may join them
+    """
     if len(feeds) < 2:
         return
     alone = _alone(feeds, _at_one_time)
     if alone:
         times = "; ".join("{} has {:.10g} to {:.10g} s".format(one.placed.name, *one.span_s) for one in feeds)
         _log.warning(
-            "%s with no time in common with another radar (%s), so no track is of both: are the clocks right?",
-            _radars(alone), times,
+            "%s with no time in common with another radar (%s), so their errors can hardly be compared: are the clocks "
+            "right?", _radars(alone), times,
         )  # fmt: skip
         return
-    alone = _alone(feeds, _at_one_place)
+    alone = _alone(feeds, _at_one_place, shown)
     if alone:
         _log.warning(
-            "%s with no place in common with another radar: none has plots where the other one detects targets, so no "
-            "track is of both: are their places and directions right?", _radars(alone),
+            "%s with no place in common with another radar: none has plots where the other one detects targets, so "
+            "their errors can hardly be compared: are their places and directions right?", _radars(alone),
         )  # fmt: skip
 
 
-def _alone(feeds: Sequence[Feed], meet: Callable[[Feed, Feed], bool]) -> list[Feed]:
-    """The feeds that meet no other."""
+def _alone(feeds: Sequence[Feed], meet: Callable[[Feed, Feed], bool], joined: Collection[int] = ()) -> list[Feed]:
+    """The feeds that meet no other and are not among the numbers of joined ones."""
     met = [(one, other) for one, other in combinations(range(len(feeds)), 2) if meet(feeds[one], feeds[other])]
-    return [feed for k, feed in enumerate(feeds) if not any(k in pair for pair in met)]
+    return [feed for k, feed in enumerate(feeds) if k not in joined and not any(k in pair for pair in met)]
+
+
+def overlap(one: tuple[float, float], other: tuple[float, float], within_s: float) -> bool:
+    """Whether two spans of time, from begin to end [s], overlap, or are at most so far apart."""
+    return one[0] - other[1] <= within_s and other[0] - one[1] <= within_s
 
 
 def _at_one_time(one: Feed, other: Feed) -> bool:
     """Whether the times of two radars overlap, to within a scan."""
-    (begin, end), (first, last), scan_s = one.span_s, other.span_s, max(one.scan_s, other.scan_s)
-    return begin - scan_s <= last and first <= end + scan_s
+    return overlap(one.span_s, other.span_s, max(one.scan_s, other.scan_s))
 
 
 def _at_one_place(one: Feed, other: Feed) -> bool:
-    """Whether one of two radars has plots where the other one detects targets."""
-    return any((b.coverage.share(a.xy, np.zeros_like(a.xy)) > 0).any() for a, b in ((one, other), (other, one)))
+    """Whether one of two radars has plots where the other one detects targets, or as near as a track coasts."""
+    return any((_near(b).share(a.xy, np.zeros_like(a.xy)) > 0).any() for a, b in ((one, other), (other, one)))
+
+
+def _near(feed: Feed) -> Sector:
+    """What a radar covers, and as far beyond as a track coasts."""
+    coasted_s = feed.settings.coast_scans * feed.scan_s
+    return replace(feed.coverage, farthest=feed.coverage.farthest + feed.settings.max_speed * coasted_s)
 
 
 def _radars(feeds: Sequence[Feed]) -> str:
