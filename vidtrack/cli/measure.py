@@ -55,7 +55,7 @@ def command(options: MeasureOptions) -> None:
     from vidtrack.output.folder import open_folder, replacing
     from vidtrack.recording.retention import parts_of
     from vidtrack.run.batch.archive import is_archive
-    from vidtrack.traffic.measures.doubts import doubts
+    from vidtrack.traffic.measures.doubts import against
     from vidtrack.traffic.measures.measure import measured
     from vidtrack.traffic.measures.runs import parts_with_tracks, site_of
     from vidtrack.traffic.site import read_site
@@ -86,7 +86,7 @@ def command(options: MeasureOptions) -> None:
         write_json(found.report, options.json_to)
     if not options.quiet:
         click.echo(_told(found.report), err=True)
-        for doubt in doubts(found.report) + found.report["sections"]:
+        for doubt in against(found.report):
             click.echo(f"vidtrack: {doubt}", err=True)
     if options.json_to != "-":
         click.echo(folder)

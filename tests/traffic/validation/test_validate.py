@@ -1,5 +1,7 @@
 """Figures of counts against counts by hand: known answers, and intervals that hold the truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -78,6 +80,17 @@ def test_a_bad_count_is_of_no_other_zone():
     figures = validate(day(share=0.3), day(), 1.0).pooled
     assert figures.recall.value < 0.5
     assert validate(day(seed=4), day(), 1.0).pooled.hit < 1000  # of another day
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_at_a_busy_gate_chance_names_no_zone(seed):
+    """Of two minutes a tenth was counted: at 1,200 vehicles an hour some other quarter of an hour fits better."""
+    rng = np.random.default_rng(seed)
+    every = np.sort(rng.uniform(0, 12 * 3600, 12 * 1200))
+    seen = every[(rng.random(len(every)) < 0.1) | (np.abs(every - 6 * 3600) > 1800)]
+    noted = every[np.abs(every - 6 * 3600) < 60]
+    counted, by_hand = (replace(events(*((t, "a", "up") for t in one)), clock="utc") for one in (seen, noted))
+    assert validate(counted, by_hand, 1.0).pooled.recall.value < 0.6
 
 
 def test_what_does_not_overlap_is_refused():

@@ -10,7 +10,10 @@ import pytest
 from vidtrack.cli import cli
 from vidtrack.errors import Error
 
-COUNTS = "time_s,frame,line,direction,track_id\n1.0,25,north,up,1\n2.0,50,north,down,2\n3.5,88,south,up,3\n4,100,west,left,4\n"
+COUNTS = (
+    "time_s,frame,line,direction,track_id\n"
+    "1.0,25,north,up,1\n2.0,50,north,down,2\n3.5,88,south,up,3\n4,100,west,left,4\n"
+)
 CROSSINGS = (
     "time_s,utc,gate,direction,track_id\n"
     "1.0,2026-06-01T05:00:01+00:00,north,up,1\n2.0,2026-06-01T05:00:02+00:00,north,down,2\n"

@@ -13,7 +13,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from vidtrack.traffic.calibration.account import examined
-from vidtrack.traffic.measures.doubts import doubts
+from vidtrack.traffic.measures.doubts import against
 from vidtrack.traffic.report.close import Close
 from vidtrack.traffic.report.findings import CONFLICTS, Findings
 from vidtrack.traffic.report.legs import LegDay
@@ -56,13 +56,12 @@ class Page:
         return [self.found.clock.label(t) for t in self.found.edges]
 
     @property
-    def doubts(self) -> list[str]:
+    def against(self) -> list[str]:
         """What contradicts the calibration: its own points, the traffic, the lengths of sections."""
         if not self.found.metres:
             return []
-        account, measured = examined(self.found.site).report, self.found.report
-        by_points = account["warnings"] if account["contradiction"] else []
-        return [*by_points, *doubts(measured), *measured["sections"]]
+        account = examined(self.found.site).report
+        return [*(account["warnings"] if account["contradiction"] else []), *against(self.found.report)]
 
     @property
     def peaks(self) -> list[tuple[str, float, float, float, float]]:

@@ -25,8 +25,13 @@ def sayings(traffic: dict[str, Any]) -> list[Saying]:
     ]
 
 
+def against(report: dict[str, Any]) -> list[str]:
+    """What contradicts the calibration of a measured site, one line each: the traffic, and the lengths of sections."""
+    return [*doubts(report), *report.get("sections", [])]
+
+
 def doubts(traffic: dict[str, Any]) -> list[str]:
-    """What contradicts the calibration, one line each."""
+    """What of the traffic contradicts the calibration, one line each."""
     return [f"{saying.found}; {saying.advice}" for saying in sayings(traffic) if saying.advice]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -23,6 +24,8 @@ _JOINED_S = 1.0
 _CLOCK_S, _CLOCK_SHARE = 5.0, 1e-4
 """s, and share of the time since: by so much the clock that a live run tells its beginning by may have been set"""
 _ROUNDING_S = 1e-3
+_LONGEST_LINE = 1 << 16
+"""Octets at the end of a table that hold its last line"""
 _NO_RUN = "{} is not a finished run: it has no tracks.parquet and no tracks.csv"
 
 
@@ -232,12 +235,18 @@ def _found(run: str) -> _Found:
 
 
 def _cut_off(folder: Path) -> bool:
-    """Whether the only table of a run does not end with a whole line."""
+    """Whether the last line of a run's only table has no end, and fewer cells than the first one."""
     if (folder / "tracks.parquet").is_file():
         return False
     with (folder / "tracks.csv").open("rb") as file:
-        file.seek(max(0, file.seek(0, SEEK_END) - 1))
-        return file.read() != b"\n"
+        first = file.readline()
+        file.seek(max(0, file.seek(0, SEEK_END) - _LONGEST_LINE))
+        last = file.read().rpartition(b"\n")[2]
+    return bool(last) and _cells(last) < _cells(first)
+
+
+def _cells(line: bytes) -> int:
+    return len(next(csv.reader([line.decode("utf-8", errors="replace")])))
 
 
 def _split(run: str) -> tuple[Path, datetime | None]:

@@ -32,7 +32,7 @@ CONFLICTS = (
 """What is read of the table of conflicts, which only calibrated sites have"""
 KEYS = (
     *("site", "metres", "runs", "utc_of_time_0", "watched_s", "tracks", "joins", "impossible_movements"),
-    *("scale", "straightness", "sections"),
+    *("scale", "straightness"),
 )
 """What is read of measures.json."""
 
