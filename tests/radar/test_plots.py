@@ -163,6 +163,14 @@ def test_a_clock_that_was_set_back_goes_on_where_no_column_says_the_scan(tmp_pat
     assert "time_s goes back from 76 to 20 s at line 102" in caplog.text
 
 
+def test_a_clock_that_was_set_back_goes_on_where_the_rows_of_a_scan_are_newest_first(tmp_path):
+    scans_s = [4 * k - 60 * (k >= 20) for k in range(40)]
+    rows = [f"{t + 0.4 * n:.1f},{1000 + 10 * k + n},{36 * n}" for k, t in enumerate(scans_s) for n in range(9, -1, -1)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s == pytest.approx([0.4 * n for n in range(400)])
+    assert plots.scan.tolist() == [k for k in range(40) for _ in range(10)]
+
+
 def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path):
     times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))
     rows = [f"{t - 61.3 * (t > 80):.4f},{1e4 + 37 * k},{90 * t % 360:.3f}" for k, t in enumerate(times)]

@@ -65,13 +65,12 @@ def closed_up(scan: Ints, time_s: Floats) -> Ints:
 def set_back(time_s: Floats) -> Ints:
     """The rows (K,) at which a clock was set back, by times (N,) in the order of rows.
 
-    None if there are more than FEW steps back of over LATE_S, or as many steps down as up: then the rows are in another
-    order than that of arrival. A row that comes late, or has a wrong time, is none, nor are rows whose times catch
-    up at once.
+    None if there are more than FEW steps back of over LATE_S, or as many of the pieces between them fall as rise: then
+    the rows are in another order than that of arrival. A row that comes late, or has a wrong time, is none, nor are
+    rows whose times catch up at once.
     """
-    step_s = np.diff(time_s)
-    back = (np.flatnonzero(step_s < -LATE_S) + 1).tolist()
-    if len(back) > FEW or np.sign(step_s).sum() <= 0:
+    back = (np.flatnonzero(np.diff(time_s) < -LATE_S) + 1).tolist()
+    if not back or len(back) > FEW or sum(np.sign(piece[-1] - piece[0]) for piece in np.split(time_s, back)) <= 0:
         return np.zeros(0, np.int64)
     return np.array([k for k, end in pairwise([*back, len(time_s)]) if _stays_back(time_s, k, end)], np.int64)
 
