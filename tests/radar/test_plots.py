@@ -163,6 +163,14 @@ def test_a_clock_that_was_set_back_goes_on_where_no_column_says_the_scan(tmp_pat
     assert "time_s goes back from 76 to 20 s at line 102" in caplog.text
 
 
+def test_a_clock_that_was_set_back_goes_on_where_the_rows_of_a_scan_are_newest_first(tmp_path):
+    scans_s = [4 * k - 60 * (k >= 20) for k in range(40)]
+    rows = [f"{t + 0.4 * n:.1f},{1000 + 10 * k + n},{36 * n}" for k, t in enumerate(scans_s) for n in range(9, -1, -1)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s == pytest.approx([0.4 * n for n in range(400)])
+    assert plots.scan.tolist() == [k for k in range(40) for _ in range(10)]
+
+
 def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path):
     times = np.sort(np.random.default_rng(0).uniform(0, 160, 400))
     rows = [f"{t - 61.3 * (t > 80):.4f},{1e4 + 37 * k},{90 * t % 360:.3f}" for k, t in enumerate(times)]
@@ -196,16 +204,28 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
     elif "wrong" in order:
         times = [*times[:50], *times[51:], 9000]
     assert plots.time_s.tolist() == times
-    assert "goes back" not in caplog.text
+    assert ("goes back" in caplog.text) is (order == "by sensor")
+    assert ("where column 'source' changes: rows are sorted by time_s" in caplog.text) is (order == "by sensor")
 
 
-@pytest.mark.parametrize(("column", "begin_s", "back_s"), [("date", 86_320, 86_400), ("file", 0, 60)])
-def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, caplog, column, begin_s, back_s):
-    scans_s = [begin_s + 4 * k - back_s * (k >= 20) for k in range(40)]
+@pytest.mark.parametrize("column", [",date", ""])
+@pytest.mark.parametrize(("scan_s", "begin_s", "days"), [(4, 86_320, 2), (300, 0, 2), (300, 0, 3), (900, 0, 2)])
+def test_times_of_day_go_on_after_midnight(tmp_path, caplog, column, scan_s, begin_s, days):
+    times = [t for t in range(begin_s, 86_400 * days - begin_s, scan_s) for _ in range(5)]
+    day = ["" if not column else f",{t // 86_400}" for t in times]
+    rows = [f"{t % 86_400},{1000 + k},{72 * k % 360}{day[k]}" for k, t in enumerate(times)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg" + column))
+    assert plots.time_s.tolist() == times
+    assert "as if a day ended: time goes on there" in caplog.text
+
+
+@pytest.mark.parametrize("back_s", [60, 80])
+def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, caplog, back_s):
+    scans_s = [4 * k - back_s * (k >= 20) for k in range(40)]
     rows = [f"{t},{1000 + 10 * k + n},{72 * n},{'ab'[k >= 20]}" for k, t in enumerate(scans_s) for n in range(5)]
-    plots = read_plots(write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{column}"))
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,file"))
     assert plots.time_s.tolist() == sorted(t for t in scans_s for _ in range(5))
-    assert f"at line 102, where column '{column}' changes: rows are sorted by time_s" in caplog.text
+    assert "at line 102, where column 'file' changes: rows are sorted by time_s" in caplog.text
 
 
 @pytest.mark.parametrize("targets", [2, 3, 4])

@@ -19,7 +19,7 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
 from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import begins_again, closed_up, cover_the_same, longest_step, set_back
+from vidtrack.radar.rhythm import DAY_S, at_midnight, begins_again, closed_up, longest_step, set_back
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -146,27 +146,29 @@ def _on_one_clock(table: Table) -> Table:
         f"{table.path}: time_s goes back from {time_s[first - 1]:.10g} to {time_s[first]:.10g} s at {table.unit} "
         f"{table.line[rows[first]]}{others}"
     )
-    column = _changing(table, rows[back])
+    step_s = np.diff(time_s)
+    usual_s = float(np.median(step_s[step_s > 0]))
+    midnight = at_midnight(step_s[back - 1], usual_s)
+    column = None if midnight.all() else _changing(table, rows[back])
     if column is not None:
-        if not cover_the_same(time_s, back):
-            _log.warning(
-                "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock "
-                "was set, give times that go on", where, column, column,
-            )  # fmt: skip
+        _log.warning(
+            "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock was "
+            "set, give times that go on", where, column, column,
+        )  # fmt: skip
         return table
-    if begins_again(time_s, back):
+    if not midnight.any() and begins_again(time_s, back):
         _log.warning(
             "%s, where it began before: rows are sorted by time_s, as if they were of one target or sensor after the "
             "other; if the clock was set, give times that go on", where,
         )  # fmt: skip
         return table
-    step_s = np.diff(time_s)
     offset = np.zeros(len(table.line))
-    for k in back.tolist():
-        offset[rows[k] :] += np.median(step_s[step_s > 0]) - step_s[k - 1]
+    for k, ended in zip(back.tolist(), midnight.tolist(), strict=True):
+        offset[rows[k] :] += DAY_S if ended else usual_s - step_s[k - 1]
     _log.warning(
-        "%s, as if the clock was set: time goes on there; if the rows are only out of order, sort them by time_s", where
-    )
+        "%s, as if %s: time goes on there; if the rows are only out of order, as of one sensor after the other, sort "
+        "them by time_s", where, "a day ended" if midnight.all() else "the clock was set",
+    )  # fmt: skip
     return replace(table, columns=table.columns | {name: table.columns[name] + offset})
 
 

@@ -18,8 +18,8 @@ LATE_S = 5.0
 """s; a row of a table that is later in it by more than this is out of order, or its clock was set back."""
 FEW = 3
 """Steps back in a table in order of arrival; with more of them its rows are in another order."""
-SAME = 0.9
-"""Share of the longest piece of a table, from one step back to the next, that all cover, if each is of one sensor."""
+DAY_S, MIDNIGHT_S = 86_400.0, 60.0
+"""s; a step back by a day, less up to the second, or some usual steps, is midnight in times of day."""
 AGREED, KEPT = 3, 10
 """Rows before a clock was set back, and rows after it, that agree about it."""
 
@@ -65,13 +65,12 @@ def closed_up(scan: Ints, time_s: Floats) -> Ints:
 def set_back(time_s: Floats) -> Ints:
     """The rows (K,) at which a clock was set back, by times (N,) in the order of rows.
 
-    None if there are more than FEW steps back of over LATE_S, or as many steps down as up: then the rows are in another
-    order than that of arrival. A row that comes late, or has a wrong time, is none, nor are rows whose times catch
-    up at once.
+    None if there are more than FEW steps back of over LATE_S, or as many of the pieces between them fall as rise: then
+    the rows are in another order than that of arrival. A row that comes late, or has a wrong time, is none, nor are
+    rows whose times catch up at once.
     """
-    step_s = np.diff(time_s)
-    back = (np.flatnonzero(step_s < -LATE_S) + 1).tolist()
-    if len(back) > FEW or np.sign(step_s).sum() <= 0:
+    back = (np.flatnonzero(np.diff(time_s) < -LATE_S) + 1).tolist()
+    if not back or len(back) > FEW or sum(np.sign(piece[-1] - piece[0]) for piece in np.split(time_s, back)) <= 0:
         return np.zeros(0, np.int64)
     return np.array([k for k, end in pairwise([*back, len(time_s)]) if _stays_back(time_s, k, end)], np.int64)
 
@@ -89,11 +88,10 @@ def begins_again(time_s: Floats, back: Ints) -> bool:
     return bool((np.abs(np.diff(time_s[[0, *back]])) <= LATE_S).any())
 
 
-def cover_the_same(time_s: Floats, back: Ints) -> bool:
-    """Whether the pieces of times (N,) between the rows (K,) at which they go back cover nearly the same times."""
-    pieces = np.split(time_s, back)
-    begin_s, end_s = (np.array([one(piece) for piece in pieces]) for one in (np.min, np.max))
-    return bool(end_s.min() - begin_s.max() >= SAME * (end_s - begin_s).max())
+def at_midnight(step_s: Floats, usual_s: float) -> Mask:
+    """Which steps back (K,) are from the end of a day to the begin of the next, in times of day."""
+    short_s = step_s + DAY_S
+    return (short_s >= 0) & (short_s <= max(MIDNIGHT_S, FEW * usual_s))
 
 
 def longest_step(step_s: Floats) -> float:

@@ -115,7 +115,7 @@ def _pipeline(
             steps=told_if_apart(
                 road_steps(network, camera, tracker),
                 len(network.feeds),
-                max(feed.scan_s for feed in network.feeds),
+                max(feed.coast_s for feed in network.feeds),
             ),
             summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
             sinks=lambda folder: radar_sinks(

@@ -113,6 +113,15 @@ def test_scans_at_irregular_times_in_a_sector_are_no_antenna():
         assert turn_within(plots, step_s) is None
 
 
+@pytest.mark.parametrize("turned", [0.1, 0.2, 0.3, 0.5, 1.0])
+def test_a_second_of_a_sweep_backwards_has_no_turns_of_negative_duration(turned):
+    rng = np.random.default_rng(0)
+    swept = np.sort(rng.uniform(0, 1, 400))
+    place = rng.uniform(3e3, 6e4, 400), -2 * np.pi * turned * swept
+    plots = Messages.of([Message(Kind.POLAR, 0, 48, *one) for one in zip(swept.round(2), *place, strict=True)])
+    assert pace_of(plots, None, 0.01).period_s > 0
+
+
 def test_turns_are_found_from_plots_in_a_sector():
     messages, turn = swept(np.random.default_rng(1), marks=())
     messages.u[:] = np.random.default_rng(2).uniform(2e3, 6e4, len(messages))

@@ -306,7 +306,9 @@ def placed(folder, begins_s, places_m):
         ((0, 10), (0, 20000), (), ""),
         ((0, 30, 60), (0, 0, 0), (), ""),  # each meets the next
         ((0, 0, 0), (0, 35000, 70000), (), ""),
-        ((0, 0), (0, 50000), (), ""),  # as near as a track coasts
+        ((0, 50), (0, 20000), (), ""),  # as near as a track coasts
+        ((0, 0), (0, 50000), (), "radars 'a', 'b' with no place in common"),
+        ((0, 60), (0, 20000), (), "radars 'a', 'b' with no time in common"),
         ((0, 10), (0, 200000), (0, 1), ""),  # a camera may join them
         ((0, 10), (0, 200000), (0,), "radar 'b' with no place in common"),
         ((0, 5000), (0, 20000), (), "radars 'a', 'b' with no time in common with another radar (a has 0 to 36 s; b"),
@@ -319,6 +321,19 @@ def test_radars_that_never_meet_are_named(tmp_path, caplog, begins_s, places_m, 
     warn_if_apart(placed(tmp_path, begins_s, places_m), shown)
     assert len(caplog.messages) == (said != "")
     assert said in caplog.text
+
+
+@pytest.mark.parametrize(("nearest_m", "told"), [(10, False), (900, False), (3000, True)])
+def test_radars_back_to_back_meet_where_a_track_coasts_from_one_to_the_other(tmp_path, caplog, nearest_m, told):
+    header = "scan,time_s,range_m,azimuth_deg,sigma_range_m,sigma_azimuth_deg"
+    for n, name in enumerate("ab"):
+        rows = [f"{k},{k},{nearest_m + 40 * k + n},{3 * n},1,0.5" for k in range(10)]
+        (tmp_path / f"{name}.csv").write_text("\n".join([header, *rows]) + "\n")
+    mast = "[radars.{}]\nx_m = 0\ny_m = 0\nboresight_deg = {}\nsector_deg = 60\n"
+    (tmp_path / "mast.toml").write_text(mast.format("a", 0) + mast.format("b", 180))
+    paths = [str(tmp_path / f"{name}.csv") for name in "ab"]
+    warn_if_apart(read_feeds(paths, read_radars(tmp_path / "mast.toml"), load().radar))
+    assert ("no place in common" in caplog.text) is told
 
 
 def test_a_radar_in_a_recording_that_has_no_table_is_named(sites):

@@ -247,6 +247,7 @@ def _highest(plots: Messages, rate: Floats, coarse_s: float) -> float | None:
     if coarse_s == 0 and rate[0] >= 1 / USUAL_S and times >= ONE_BY_ONE * len(plots):
         return 1 / float(rate[at])
     near = rate[at] + np.linspace(-0.1, 0.1, 9) / max(float(passed_s.max()), FASTEST_S)
+    near = np.clip(near, rate[0], rate[-1])
     best = float(near[score(near).argmax()])
     related = _correlation(seen, np.exp(2j * np.pi * best * passed_s))
     return 1 / best if related > max(RELATED * left[at], chance) else None

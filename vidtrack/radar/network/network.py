@@ -10,6 +10,7 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from vidtrack.arrays.types import Floats
 from vidtrack.config.radar import RadarSettings
@@ -69,6 +70,11 @@ class Feed:
     def span_s(self) -> tuple[float, float]:
         """The times of the first and last plot."""
         return float(self.plots.time_s.min()), float(self.plots.time_s.max())
+
+    @property
+    def coast_s(self) -> float:
+        """How long a track coasts, by the time of a scan."""
+        return self.settings.coast_scans * self.scan_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,19 +215,17 @@ def overlap(one: tuple[float, float], other: tuple[float, float], within_s: floa
 
 
 def _at_one_time(one: Feed, other: Feed) -> bool:
-    """Whether the times of two radars overlap, to within a scan."""
-    return overlap(one.span_s, other.span_s, max(one.scan_s, other.scan_s))
+    """Whether the times of two radars overlap, or are as near as a track coasts."""
+    return overlap(one.span_s, other.span_s, max(one.coast_s, other.coast_s))
 
 
 def _at_one_place(one: Feed, other: Feed) -> bool:
-    """Whether one of two radars has plots where the other one detects targets, or as near as a track coasts."""
-    return any((_near(b).share(a.xy, np.zeros_like(a.xy)) > 0).any() for a, b in ((one, other), (other, one)))
-
-
-def _near(feed: Feed) -> Sector:
-    """What a radar covers, and as far beyond as a track coasts."""
-    coasted_s = feed.settings.coast_scans * feed.scan_s
-    return replace(feed.coverage, farthest=feed.coverage.farthest + feed.settings.max_speed * coasted_s)
+    """Whether one of two radars has plots in the other's coverage, or as near its plots as a track coasts."""
+    if any((b.coverage.share(a.xy, np.zeros_like(a.xy)) > 0).any() for a, b in ((one, other), (other, one))):
+        return True
+    farthest_m = max(feed.settings.max_speed * feed.coast_s for feed in (one, other))
+    apart_m, _ = cKDTree(one.xy).query(other.xy, distance_upper_bound=farthest_m)
+    return bool(np.isfinite(apart_m).any())
 
 
 def _radars(feeds: Sequence[Feed]) -> str:
