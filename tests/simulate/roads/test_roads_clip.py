@@ -63,7 +63,7 @@ def test_visibility_is_the_share_of_pixels_left_by_what_is_nearer():
     truth, hidden = c.truth, 0
     assert truth.boxes.visibility.min() >= 0
     assert truth.boxes.visibility.max() == 1
-    for frame in range(0, 30, 4):
+    for frame in range(0, 30, 3):
         states, rows = c.history.at(c.times[frame]), boxes(c, frame)
         actors = c.actors(states, frame)
         alone = [covered(actor, c.eye, size) for actor in actors]
