@@ -7,6 +7,7 @@ from bisect import bisect_right
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
+from vidtrack.radar.rhythm import scan_times
 from vidtrack.radar.table import Table
 
 TIME = ("scan", "time_s")
@@ -78,8 +79,7 @@ def check_order(table: Table, measured: list[str]) -> None:
         table.note(rows[order[k]], f"the plot of {table.unit} {table.line[rows[order[k - 1]]]} again")
 
     rows = np.sort(rows[order[~again]])
-    number, member = np.unique(scan[rows], return_inverse=True)
-    times = np.bincount(member, time_s[rows]) / np.bincount(member)
+    number, member, times = scan_times(scan[rows], time_s[rows])
     for k in np.flatnonzero(~_in_order(times)[member]):
         fault = (
             f"time_s is {time_s[rows[k]]:.10g}, but scan {scan[rows[k]]:.0f} does not fit between its neighbours' times"

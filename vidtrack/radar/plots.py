@@ -19,7 +19,7 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
 from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import DAY_S, at_midnight, begins_again, closed_up, longest_step, set_back
+from vidtrack.radar.rhythm import DAY_S, at_midnight, begins_again, closed_up, longest_step, scan_times, set_back
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -220,8 +220,9 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
             )  # fmt: skip
         return None
     turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
-    if (coarse_s > 0 or pace.period_s > USUAL_S) and not _in_order(turn, plots.time_s):
-        return None
+    unsure = coarse_s > 0 or pace.period_s > USUAL_S
+    if unsure and (np.diff(scan_times(turn, plots.time_s)[2]) < 0).any():
+        return None  # the check of order would refuse the table
     scan = np.zeros(len(time_s))
     scan[rows] = turn - turn.min()
     _log.warning(
@@ -229,12 +230,6 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
         table.path, scan.max() + 1, pace.period_s,
     )  # fmt: skip
     return scan
-
-
-def _in_order(scan: Ints, time_s: Floats) -> bool:
-    """Whether scans, numbered (N,), follow each other by the means of their times (N,), as the check of order needs."""
-    _, member = np.unique(scan, return_inverse=True)
-    return bool((np.diff(np.bincount(member, time_s) / np.bincount(member)) >= 0).all())
 
 
 def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 
+T = TypeVar("T", np.float64, np.int64)
 USUAL = 4
 """Medians of the steps; longer ones tell nothing of the time of a scan."""
 PAUSE_S, PAUSE_SCANS = 3600.0, 100
@@ -53,10 +55,15 @@ def rhythm(scan: Ints, time_s: Floats) -> Rhythm:
     return Rhythm(float(scan_s), limit_s, mean_s[:-1][paused], mean_s[1:][paused])
 
 
+def scan_times(scan: NDArray[T], time_s: Floats) -> tuple[NDArray[T], Ints, Floats]:
+    """Numbers (K,) of the scans of plots (N,) in any order, the scan of each among them (N,), and mean times (K,)."""
+    number, member, size = np.unique(scan, return_inverse=True, return_counts=True)
+    return number, member, np.bincount(member, time_s) / size
+
+
 def closed_up(scan: Ints, time_s: Floats) -> Ints:
     """Numbers of scans (N,) that times (N,) told, in any order, without the empty ones that a pause would hold."""
-    number, member, size = np.unique(scan, return_inverse=True, return_counts=True)
-    mean_s = np.bincount(member, time_s) / size
+    number, member, mean_s = scan_times(scan, time_s)
     scans, step_s = np.diff(number), np.diff(mean_s)
     idle = np.where(step_s > longest_step(step_s / scans), scans - 1, 0)
     return np.asarray(scan - np.concatenate([[0], np.cumsum(idle)])[member])
