@@ -94,10 +94,10 @@ class LifeCycle:
         return 0.0
 
     def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
-        """(T,) tentative rows with enough hits, age and travel (T,); size (T,) of the objects."""
+        """(T,) tentative rows with enough hits, age and travel (T,); size (T,) of the objects, infinite: never."""
         return _often(
             register.history, self.confirm_window, self.confirm_hits,
-            register.status, register.born_s, travel, t, _full(self.confirm_s), self.confirm_travel * size,
+            register.status, register.born_s, travel, t, _full(self.confirm_s), least_travel(self.confirm_travel, size),
         )  # fmt: skip
 
     def hopeless(self, register: Register) -> Mask:
@@ -120,6 +120,11 @@ class LifeCycle:
 def grown(register: Register, t: float, travel: Floats, age_s: float, least: Floats) -> Mask:
     """(T,) tentative rows that are old enough and whose travel (T,) is at least `least` (T,)."""
     return _grown(register.status, register.born_s, travel, t, _full(age_s), least)
+
+
+def least_travel(sizes: float, size: Floats) -> Floats:
+    """(T,) travel of so many sizes (T,); infinite where the size is, even if no travel is asked for."""
+    return np.multiply(sizes, size, out=size.copy(), where=size < inf)
 
 
 def _full(age_s: float) -> float:

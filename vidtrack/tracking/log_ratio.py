@@ -9,7 +9,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError
-from vidtrack.tracking.lifecycle import grown, refuse_immortal, unseen
+from vidtrack.tracking.lifecycle import grown, least_travel, refuse_immortal, unseen
 from vidtrack.tracking.register import Register
 
 LEAST = 1e-8
@@ -75,7 +75,9 @@ class LogRatio:
 
     def confirmed(self, register: Register, t: float, travel: Floats, size: Floats) -> Mask:
         """(T,) tentative rows with enough score, age and travel (T,); size (T,) of the objects."""
-        return (register.score >= self.highest) & grown(register, t, travel, self.confirm_s, self.confirm_travel * size)
+        return (register.score >= self.highest) & grown(
+            register, t, travel, self.confirm_s, least_travel(self.confirm_travel, size)
+        )
 
     def hopeless(self, register: Register) -> Mask:
         """(T,) rows whose score has fallen too far."""

@@ -5,6 +5,7 @@ import pytest
 from scipy.special import logit
 
 import vidtrack as vt
+from vidtrack.tracking.picture.road import Road
 
 SIZE = (320.0, 240.0)
 
@@ -60,6 +61,22 @@ def test_points_are_tracked_alike_with_a_picture_without_bounds_and_without_a_pi
         np.testing.assert_array_equal(one.status, other.status)
         np.testing.assert_array_equal(one.x, other.x)
         assert one.events == other.events
+
+
+@pytest.mark.parametrize(("careful", "taken"), [(True, False), (False, True)])
+def test_no_flake_is_a_measurement_of_a_vehicle(careful, taken):
+    """Flakes of 8 px fall everywhere; where the vehicle of 20 px is missed, one lies in its place."""
+    rng = np.random.default_rng(3)
+    picture = vt.Picture(SIZE, road=Road(*SIZE, careful=careful))
+
+    def scan(k, box):
+        flakes = [[*rng.uniform((0, 140), SIZE), 8.0, 6.0] for _ in range(20)]
+        return vt.box_scan(k / 10, [box, *flakes])
+
+    driven = [scan(k, [20.0 + 5 * k, 100.0, 20.0, 20.0]) for k in range(40)]
+    tracks = played(picture, [*driven, scan(40, [226.0, 106.0, 8.0, 8.0])])
+    vehicle = np.flatnonzero(tracks[-1].id == tracks[0].id[0])
+    assert bool(tracks[-1].measurement[vehicle][0] == 0) == taken
 
 
 def test_a_box_follows_with_its_time_constant():

@@ -108,7 +108,7 @@ def joined(foreground, predicted, settings=JOIN):
     box, unknown = regions.boxes().astype(float), np.full((regions.total, 2), np.nan)
     group, count = together(
         box, regions.areas().astype(float), np.arange(regions.total),
-        np.asarray(predicted, float).reshape(-1, 4), unknown, True,
+        np.asarray(predicted, float).reshape(-1, 4), unknown, 0.0, True,
         settings.join_overlap, settings.join_gap,
     )  # fmt: skip
     return measured(regions.joined(group, count), foreground, settings)

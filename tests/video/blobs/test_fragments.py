@@ -16,13 +16,13 @@ CAR = (40.0, 20.0)
 NOBODY = np.empty((0, 4))
 
 
-def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None):
+def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None, flake=0.0):
     """Group of each box (R, 4), where it is known that vehicles are as large as `typical`; None: it is not."""
     box = np.asarray(box, float)
     usual = np.tile(np.full(2, np.nan) if typical is None else typical, (len(box), 1))
     area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
     link = np.arange(len(box)) if link is None else np.asarray(link)
-    group, count = together(box, area, link, np.asarray(predicted, float), usual, True, 0.7, gap)
+    group, count = together(box, area, link, np.asarray(predicted, float), usual, flake, True, 0.7, gap)
     assert sorted(set(group.tolist())) == list(range(count))
     return group.tolist()
 
@@ -32,6 +32,14 @@ def test_pieces_inside_one_predicted_vehicle_are_one(typical):
     pieces = [[10, 10, 30, 20], [41, 10, 9, 20], [200, 100, 8, 8]]
     assert grouped(pieces, [[9, 9, 42, 22]], typical) == [0, 0, 1]
     assert grouped(pieces, [[9, 9, 42, 22]], typical, gap=0.0) == ([0, 0, 1] if typical else [0, 1, 2])
+
+
+def test_a_flake_is_a_piece_of_nothing():
+    car_and_flakes = [[10, 10, 30, 20], [41, 10, 7, 8], [48, 18, 8, 8], [41, 20, 9, 8]]
+    within = [[9, 9, 50, 22]]
+    assert grouped(car_and_flakes, within, gap=0.5) == [0, 0, 0, 0]
+    assert grouped(car_and_flakes, within, gap=0.5, flake=8.0) == [0, 1, 2, 0]
+    assert grouped(car_and_flakes, link=[5, 5, 5, 5], flake=8.0) == [0, 1, 2, 0]
 
 
 @pytest.mark.parametrize("typical", [CAR, None])

@@ -180,9 +180,13 @@ class Picture:
         return View(boxes, scan.box, predicted, bank.hits, self.border, self.box_s, scan.look, register.look)
 
     def weigh(self, problem: Problem, view: View | None) -> Problem:
-        """The problem with the likelihood of sizes and looks."""
+        """The problem with the likelihood of sizes and looks; no flake is a measurement of a vehicle."""
         if view is None:
             return problem
+        if self.road and self.road.flake:
+            flake, vehicle = longer(view.blobs) <= self.road.flake, longer(view.predicted) > self.road.flake
+            pairs = problem.pairs
+            problem = problem.having(pairs.only(~(flake[pairs.measurement] & vehicle[pairs.row])))
         if self.shape is not None:
             problem = problem.having(self.shape.weigh(problem.pairs, view.predicted, view.blobs))
         if self.look is not None and view.looks is not None:

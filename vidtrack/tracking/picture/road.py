@@ -45,12 +45,17 @@ class Road:
             return np.ones((len(before), 4))
         return _growth(self.sizes.typical(before), self.sizes.typical(after))
 
+    @property
+    def flake(self) -> float:
+        """Longer side [px] up to which an object is taken for a flake or a drop; zero without a swarm of them."""
+        return self.swarm.size if self._wary else 0.0
+
     def travel_factor(self, xy: Floats, size: Floats) -> Floats:
         """(N,) how much farther than elsewhere tracks at xy (N, 2) of sizes (N,) must travel to be believed."""
         if not self._wary:
             return np.ones(len(xy))
         factor = np.where(self.restless.restless(xy), _CAUTION, 1.0)
-        factor[size <= self.swarm.size] = np.inf
+        factor[size <= self.flake] = np.inf
         return factor
 
 

@@ -36,13 +36,14 @@ _YOUNG_S = 0.15  # s; younger tentative tracks divide nothing
 
 
 class _Measure:
-    """Maps between mask and scene, and the typical vehicle sizes at each place."""
+    """Maps between mask and scene, the typical vehicle sizes at each place, and that of flakes [px of the mask]."""
 
-    def __init__(self, foreground: Foreground, sizes: SizeField) -> None:
+    def __init__(self, foreground: Foreground, road: Road) -> None:
         place = affine.IDENTITY if foreground.place is None else foreground.place
         self._to_scene = affine.after(place, enlargement(foreground.step))
         self._to_mask = affine.inverse(self._to_scene)
-        self.sizes = sizes
+        self.sizes = road.sizes
+        self.flake = road.flake * affine.scale(self._to_mask)
         h, w = foreground.mask.shape
         self.edges = np.array([0.0, 0.0, w, h])
         if foreground.surveyed is not None and foreground.place is not None:
@@ -70,7 +71,7 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
 
     expected  tracks predicted to the time of the foreground, in the scene
     """
-    measure = _Measure(foreground, road.sizes if road else SizeField(1, 1))
+    measure = _Measure(foreground, road or Road(1, 1))
     regions = find_regions(foreground.mask, settings.min_area_share * foreground.mask.size)
     known = expected.status != TENTATIVE
     if settings.cut:
@@ -81,7 +82,7 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
     box = regions.boxes().astype(float)
     group, count = together(
         box, regions.areas().astype(float), _links(regions, foreground.weak),
-        measure.predicted(expected.box[known]), measure.typical(box),
+        measure.predicted(expected.box[known]), measure.typical(box), measure.flake,
         settings.pieces, settings.join_overlap, settings.join_gap,
     )  # fmt: skip
     return measured(regions.joined(group, count), foreground, settings)

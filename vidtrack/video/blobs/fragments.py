@@ -60,12 +60,21 @@ def _run_at(row: Runs, start: Runs, stop: Runs, y: int, x: int) -> int:
 
 @kernel
 def together(
-    box: Floats, area: Floats, link: Ints, predicted: Floats, typical: Floats, pieces: bool, overlap: float, gap: float
+    box: Floats,
+    area: Floats,
+    link: Ints,
+    predicted: Floats,
+    typical: Floats,
+    flake: float,
+    pieces: bool,
+    overlap: float,
+    gap: float,
 ) -> tuple[Ints, int]:
     """Group of each region (R,) and the number of groups; pieces of one vehicle have the same group.
 
     box (R, 4) and area (R,) of the regions, link (R,) the same number for regions that weak foreground links,
-    predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, NaN where unknown;
+    predicted (K, 4) boxes of vehicles, typical (R, 2) width and height of vehicles at each region, NaN where unknown,
+    flake the longer side up to which regions are flakes or drops, which are pieces of nothing;
     pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
 
     Two regions are pieces of one vehicle if they are close together inside one predicted box; or if no box predicts
@@ -79,8 +88,10 @@ def together(
         vehicle[i] = _only_vehicle(box[i], predicted, overlap)
     one, other, apart = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]  # pieces of one vehicle
     for i in range(len(box)):
+        if max(box[i, 2], box[i, 3]) <= flake:
+            continue
         for j in range(i):
-            if _both_vehicles(i, j, box, area, typical):
+            if max(box[j, 2], box[j, 3]) <= flake or _both_vehicles(i, j, box, area, typical):
                 continue
             distance = _gap(box[i], box[j])
             same = vehicle[i] >= 0 and vehicle[i] == vehicle[j]
