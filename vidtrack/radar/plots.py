@@ -19,7 +19,17 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
 from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import DAY_S, at_midnight, begins_again, closed_up, longest_step, scan_times, set_back
+from vidtrack.radar.rhythm import (
+    DAY_S,
+    FEW,
+    at_midnight,
+    begins_again,
+    closed_up,
+    longest_step,
+    scan_times,
+    set_back,
+    whole_days,
+)
 from vidtrack.radar.table import Table, nearest, read_table
 
 _log = logging.getLogger(__name__)
@@ -28,6 +38,10 @@ MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
 KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
 
 
+_OTHERWISE = (
+    "if the rows are only out of order, as of one target after the other, sort them by time_s; if these are several "
+    "radars, give a table each, with --radars"
+)
 EVENLY = 0.1
 """Usual steps; how far a step may be from a multiple of the usual one to count as such."""
 
@@ -77,10 +91,10 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     """Read a CSV or Parquet table of plots.
 
     Rows may come in any order. Without a column `scan`, plots of the same time are one scan, or, if nearly each has its
-    own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set:
-    time goes on. Standard deviations come from columns, else from the settings.
-    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
-    rows. With settings.skip_bad_rows bad rows are left out with a warning.
+    own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set, or
+    a day ended: time goes on. Standard deviations come from columns, else from the settings.
+    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, times
+    that begin anew and may be of several radars, and bad rows. With settings.skip_bad_rows bad rows are left out with a warning.
     """
     settings = settings or RadarSettings()
     table = _numbered(read_table(Path(path), KNOWN), settings.position[:2])
@@ -134,42 +148,88 @@ def _numbered(table: Table, place: tuple[float, float]) -> Table:
 
 
 def _on_one_clock(table: Table) -> Table:
-    """The table with times that go on where its clock was set back; rows in another order than of arrival stay so."""
+    """The table with times that go on where its clock was set back or a day ended; other rows are to be sorted by time.
+
+    Raises PlotFormatError where times begin anew and nothing tells whether the clock did, or another sensor's rows.
+    """
     name = TIME[1]
     rows = np.flatnonzero(np.isfinite(possible_times(table.columns[name])))
     time_s = table.columns[name][rows]
     back = set_back(time_s)
     if not len(back):
         return table
-    first, others = back[0], f", the first of {len(back)} such steps" if len(back) > 1 else ""
-    where = (
-        f"{table.path}: time_s goes back from {time_s[first - 1]:.10g} to {time_s[first]:.10g} s at {table.unit} "
-        f"{table.line[rows[first]]}{others}"
-    )
     step_s = np.diff(time_s)
     usual_s = float(np.median(step_s[step_s > 0]))
     midnight = at_midnight(step_s[back - 1], usual_s)
-    column = None if midnight.all() else _changing(table, rows[back])
-    if column is not None:
+    days, anew = back[midnight], back[~midnight]
+    column = _changing(table, rows[anew if len(anew) else days])
+    first = int(anew[0] if len(anew) else days[0])
+    others = len(anew) or len(days)
+    where = (
+        f"{table.path}: time_s goes back from {time_s[first - 1]:.10g} to {time_s[first]:.10g} s at {table.unit} "
+        f"{table.line[rows[first]]}{f', the first of {others} such steps' if others > 1 else ''}"
+    )
+    offset = np.zeros(len(table.line))
+    for k in days.tolist():
+        offset[rows[k] :] += DAY_S
+    if not len(anew):
+        _refuse_days_of_sensors(table, where, column, rows[[0, *days]], whole_days(time_s, usual_s))
+        _log.warning("%s, as if a day ended: time goes on there; %s", where, _OTHERWISE)
+    elif column is not None:
+        for k in anew.tolist():  # each sensor's or target's days begin anew
+            offset[rows[k] :] -= offset[rows[k]]
         _log.warning(
             "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock was "
-            "set, give times that go on", where, column, column,
+            "set, give times that go on; if these are several radars, a table each, with --radars",
+            where, column, column,
         )  # fmt: skip
-        return table
-    if not midnight.any() and begins_again(time_s, back):
+    elif begins_again(time_s, anew):
+        raise PlotFormatError(
+            f"{where}, where it began before: if the clock began anew, give times that go on; if these are several "
+            "radars, a table each, with --radars; if targets one after the other, rows sorted by time_s"
+        )
+    elif len(anew) > FEW:
         _log.warning(
-            "%s, where it began before: rows are sorted by time_s, as if they were of one target or sensor after the "
-            "other; if the clock was set, give times that go on", where,
+            "%s: rows are sorted by time_s, as if they were of one target after the other; if the clock was set, give "
+            "times that go on; if these are several radars, a table each, with --radars", where,
         )  # fmt: skip
-        return table
-    offset = np.zeros(len(table.line))
-    for k, ended in zip(back.tolist(), midnight.tolist(), strict=True):
-        offset[rows[k] :] += DAY_S if ended else usual_s - step_s[k - 1]
-    _log.warning(
-        "%s, as if %s: time goes on there; if the rows are only out of order, as of one sensor after the other, sort "
-        "them by time_s", where, "a day ended" if midnight.all() else "the clock was set",
-    )  # fmt: skip
+    else:
+        for k in anew.tolist():
+            offset[rows[k] :] += usual_s - step_s[k - 1]
+        _log.warning("%s, as if the clock was set: time goes on there; %s", where, _OTHERWISE)
     return replace(table, columns=table.columns | {name: table.columns[name] + offset})
+
+
+def _refuse_days_of_sensors(table: Table, where: str, column: str | None, begin: Ints, whole: bool) -> None:
+    """Raise PlotFormatError if days that begin at these rows (K,) may be of several sensors, by a column that changes.
+
+    whole  all of them are whole days
+    """
+    if column is None:
+        return
+    values = table.cells[column].take(begin).to_pylist()
+    if len(set(values)) < len(values):
+        reason = f"where column {column!r} is {_repeated(values)!r} again"
+    elif whole and not _dated(column, values):
+        reason = f"where column {column!r} changes"
+    else:
+        return
+    raise PlotFormatError(
+        f"{where}, {reason}: if a day ended there, give times that go on, or name the column 'date'; if these are "
+        "several radars, give a table each, with --radars"
+    )
+
+
+def _repeated(values: list[object]) -> object:
+    """The first of the values that was there before."""
+    return next(value for k, value in enumerate(values) if value in values[:k])
+
+
+def _dated(column: str, values: list[object]) -> bool:
+    """Whether a column with these values tells days."""
+    if any(word in column.lower() for word in ("date", "day")):
+        return True
+    return all(re.match(r"\d{4}-?\d\d-?\d\d", str(value)) for value in values)
 
 
 def _changing(table: Table, back: Ints) -> str | None:
