@@ -94,7 +94,8 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set, or
     a day ended: time goes on. Standard deviations come from columns, else from the settings.
     Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, times
-    that begin anew and may be of several radars, and bad rows. With settings.skip_bad_rows bad rows are left out with a warning.
+    that begin anew and may be of several radars, and bad rows. With settings.skip_bad_rows bad rows are left out with a
+    warning.
     """
     settings = settings or RadarSettings()
     table = _numbered(read_table(Path(path), KNOWN), settings.position[:2])
