@@ -122,6 +122,22 @@ def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told)
     assert ("too coarse to tell its turns: give a column 'scan'" in caplog.text) is told
 
 
+@pytest.mark.parametrize(("sector_deg", "step_s"), [((40, 70), 0.5), ((80, 140), 1.0)])
+def test_a_pass_over_a_sector_is_one_scan_where_rounded_times_part_it(tmp_path, caplog, sector_deg, step_s):
+    rng = np.random.default_rng(0)
+    azimuth = np.linspace(*sector_deg, 8)
+    passed = [(k, n) for k in range(60) if k % 20 != 7 for n in range(8) if rng.random() < 0.9]
+    times = [round((4 * k + 4 * azimuth[n] / 360) / step_s) * step_s for k, n in passed]
+    rows = [
+        f"{t:.1f},{8e3 + 2e3 * n + k:.0f},{azimuth[n] + rng.normal(0, 0.2):.2f}"
+        for t, (k, n) in zip(times, passed, strict=True)
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [k for k, _ in passed]
+    assert len(set(times)) > 80  # more than there are passes
+    assert "passes over a sector, the plots of one pass are one scan; 57 scans, 4 s apart" in caplog.text
+
+
 def test_scans_in_bursts_are_no_turns_of_an_antenna(tmp_path, caplog):
     rng = np.random.default_rng(0)
     scans_s = [60 * k + j for k in range(4) for j in range(10)]

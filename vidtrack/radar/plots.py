@@ -26,6 +26,7 @@ from vidtrack.radar.rhythm import (
     begins_again,
     closed_up,
     longest_step,
+    passes,
     scan_times,
     set_back,
     whole_days,
@@ -133,17 +134,22 @@ def _numbered(table: Table, place: tuple[float, float]) -> Table:
     turned = _turned(table, time_s, place, 0.0 if one_by_one else _coarse(steps))
     if turned is not None:
         return replace(table, columns=table.columns | {scan: turned})
+    told = "plots of the same time are one scan"
     if one_by_one:
         _log.warning(
             "%s has no column 'scan', and nearly every plot its own time: give the plots of one turn the same scan",
             table.path,
         )
+    elif (swept_s := _swept(table, time_s, place, _coarse(steps))) is not None:
+        told = "an antenna passes over a sector, the plots of one pass are one scan"
+        times, member = np.unique(swept_s, return_inverse=True)
+        steps = np.diff(times[np.isfinite(times)])
+        usual = float(np.median(steps))
     passed = np.where(steps > longest_step(steps), 1, np.maximum(1, np.round(steps / usual)))
     number = np.concatenate([[0], np.cumsum(passed)])
     number = np.concatenate([number, np.full(len(times) - len(number), np.nan)])
     _log.warning(
-        "%s has no column 'scan': plots of the same time are one scan; %d scans, %.6g s apart",
-        table.path, len(steps) + 1, usual,
+        "%s has no column 'scan': %s; %d scans, %.6g s apart", table.path, told, len(steps) + 1, usual
     )  # fmt: skip
     return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
 
@@ -291,6 +297,20 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
         table.path, scan.max() + 1, pace.period_s,
     )  # fmt: skip
     return scan
+
+
+def _swept(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
+    """(N,) s; the mean time of the pass of an antenna over a sector that each plot is of; None: there are no passes."""
+    found = _polar(table, place)
+    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(found[1])) if found else np.zeros(0, np.int64)
+    if found is None or not len(rows):
+        return None
+    number = passes(time_s[rows], found[1][rows], coarse_s)
+    if number is None:
+        return None
+    mean_s = np.full(len(time_s), np.nan)
+    mean_s[rows] = scan_times(number, time_s[rows])[2][number]
+    return mean_s
 
 
 def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:

@@ -26,6 +26,9 @@ AGREED, KEPT = 3, 10
 """Rows before a clock was set back, and rows after it, that agree about it."""
 ANEW = 0.02
 """Share of the time up to a step back; a step to so near the begin, or to LATE_S, begins there once more."""
+NEXT, PASSES, SWEEPS = 1.5, 10, 0.9
+"""Steps of coarse times up to which two follow each other; least number of times that do, of passes of an antenna over
+a sector, and the share of them after which it has turned to the right, and of gaps after which it is back."""
 
 
 class Rhythm(NamedTuple):
@@ -112,6 +115,23 @@ def whole_days(time_s: Floats, usual_s: float) -> bool:
     """Whether times (N,) from midnight to midnight are from the first one on, and up to the last one."""
     near_s = max(MIDNIGHT_S, FEW * usual_s)
     return bool(0 <= time_s[0] <= near_s and time_s[-1] >= DAY_S - near_s)
+
+
+def passes(time_s: Floats, azimuth: Floats, coarse_s: float) -> Ints | None:
+    """The pass of an antenna over a sector, from 0, that each of the plots (N,) is of, by times in steps of coarse_s.
+
+    Times that follow each other are of one pass, in which azimuths [rad] go to the right; after a gap they are back.
+    None if they do not do so, or too seldom.
+    """
+    times, member = np.unique(time_s, return_inverse=True)
+    gap = np.diff(times) > NEXT * coarse_s
+    toward = np.bincount(member, np.cos(azimuth)) + 1j * np.bincount(member, np.sin(azimuth))
+    right = np.angle(toward[1:] * toward[:-1].conj()) > 0
+    between = np.zeros(len(gap), bool)
+    between[1:-1] = gap[1:-1] & ~gap[:-2] & ~gap[2:]
+    if min((~gap).sum(), between.sum()) < PASSES or min(right[~gap].mean(), 1 - right[between].mean()) < SWEEPS:
+        return None
+    return np.concatenate([[0], np.cumsum(gap)])[member]
 
 
 def longest_step(step_s: Floats) -> float:
