@@ -302,6 +302,16 @@ def test_days_of_one_radar_after_the_other_are_of_one_time(tmp_path, caplog):
     assert "where column 'radar' changes: rows are sorted by time_s" in caplog.text
 
 
+@pytest.mark.parametrize(
+    ("column", "values", "told"), [("Radar_ID", "ab", True), ("radar", "aa", False), ("to", "ab", False)]
+)
+def test_a_column_that_tells_several_radars_apart_is_not_ignored_in_silence(tmp_path, caplog, column, values, told):
+    rows = [f"{k},{4 * k + j},{1000 + 10 * k},{72 * j},{values[j]}" for k in range(20) for j in range(2)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=f"scan,time_s,range_m,azimuth_deg,{column}"))
+    assert len(plots) == 40
+    assert (f"column {column!r} has 2 values, but all plots are taken as of one radar" in caplog.text) is told
+
+
 def test_many_pieces_that_begin_anywhere_are_sorted_and_told(tmp_path, caplog):
     begins = [0, 300, 100, 400, 200, 500, 50, 250, 150]
     rows = [f"{begin + 4 * k},{1000 + 10 * k},{40 * n}" for n, begin in enumerate(begins) for k in range(40)]

@@ -39,6 +39,8 @@ MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
 KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
 
 
+SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
+"""Names, without case and punctuation, of a column that tells which radar a plot is of."""
 _OTHERWISE = (
     "if the rows are only out of order, as of one target after the other, sort them by time_s; if these are several "
     "radars, give a table each, with --radars"
@@ -102,6 +104,7 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     table = _numbered(read_table(Path(path), KNOWN), settings.position[:2])
     measured = _measured(table)
     _hint_at_misspelt(table)
+    _hint_at_several(table)
     sigma = {name: _sigma(table, name, settings) for name in measured}
     check_numbers(table, measured)
     check_order(table, measured)
@@ -373,6 +376,18 @@ def _hint_at_misspelt(table: Table) -> None:
         near = [] if name in KNOWN else difflib.get_close_matches(_bare(name), absent, n=1, cutoff=0.9)
         if near:
             _log.warning("%s: column %r is not used; is it %r?", table.path, name, absent[near[0]])
+
+
+def _hint_at_several(table: Table) -> None:
+    """Warn of a column by which the plots are of several radars: they are tracked as if they were of one."""
+    for name in table.names:
+        if name not in KNOWN and re.fullmatch(SENSOR, _bare(name)):
+            count = len(table.cells[name].unique())
+            if count > 1:
+                _log.warning(
+                    "%s: column %r has %d values, but all plots are taken as of one radar; of several radars give a "
+                    "table each, with --radars", table.path, name, count,
+                )  # fmt: skip
 
 
 def _bare(name: str) -> str:
