@@ -44,6 +44,7 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
     place  x and y of the radar [m]
 
     A gap of several usual steps between two times holds empty scans, and a pause none.
+    Raises PlotFormatError where times begin anew and may be of several radars.
     """
     scan, time = TIME
     similar = difflib.get_close_matches(scan, [bare(name) for name in table.names if name not in KNOWN])
