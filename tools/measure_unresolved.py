@@ -84,6 +84,13 @@ def outcome(scenario: str, seed: int, settings: Settings) -> Outcome:
     )  # fmt: skip
 
 
+def add_scenarios() -> None:
+    """Make the scenarios that are only here known by their names."""
+    radar, _, scans, holds = SCENARIOS["radar-unresolved"]
+    SCENARIOS["anywhere"] = radar, anywhere, scans, holds
+    SCENARIOS["straight"] = radar, straight, scans, SCENARIOS["radar-parting"][3]  # some seconds in a cell are enough
+
+
 def anywhere(rng: np.random.Generator) -> list[Target]:
     """Two aircraft as in radar-unresolved, of which one may be anywhere in the resolution cell about the other."""
     azimuth, course, r = *rng.uniform(0, 2 * np.pi, 2), rng.uniform(15e3, 30e3)
@@ -189,9 +196,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="200-219", metavar="FIRST-LAST")
     options = parser.parse_intermixed_args()
     logging.disable(logging.WARNING)
-    radar, _, scans, holds = SCENARIOS["radar-unresolved"]
-    SCENARIOS["anywhere"] = radar, anywhere, scans, holds
-    SCENARIOS["straight"] = radar, straight, scans, SCENARIOS["radar-parting"][3]  # some seconds in a cell are enough
+    add_scenarios()
     first, last = map(int, options.seeds.split("-"))
     for choice in options.choices:
         settings = load(assignments=[part for part in choice.split(";") if part])

@@ -122,6 +122,22 @@ def test_times_too_coarse_for_the_turns_are_told(tmp_path, caplog, turn_s, told)
     assert ("too coarse to tell its turns: give a column 'scan'" in caplog.text) is told
 
 
+@pytest.mark.parametrize(("sector_deg", "step_s"), [((40, 70), 0.5), ((80, 140), 1.0)])
+def test_a_pass_over_a_sector_is_one_scan_where_rounded_times_part_it(tmp_path, caplog, sector_deg, step_s):
+    rng = np.random.default_rng(0)
+    azimuth = np.linspace(*sector_deg, 8)
+    passed = [(k, n) for k in range(60) if k % 20 != 7 for n in range(8) if rng.random() < 0.9]
+    times = [round((4 * k + 4 * azimuth[n] / 360) / step_s) * step_s for k, n in passed]
+    rows = [
+        f"{t:.1f},{8e3 + 2e3 * n + k:.0f},{azimuth[n] + rng.normal(0, 0.2):.2f}"
+        for t, (k, n) in zip(times, passed, strict=True)
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [k for k, _ in passed]
+    assert len(set(times)) > 80  # more than there are passes
+    assert "passes over a sector, the plots of one pass are one scan; 57 scans, 4 s apart" in caplog.text
+
+
 def test_scans_in_bursts_are_no_turns_of_an_antenna(tmp_path, caplog):
     rng = np.random.default_rng(0)
     scans_s = [60 * k + j for k in range(4) for j in range(10)]
@@ -204,12 +220,16 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
     elif "wrong" in order:
         times = [*times[:50], *times[51:], 9000]
     assert plots.time_s.tolist() == times
-    assert ("goes back" in caplog.text) is (order == "by sensor")
-    assert ("where column 'source' changes: rows are sorted by time_s" in caplog.text) is (order == "by sensor")
+    told = order in ("by sensor", "by target")
+    assert ("goes back" in caplog.text) is told
+    assert ("where column 'source' changes: rows are sorted by time_s" in caplog.text) is told
 
 
 @pytest.mark.parametrize("column", [",date", ""])
-@pytest.mark.parametrize(("scan_s", "begin_s", "days"), [(4, 86_320, 2), (300, 0, 2), (300, 0, 3), (900, 0, 2)])
+@pytest.mark.parametrize(
+    ("scan_s", "begin_s", "days"),
+    [(4, 86_320, 2), (300, 0, 2), (300, 0, 3), (900, 0, 2), (900, 0, 9), (900, 30_000, 9)],
+)
 def test_times_of_day_go_on_after_midnight(tmp_path, caplog, column, scan_s, begin_s, days):
     times = [t for t in range(begin_s, 86_400 * days - begin_s, scan_s) for _ in range(5)]
     day = ["" if not column else f",{t // 86_400}" for t in times]
@@ -228,13 +248,76 @@ def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, ca
     assert "at line 102, where column 'file' changes: rows are sorted by time_s" in caplog.text
 
 
-@pytest.mark.parametrize("targets", [2, 3, 4])
-def test_targets_one_after_the_other_are_of_one_time_without_a_column_that_names_them(tmp_path, caplog, targets):
-    rows = [f"{4 * k + n},{1000 + 10 * k},{72 * n}" for n in range(targets) for k in range(40)]
+@pytest.mark.parametrize("targets", [2, 3, 4, 7])
+def test_times_that_begin_again_are_asked_about_where_no_column_tells_why(tmp_path, targets):
+    rows = [f"{4 * k + n / 2},{1000 + 10 * k},{50 * n}" for n in range(targets) for k in range(40)]
+    path = write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg")
+    with pytest.raises(
+        PlotFormatError, match=r"goes back from 156 to 0\.5 s at line 42.* where it began before"
+    ) as caught:
+        read_plots(path)
+    assert "give times that go on; if these are several radars, a table each, with --radars" in str(caught.value)
+    by_time = sorted(rows, key=lambda row: float(row.split(",")[0]))
+    plots = read_plots(write(path, *by_time, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == sorted(4 * k + n / 2 for n in range(targets) for k in range(40))
+
+
+def test_a_clock_that_begins_at_zero_again_is_asked_about(tmp_path):
+    rows = [f"{4 * k},{1000 + 10 * k + n},{72 * n}" for scans in (20, 60) for k in range(scans) for n in range(5)]
+    with pytest.raises(PlotFormatError, match="goes back from 76 to 0 s at line 102, where it began before: if the cl"):
+        read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+
+
+DAY = [900 * k for k in range(96)]
+"""Times of the scans of a whole day."""
+
+
+@pytest.mark.parametrize(
+    ("header", "of_day", "told"),
+    [
+        ("radar", ["north", "south", "west"], "where column 'radar' changes"),
+        ("date", ["1", "2", "1", "2"], "where column 'date' is '1' again"),
+        ("began", ["2026-07-01", "2026-07-02"], ""),
+        ("day", ["5", "6"], ""),
+    ],
+)
+def test_whole_days_that_may_be_of_several_radars_are_asked_about(tmp_path, caplog, header, of_day, told):
+    rows = [f"{t},{1000 + t + n},{72 * n},{one}" for one in of_day for t in DAY for n in range(5)]
+    path = write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{header}")
+    if told:
+        with pytest.raises(PlotFormatError, match=f"{told}: if a day ended .* give a table each, with --radars"):
+            read_plots(path)
+    else:
+        assert read_plots(path).time_s[-1] == 86_400 * len(of_day) - 900
+        assert "if these are several radars, give a table each" in caplog.text
+
+
+def test_days_of_one_radar_after_the_other_are_of_one_time(tmp_path, caplog):
+    times = [900 * k for k in range(40, 270)]
+    rows = [
+        f"{t % 86_400},{1000 * one + t + n},{72 * n},{one}" for one in (8, 9) for t in times for n in range(one - 5)
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,radar"))
+    assert plots.time_s.tolist() == sorted(t for t in times for _ in range(7))
+    assert "where column 'radar' changes: rows are sorted by time_s" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "told"), [("Radar_ID", "ab", True), ("radar", "aa", False), ("to", "ab", False)]
+)
+def test_a_column_that_tells_several_radars_apart_is_not_ignored_in_silence(tmp_path, caplog, column, values, told):
+    rows = [f"{k},{4 * k + j},{1000 + 10 * k},{72 * j},{values[j]}" for k in range(20) for j in range(2)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=f"scan,time_s,range_m,azimuth_deg,{column}"))
+    assert len(plots) == 40
+    assert (f"column {column!r} has 2 values, but all plots are taken as of one radar" in caplog.text) is told
+
+
+def test_many_pieces_that_begin_anywhere_are_sorted_and_told(tmp_path, caplog):
+    begins = [0, 300, 100, 400, 200, 500, 50, 250, 150]
+    rows = [f"{begin + 4 * k},{1000 + 10 * k},{40 * n}" for n, begin in enumerate(begins) for k in range(40)]
     plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
-    assert plots.time_s.tolist() == sorted(4 * k + n for n in range(targets) for k in range(40))
-    assert "goes back from 156 to 1 s at line 42" in caplog.text
-    assert "where it began before: rows are sorted by time_s" in caplog.text
+    assert plots.time_s.tolist() == sorted(begin + 4 * k for begin in begins for k in range(40))
+    assert "goes back from 456 to 100 s at line 82, the first of 4 such steps: rows are sorted by time_s" in caplog.text
 
 
 @pytest.mark.parametrize("stray", ["1e300", "-1e300", "-1e18"])

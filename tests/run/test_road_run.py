@@ -6,10 +6,11 @@ from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 
 import vidtrack as vt
 from vidtrack.config.load import load
+from vidtrack.config.settings import SourceSettings
 from vidtrack.output.sink import Step
 from vidtrack.radar.network.network import read_feeds
 from vidtrack.radar.network.radars import read_radars
-from vidtrack.run.road import ROAD, is_shown, run_road, told_if_apart
+from vidtrack.run.road import ROAD, is_shown, run_road, stated_span, told_if_apart
 from vidtrack.simulate import simulate_road
 from vidtrack.simulate.roads.write import write_road
 from vidtrack.traffic.calibration.calibrate import calibrated
@@ -67,6 +68,14 @@ def test_a_run_tells_of_a_radar_that_the_camera_never_meets(clip, tmp_path, capl
     (tmp_path / "radars.toml").write_text("[radars.radar]\nx_m = 99999\ny_m = 0\n")
     given = [str(tmp_path / "radar.csv")], tmp_path / "radars.toml", str(clip / "video.avi"), clip / "site.toml"
     with run_road(*given, load(base=ROAD), tmp_path / "run") as run:
+        assert "no plot of a radar is where the camera shows the road" in caplog.text
+        assert "scans 5000 to 5004 s, pictures 0 to 1 s" in caplog.text  # nothing is tracked yet
         assert len(list(run)) == 15
-    assert "no plot of a radar is where the camera shows the road" in caplog.text
-    assert "scans 5000 to 5004 s, pictures 0 to 0.9 s" in caplog.text
+    assert caplog.text.count("have no common time") == 1
+
+
+def test_the_times_of_the_pictures_of_a_file_are_those_of_the_part_that_is_read(clip):
+    video = str(clip / "video.avi")
+    assert stated_span(video, SourceSettings()) == pytest.approx((0, 1))
+    assert stated_span(video, SourceSettings(start_s=0.2, end_s=0.5)) == pytest.approx((0.2, 0.5))
+    assert stated_span(str(clip), SourceSettings()) is None

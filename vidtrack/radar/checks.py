@@ -15,6 +15,8 @@ POLAR = ("range_m", "azimuth_deg", "elevation_deg")
 CARTESIAN = ("x_m", "y_m", "z_m")
 DOPPLER = "doppler_m_s"
 AMPLITUDE = "amplitude"
+MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
+KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
 
 FARTHEST_M = 1e6
 FASTEST_M_S = 1e5

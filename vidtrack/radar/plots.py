@@ -14,22 +14,16 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
-from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, POLAR, TIME, check_numbers, check_order, possible_times
+from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, KNOWN, POLAR, TIME, check_numbers, check_order
 from vidtrack.radar.coordinates import wrap
-from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
+from vidtrack.radar.numbering import numbered
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.rhythm import DAY_S, at_midnight, begins_again, closed_up, longest_step, scan_times, set_back
-from vidtrack.radar.table import Table, nearest, read_table
+from vidtrack.radar.table import Table, bare, nearest, read_table
 
 _log = logging.getLogger(__name__)
 
-MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
-KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
-
-
-EVENLY = 0.1
-"""Usual steps; how far a step may be from a multiple of the usual one to count as such."""
+SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
+"""Names, without case and punctuation, of a column that tells which radar a plot is of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +71,17 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     """Read a CSV or Parquet table of plots.
 
     Rows may come in any order. Without a column `scan`, plots of the same time are one scan, or, if nearly each has its
-    own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set:
-    time goes on. Standard deviations come from columns, else from the settings.
-    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, and bad
-    rows. With settings.skip_bad_rows bad rows are left out with a warning.
+    own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set, or
+    a day ended: time goes on. Standard deviations come from columns, else from the settings.
+    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, times
+    that begin anew and may be of several radars, and bad rows. With settings.skip_bad_rows bad rows are left out with a
+    warning.
     """
     settings = settings or RadarSettings()
-    table = _numbered(read_table(Path(path), KNOWN), settings.position[:2])
+    table = numbered(read_table(Path(path), KNOWN), settings.position[:2])
     measured = _measured(table)
     _hint_at_misspelt(table)
+    _hint_at_several(table)
     sigma = {name: _sigma(table, name, settings) for name in measured}
     check_numbers(table, measured)
     check_order(table, measured)
@@ -96,152 +92,6 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     if table.faults:
         _log.warning("%s; left out", table.problem())
     return _sorted(table, measured, sigma)
-
-
-def _numbered(table: Table, place: tuple[float, float]) -> Table:
-    """The table with a column of scans: those of its times, if it has none and no other column may be meant.
-
-    place  x and y of the radar [m]
-
-    A gap of several usual steps between two times holds empty scans, and a pause none.
-    """
-    scan, time = TIME
-    similar = difflib.get_close_matches(scan, [_bare(name) for name in table.names if name not in KNOWN])
-    if scan in table.names or time not in table.columns or similar:
-        return table
-    table = _on_one_clock(table)
-    time_s = possible_times(table.columns[time])
-    times, member = np.unique(time_s, return_inverse=True)
-    steps = np.diff(times[np.isfinite(times)])
-    usual = float(np.median(steps)) if len(steps) else 1.0
-    one_by_one = _one_by_one(steps, len(member))
-    turned = _turned(table, time_s, place, 0.0 if one_by_one else _coarse(steps))
-    if turned is not None:
-        return replace(table, columns=table.columns | {scan: turned})
-    if one_by_one:
-        _log.warning(
-            "%s has no column 'scan', and nearly every plot its own time: give the plots of one turn the same scan",
-            table.path,
-        )
-    passed = np.where(steps > longest_step(steps), 1, np.maximum(1, np.round(steps / usual)))
-    number = np.concatenate([[0], np.cumsum(passed)])
-    number = np.concatenate([number, np.full(len(times) - len(number), np.nan)])
-    _log.warning(
-        "%s has no column 'scan': plots of the same time are one scan; %d scans, %.6g s apart",
-        table.path, len(steps) + 1, usual,
-    )  # fmt: skip
-    return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
-
-
-def _on_one_clock(table: Table) -> Table:
-    """The table with times that go on where its clock was set back; rows in another order than of arrival stay so."""
-    name = TIME[1]
-    rows = np.flatnonzero(np.isfinite(possible_times(table.columns[name])))
-    time_s = table.columns[name][rows]
-    back = set_back(time_s)
-    if not len(back):
-        return table
-    first, others = back[0], f", the first of {len(back)} such steps" if len(back) > 1 else ""
-    where = (
-        f"{table.path}: time_s goes back from {time_s[first - 1]:.10g} to {time_s[first]:.10g} s at {table.unit} "
-        f"{table.line[rows[first]]}{others}"
-    )
-    step_s = np.diff(time_s)
-    usual_s = float(np.median(step_s[step_s > 0]))
-    midnight = at_midnight(step_s[back - 1], usual_s)
-    column = None if midnight.all() else _changing(table, rows[back])
-    if column is not None:
-        _log.warning(
-            "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock was "
-            "set, give times that go on", where, column, column,
-        )  # fmt: skip
-        return table
-    if not midnight.any() and begins_again(time_s, back):
-        _log.warning(
-            "%s, where it began before: rows are sorted by time_s, as if they were of one target or sensor after the "
-            "other; if the clock was set, give times that go on", where,
-        )  # fmt: skip
-        return table
-    offset = np.zeros(len(table.line))
-    for k, ended in zip(back.tolist(), midnight.tolist(), strict=True):
-        offset[rows[k] :] += DAY_S if ended else usual_s - step_s[k - 1]
-    _log.warning(
-        "%s, as if %s: time goes on there; if the rows are only out of order, as of one sensor after the other, sort "
-        "them by time_s", where, "a day ended" if midnight.all() else "the clock was set",
-    )  # fmt: skip
-    return replace(table, columns=table.columns | {name: table.columns[name] + offset})
-
-
-def _changing(table: Table, back: Ints) -> str | None:
-    """The name of another column, as of a sensor or target, that changes where time goes back and hardly elsewhere."""
-    measured = {TIME[1], *MEASURED}
-    for name in table.names:
-        new = None if name in measured else table.changes(name)
-        if new is not None and new[back].all() and new.sum() <= 2 * len(back):
-            return name
-    return None
-
-
-def _one_by_one(steps: Floats, plots: int) -> bool:
-    """Whether nearly each of the plots has its own time, with steps (N,) that are not multiples of the usual one."""
-    if len(steps) < 2 or len(steps) < ONE_BY_ONE * plots:
-        return False
-    passed = steps / np.median(steps)
-    return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
-
-
-def _coarse(steps: Floats) -> float:
-    """The step [s] of times that several plots share, by steps (N,) between different times: nearly the shortest."""
-    return float(np.quantile(steps, 0.1)) if len(steps) else np.inf
-
-
-def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
-    """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times in steps of coarse_s.
-
-    None: they follow no antenna.
-    """
-    found = _polar(table, place)
-    if found is None:
-        return None
-    range_m, azimuth = found
-    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(range_m) & np.isfinite(azimuth))
-    if len(rows) < 2:
-        return None
-    rows = rows[np.argsort(time_s[rows], kind="stable")]
-    polar = (Message(Kind.POLAR, 0, 0, *one) for one in zip(time_s[rows], range_m[rows], azimuth[rows], strict=True))
-    plots = Messages.of(list(polar))
-    pace = pace_of(plots, None, coarse_s)
-    if not isinstance(pace, Turns):
-        short_s = turn_within(plots, coarse_s) if 0 < coarse_s < np.inf else None
-        if short_s is not None:
-            _log.warning(
-                "%s: azimuths follow an antenna with turns of %.3g s, but times are in steps of %.3g s, too coarse to "
-                "tell its turns: give a column 'scan', or finer times", table.path, short_s, coarse_s,
-            )  # fmt: skip
-        return None
-    turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
-    unsure = coarse_s > 0 or pace.period_s > USUAL_S
-    if unsure and (np.diff(scan_times(turn, plots.time_s)[2]) < 0).any():
-        return None  # the check of order would refuse the table
-    scan = np.zeros(len(time_s))
-    scan[rows] = turn - turn.min()
-    _log.warning(
-        "%s has no column 'scan': azimuths and times follow an antenna, its turns are scans; %d scans, %.6g s apart",
-        table.path, scan.max() + 1, pace.period_s,
-    )  # fmt: skip
-    return scan
-
-
-def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:
-    """Range [m] and azimuth [rad] (N,) of each row from a radar at (x, y) [m]; None without the columns for them."""
-    for names in (POLAR[:2], CARTESIAN[:2]):
-        if set(names) <= table.columns.keys():
-            first, second = (table.columns[name] for name in names)
-            if names == POLAR[:2]:
-                return first, np.radians(second)
-            east, north = first - place[0], second - place[1]
-            return np.hypot(east, north), np.arctan2(east, north)
-    return None
 
 
 def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:
@@ -287,17 +137,23 @@ def _measured(table: Table) -> list[str]:
 
 def _hint_at_misspelt(table: Table) -> None:
     """Warn of a column whose name resembles that of a missing optional column."""
-    absent = {_bare(name): name for name in KNOWN if name not in table.names}
+    absent = {bare(name): name for name in KNOWN if name not in table.names}
     for name in table.names:
-        near = [] if name in KNOWN else difflib.get_close_matches(_bare(name), absent, n=1, cutoff=0.9)
+        near = [] if name in KNOWN else difflib.get_close_matches(bare(name), absent, n=1, cutoff=0.9)
         if near:
             _log.warning("%s: column %r is not used; is it %r?", table.path, name, absent[near[0]])
 
 
-def _bare(name: str) -> str:
-    """A column's name without case, punctuation and unit."""
-    words = re.split(r"[\W_]+", name.lower())
-    return "".join(word for word in words if word not in ("m", "s", "deg", "rad", "km", "degrees"))
+def _hint_at_several(table: Table) -> None:
+    """Warn of a column by which the plots are of several radars: they are tracked as if they were of one."""
+    for name in table.names:
+        if name not in KNOWN and re.fullmatch(SENSOR, bare(name)):
+            count = len(table.cells[name].unique())
+            if count > 1:
+                _log.warning(
+                    "%s: column %r has %d values, but all plots are taken as of one radar; of several radars give a "
+                    "table each, with --radars", table.path, name, count,
+                )  # fmt: skip
 
 
 def _sigma(table: Table, name: str, settings: RadarSettings) -> Floats:

@@ -19,11 +19,16 @@ PAUSE_S, PAUSE_SCANS = 3600.0, 100
 LATE_S = 5.0
 """s; a row of a table that is later in it by more than this is out of order, or its clock was set back."""
 FEW = 3
-"""Steps back in a table in order of arrival; with more of them its rows are in another order."""
+"""Steps back in a table in order of arrival; with more of them, but for midnights, its rows are in another order."""
 DAY_S, MIDNIGHT_S = 86_400.0, 60.0
 """s; a step back by a day, less up to the second, or some usual steps, is midnight in times of day."""
 AGREED, KEPT = 3, 10
 """Rows before a clock was set back, and rows after it, that agree about it."""
+ANEW = 0.02
+"""Share of the time up to a step back; a step to so near the begin, or to LATE_S, begins there once more."""
+NEXT, PASSES, SWEEPS = 1.5, 10, 0.9
+"""Steps of coarse times up to which two follow each other; least number of times that do, of passes of an antenna over
+a sector, and the share of them after which it has turned to the right, and of gaps after which it is back."""
 
 
 class Rhythm(NamedTuple):
@@ -70,14 +75,16 @@ def closed_up(scan: Ints, time_s: Floats) -> Ints:
 
 
 def set_back(time_s: Floats) -> Ints:
-    """The rows (K,) at which a clock was set back, by times (N,) in the order of rows.
+    """The rows (K,) at which times (N,) go back by over LATE_S and stay behind, in the order of rows.
 
-    None if there are more than FEW steps back of over LATE_S, or as many of the pieces between them fall as rise: then
-    the rows are in another order than that of arrival. A row that comes late, or has a wrong time, is none, nor are
+    None if as many of the pieces between all such steps fall as rise, or if more than FEW pieces have fewer than KEPT
+    rows on average: then the rows are in another order. A row that comes late, or has a wrong time, is none, nor are
     rows whose times catch up at once.
     """
     back = (np.flatnonzero(np.diff(time_s) < -LATE_S) + 1).tolist()
-    if not back or len(back) > FEW or sum(np.sign(piece[-1] - piece[0]) for piece in np.split(time_s, back)) <= 0:
+    if not back or (len(back) > FEW and len(time_s) < KEPT * len(back)):
+        return np.zeros(0, np.int64)
+    if sum(np.sign(piece[-1] - piece[0]) for piece in np.split(time_s, back)) <= 0:
         return np.zeros(0, np.int64)
     return np.array([k for k, end in pairwise([*back, len(time_s)]) if _stays_back(time_s, k, end)], np.int64)
 
@@ -91,14 +98,40 @@ def _stays_back(time_s: Floats, row: int, end: int) -> bool:
 
 
 def begins_again(time_s: Floats, back: Ints) -> bool:
-    """Whether times (N,) go back, at one of the rows (K,), to where they began or went back to before."""
-    return bool((np.abs(np.diff(time_s[[0, *back]])) <= LATE_S).any())
+    """Whether at half or more of the rows (K,) times (N,) go back to about where they began."""
+    if not len(back):
+        return False
+    near_s = np.maximum(LATE_S, ANEW * (time_s[back - 1] - time_s[0]))
+    return bool((np.abs(time_s[back] - time_s[0]) <= near_s).mean() >= 0.5)
 
 
 def at_midnight(step_s: Floats, usual_s: float) -> Mask:
     """Which steps back (K,) are from the end of a day to the begin of the next, in times of day."""
     short_s = step_s + DAY_S
     return (short_s >= 0) & (short_s <= max(MIDNIGHT_S, FEW * usual_s))
+
+
+def whole_days(time_s: Floats, usual_s: float) -> bool:
+    """Whether times (N,) from midnight to midnight are from the first one on, and up to the last one."""
+    near_s = max(MIDNIGHT_S, FEW * usual_s)
+    return bool(0 <= time_s[0] <= near_s and time_s[-1] >= DAY_S - near_s)
+
+
+def passes(time_s: Floats, azimuth: Floats, coarse_s: float) -> Ints | None:
+    """The pass of an antenna over a sector, from 0, that each of the plots (N,) is of, by times in steps of coarse_s.
+
+    Times that follow each other are of one pass, in which azimuths [rad] go to the right; after a gap they are back.
+    None if they do not do so, or too seldom.
+    """
+    times, member = np.unique(time_s, return_inverse=True)
+    gap = np.diff(times) > NEXT * coarse_s
+    toward = np.bincount(member, np.cos(azimuth)) + 1j * np.bincount(member, np.sin(azimuth))
+    right = np.angle(toward[1:] * toward[:-1].conj()) > 0
+    between = np.zeros(len(gap), bool)
+    between[1:-1] = gap[1:-1] & ~gap[:-2] & ~gap[2:]
+    if min((~gap).sum(), between.sum()) < PASSES or min(right[~gap].mean(), 1 - right[between].mean()) < SWEEPS:
+        return None
+    return np.concatenate([[0], np.cumsum(gap)])[member]
 
 
 def longest_step(step_s: Floats) -> float:

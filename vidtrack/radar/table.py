@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -132,6 +133,12 @@ def nearest(wanted: str, names: Iterable[str]) -> str:
     names = list(names)
     near = difflib.get_close_matches(wanted, names, n=3, cutoff=0.5) or names[:6]
     return f"the nearest {'is' if len(near) == 1 else 'are'} {', '.join(map(repr, near))}" if near else "it has none"
+
+
+def bare(name: str) -> str:
+    """A column's name without case, punctuation and unit."""
+    words = re.split(r"[\W_]+", name.lower())
+    return "".join(word for word in words if word not in ("m", "s", "deg", "rad", "km", "degrees"))
 
 
 def _complaint(path: Path, unit: str, faults: Faults) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vidtrack.config.settings import Settings
+from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.output.linked import refuse_link
@@ -37,7 +37,7 @@ from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.road_scans import InPicture, RoadScans
 from vidtrack.traffic.site import read_site
 from vidtrack.video.resources import frame_by_frame
-from vidtrack.video.source import open_source
+from vidtrack.video.source import duration_s, open_source
 
 _log = logging.getLogger(__name__)
 
@@ -108,15 +108,16 @@ def _pipeline(
                 "stations": dict(zip(names, rates, strict=True)),
             }
 
+        steps, coast_s = road_steps(network, camera, tracker), max(feed.coast_s for feed in network.feeds)
+        begin_s, end_s = zip(*(feed.span_s for feed in network.feeds), strict=True)
+        pictures = stated_span(video, settings.source)
+        if pictures is None or not _tell_if_apart((min(begin_s), max(end_s)), pictures, coast_s):
+            steps = told_if_apart(steps, len(network.feeds), coast_s)
         yield Pipeline(
             name=Path(video).stem,
             place=Path(video),
             count=None,
-            steps=told_if_apart(
-                road_steps(network, camera, tracker),
-                len(network.feeds),
-                max(feed.coast_s for feed in network.feeds),
-            ),
+            steps=steps,
             summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
             sinks=lambda folder: radar_sinks(
                 settings, extras, 2, [feed.placed.xyz[:2] for feed in network.feeds], folder
@@ -156,11 +157,27 @@ def told_if_apart(steps: Iterable[Step], radars: int, within_s: float) -> Iterat
         spans[kind] = min(begin, step.time_s), max(end, step.time_s)
         yield step
     scans, pictures = spans
-    if scans and pictures and not overlap(scans, pictures, within_s):
-        _log.warning(
-            "the radar and the camera have no common time (scans %.10g to %.10g s, pictures %.10g to %.10g s): times "
-            "of plots count from the first picture", *scans, *pictures,
-        )  # fmt: skip
+    if scans and pictures:
+        _tell_if_apart(scans, pictures, within_s)
+
+
+def stated_span(video: str, settings: SourceSettings) -> tuple[float, float] | None:
+    """The times of the pictures of a video file, by the length that it states [s]; None where it states none."""
+    length_s = duration_s(video)
+    if length_s is None:
+        return None
+    return settings.start_s, length_s if settings.end_s is None else min(length_s, settings.end_s)
+
+
+def _tell_if_apart(scans: tuple[float, float], pictures: tuple[float, float], within_s: float) -> bool:
+    """Whether the times of a radar and a camera are more than that apart [s]; a warning says so."""
+    if overlap(scans, pictures, within_s):
+        return False
+    _log.warning(
+        "the radar and the camera have no common time (scans %.10g to %.10g s, pictures %.10g to %.10g s): times "
+        "of plots count from the first picture", *scans, *pictures,
+    )  # fmt: skip
+    return True
 
 
 def build_road_tracker(
