@@ -88,11 +88,9 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
 
 def _stand(road: Footprints, tracks: Tracks) -> Stand:
     """Where the tracks, in pixels of the scene, stand on the road."""
-    from vidtrack.traffic.footprint import partly_hidden
-
     plane = [*tracks.position, *tracks.velocity]
-    hidden = partly_hidden(np.full(len(tracks), tracks.t), tracks.box, tracks.status == Status.MERGED)
-    return road.place(tracks.id, tracks.xy, tracks.v, tracks.P[:, plane][:, :, plane], tracks.box, hidden=hidden)
+    t, P, merged = np.full(len(tracks), tracks.t), tracks.P[:, plane][:, :, plane], tracks.status == Status.MERGED
+    return road.place(tracks.id, t, tracks.xy, tracks.v, P, tracks.box, merged)
 
 
 @contextmanager

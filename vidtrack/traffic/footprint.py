@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.pace import Pace
 from vidtrack.traffic.vehicles.naming import Naming
@@ -108,14 +109,6 @@ class Stand:
         return np.divide(self.v, speed, out=np.column_stack([np.cos(angle), np.sin(angle)]), where=speed > 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """What was seen of N rows: t (N,) s, edge (N, 4) px left, top, right and lower edges, NaN where there are none."""
-
-    t: Floats
-    edge: Floats
-
-
 class Footprints:
     """Places vehicles on the road. Remembers the heading of those that stop; rows must come in order of time.
 
@@ -136,36 +129,39 @@ class Footprints:
     def place(
         self,
         track: Ints,
+        t: Floats,
         xy: Floats,
         u: Floats,
         P: Floats,
         box: Floats,
-        seen: Seen | None = None,
-        hidden: Mask | None = None,
+        merged: Mask | None = None,
+        edge: Floats | None = None,
     ) -> Stand:
-        """The vehicles of N rows.
+        """The vehicles of N rows, all those of a picture at once.
 
         track  (N,) identities
+        t      (N,) s
         xy, u  (N, 2) positions [px] and velocities [px/s] of the tracks
         P      (N, 4, 4) covariance of (x, y, their velocities)
         box    (N, 4) left, top, width, height [px]
-        seen   what was seen of them; None: velocities follow from u alone
-        hidden (N,) whose boxes may not be those of the whole vehicle, see `partly_hidden`; None: nobody's
+        merged (N,) who shares a blob; None: each box is that of its whole vehicle, also where it touches another
+        edge   (N, 4) px left, top, right and lower edges that were seen, NaN where there are none; None: velocities
+               follow from u alone
         """
-        hidden = np.zeros(len(track), bool) if hidden is None else hidden
+        hidden = np.zeros(len(track), bool) if merged is None else partly_hidden(t, box, merged)
         box = np.where(self._cut(box)[:, None], np.nan, box)
         with np.errstate(invalid="ignore"):
-            paced = None if seen is None else self._paced(track, seen)
+            paced = None if edge is None else self._paced(track, t, edge)
             headings = self._headings(track, xy, u, P, box, paced)
             stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2], hidden)
             stand = stand if paced is None else self._at_pace(stand, *paced)
             return self._named(track, stand, hidden)
 
-    def _paced(self, track: Ints, seen: Seen) -> tuple[Floats, Floats]:
+    def _paced(self, track: Ints, t: Floats, edge: Floats) -> tuple[Floats, Floats]:
         """(N, 2) velocities that were filtered on the road, and (N, 2, 2) their covariances."""
-        ground, (left, _, right, bottom) = self.ground, uncut(seen.edge, self._size).T
+        ground, (left, _, right, bottom) = self.ground, uncut(edge, self._size).T
         foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
-        v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
+        v, cov = self._pace.follow(track, t, foot, ground.by_own_error(foot))
         return v, cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
 
     def _at_pace(self, stand: Stand, v: Floats, cov: Floats) -> Stand:
@@ -183,8 +179,7 @@ class Footprints:
 
     def _named(self, track: Ints, stand: Stand, hidden: Mask) -> Stand:
         """The same with classes; who is partly hidden has the length of its track so far, and adds nothing to it."""
-        length = np.where(hidden, np.nan, stand.length)
-        kind, mean, sigma = self._naming.named(track, length, stand.length_sigma, stand.speed)
+        kind, mean, sigma = self._naming.named(track, stand.length, stand.length_sigma, stand.speed, hidden)
         hidden = hidden & np.isfinite(stand.length)
         return replace(
             stand,
@@ -281,16 +276,26 @@ def partly_hidden(t: Floats, box: Floats, merged: Mask) -> Mask:
     """(N,) whether the box of a row may not be that of its whole vehicle, and of it alone.
 
     It shares its blob, merged (N,), or touches a box of the same time t (N,) that reaches farther down in the picture:
-    that vehicle is nearer to the camera and may hide a part of this one. box (N, 4) left, top, width, height [px]
+    that vehicle is nearer to the camera and may hide a part of this one. Rows are in order of time.
+
+    box (N, 4) left, top, width, height [px]
     """
     hidden = merged.copy()
-    order = np.argsort(t, kind="stable")
-    low, high = box[:, :2] - _APART_PX / 2, box[:, :2] + box[:, 2:] + _APART_PX / 2
-    for rows in np.split(order, np.flatnonzero(np.diff(t[order])) + 1):
-        touch = (low[rows, None] < high[rows]).all(axis=2)
-        nearer = high[rows, 1] > high[rows, None, 1]
-        hidden[rows] |= (touch & touch.T & nearer).any(axis=1)
+    _hide(t, box[:, :2] - _APART_PX / 2, box[:, :2] + box[:, 2:] + _APART_PX / 2, hidden)
     return hidden
+
+
+@kernel
+def _hide(t: Floats, low: Floats, high: Floats, hidden: Mask) -> None:
+    """Mark rows whose boxes, from low to high (N, 2), touch one of the same time with a lower edge farther down."""
+    for i in range(len(t)):
+        j = i - 1
+        while j >= 0 and t[j] == t[i]:
+            beside = low[i, 0] < high[j, 0] and low[j, 0] < high[i, 0]
+            if beside and low[i, 1] < high[j, 1] and low[j, 1] < high[i, 1]:
+                hidden[i] |= high[j, 1] > high[i, 1]
+                hidden[j] |= high[i, 1] > high[j, 1]
+            j -= 1
 
 
 def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[Floats, Floats]:
