@@ -299,6 +299,14 @@ def test_a_line_that_is_being_written_is_not_read(tmp_path):
             assert read == [1, 12][: rows.count("\n")]
 
 
+def test_the_last_row_of_a_run_that_ended_needs_no_line_end(tmp_path):
+    """Some editors leave none."""
+    (tmp_path / "summary.json").write_text('{"interrupted": false}')
+    (tmp_path / "tracks.csv").write_text("time_s,status,track_id\n0.0,confirmed,1\n0.04,confirmed,12")
+    read = [row for table in blocks(tmp_path, ("time_s", "track_id")) for row in table["track_id"].to_pylist()]
+    assert read == [1, 12]
+
+
 def test_a_run_without_a_summary_or_tables(tmp_path):
     with pytest.raises(SourceError, match="not a finished run"):
         measured([str(tmp_path)], site())

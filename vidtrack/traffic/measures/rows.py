@@ -22,7 +22,7 @@ from vidtrack.errors import ConfigError, FormatError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
-from vidtrack.traffic.measures.runs import Day, Recording
+from vidtrack.traffic.measures.runs import Day, Recording, ended
 from vidtrack.video.readahead import ReadAhead
 
 BLOCK = 1 << 16
@@ -372,13 +372,13 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
 
 
 def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
-    """Of the whole lines: a live run may be writing the last one."""
+    """Of the whole lines: a run that goes on may be writing the last one, and in one that ended it may have no end."""
     kinds = {name: pa.float64() for name in columns} | {"track_id": pa.int64(), "status": pa.string()}
     convert = pyarrow.csv.ConvertOptions(
         column_types={name: kinds[name] for name in columns}, include_columns=list(columns)
     )
     try:
-        whole = pa.OSFile(str(path)).get_stream(0, _whole_lines(path))
+        whole = pa.OSFile(str(path)).get_stream(0, path.stat().st_size if ended(path.parent) else _whole_lines(path))
         with pyarrow.csv.open_csv(whole, convert_options=convert) as reader:
             for batch in reader:
                 yield pa.Table.from_batches([batch])
