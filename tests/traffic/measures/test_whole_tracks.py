@@ -111,3 +111,12 @@ def test_a_section_that_is_not_as_long_as_the_calibration_says_is_told(tmp_path,
     told = measured(runs, lengths).report["sections"]
     assert len(told) == said
     assert not said or "the calibration the gates are 18.0 to" in told[0]
+
+
+def test_measures_tell_what_the_points_say_against_their_calibration(tmp_path):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    assert measured(runs, site(CALIBRATED)).report["calibration"] == []
+    points = CALIBRATED["calibration"]
+    ground = [*points["ground"][:4], [35, 47], *points["ground"][5:]]
+    (told,) = measured(runs, site(CALIBRATED | {"calibration": points | {"ground": ground}})).report["calibration"]
+    assert told.startswith("pair 5 of the calibration")
