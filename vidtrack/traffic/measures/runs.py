@@ -168,7 +168,7 @@ def site_of(runs: Sequence[str]) -> Path:
     """
     copies = [_split(run)[0] / SITE_COPY for run in runs]
     for copy in copies:
-        if not copy.parent.is_dir():
+        if not has_tracks(copy.parent):
             raise SourceError(_NO_RUN.format(copy.parent))
         if not copy.is_file() or not _had_site(copy.parent):
             raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
