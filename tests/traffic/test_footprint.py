@@ -126,6 +126,15 @@ def test_a_box_that_the_border_cuts_has_no_footprint():
     assert np.isnan(placed(*((xy, u, np.array(one)) for one in cut)).xy).all()
 
 
+def test_a_box_that_the_border_may_cut_tells_no_heading():
+    """A blob that comes in grows: its centroid goes another way than the vehicle, and the heading would stay."""
+    xy, u, box = seen(CAR, (0, 25), 0)
+    at_border = np.array([2.0, *box[1:]])
+    stand = placed((xy, 5 * u[::-1], at_border), (xy, u, box), tracks=[7, 7])
+    assert np.isnan(stand.heading[0])
+    assert np.degrees(stand.heading[1]) == pytest.approx(0, abs=3)
+
+
 def test_a_vehicle_that_stops_keeps_its_heading():
     moving, standing = seen(CAR, (2, 25), 45), seen(CAR, (2, 25), 45, speed=1e-6)
     stand = placed(moving, moving, standing, standing, tracks=[7, 8, 7, 9])

@@ -233,8 +233,11 @@ class Footprints:
         self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats, paced: tuple[Floats, Floats] | None
     ) -> Floats:
         """(N, 3) unit vectors along the vehicles, and the angle's standard deviation; NaN for those that have not
-        moved yet. The direction of the tracker's velocity, or of that on the road, whichever is better known."""
-        middle, _ = footprint(self.ground, box, np.full((len(box), 2), np.nan), _SLENDER)
+        moved yet. The direction of the tracker's velocity, or of that on the road, whichever is better known; at the
+        border, which may cut the box, the centroid goes another way than the vehicle."""
+        edges = uncut(np.column_stack([box[:, :2], box[:, :2] + box[:, 2:]]), self._size)
+        whole = np.where(np.isfinite(edges).all(axis=1, keepdims=True), box, np.nan)
+        middle, _ = footprint(self.ground, whole, np.full((len(box), 2), np.nan), _SLENDER)
         v, M = velocity(self.ground, xy, middle, u)
         found = _direction(v, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2))
         if paced is not None:
