@@ -111,6 +111,19 @@ def test_a_calibration_that_is_poor_does_not_make_a_vehicles_own_error_larger():
     assert np.linalg.norm(rough.v_shared) > 2 * np.linalg.norm(fine.v_shared)
 
 
+def test_the_rim_of_a_blob_is_no_part_of_the_vehicle():
+    """3 px on each side, of a car 40 m away: else it is longer, and stands nearer to the camera."""
+    xy, u, box = seen(CAR, (2, 40), 90)
+    wide = box + np.array([-3, -3, 6, 6])
+    one, road = (np.array([7]), np.zeros(1), xy[None], u[None], SURE), Footprints(GROUND, (WIDTH, HEIGHT))
+    exact = placed((xy, u, box))
+    for rim in (3.0, np.array([3.0])):
+        told = road.place(*one, wide[None], rim=rim)
+        assert np.allclose(told.xy, exact.xy)
+        assert np.allclose(told.length, exact.length)
+    assert placed((xy, u, wide)).xy[0, 1] < exact.xy[0, 1] - 0.5
+
+
 def test_outside_the_hull_everything_is_empty_and_never_zero():
     stand = placed(seen(CAR, (0, 25), 0), seen(CAR, (0, 70), 0))
     for values in (stand.xy, stand.xy_own, stand.xy_shared, stand.v, stand.v_own, stand.v_shared, stand.speed):

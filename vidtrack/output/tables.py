@@ -179,7 +179,8 @@ def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[
     x, P = stacked(steps, "x")[:, plane], stacked(steps, "P")[:, plane][:, :, plane]
     box = stacked(steps, "box")
     merged = stacked(steps, "status") == Status.MERGED
-    stand = road.place(stacked(steps, "id"), t, x[:, :2], x[:, 2:], P, box, merged, edge)
+    rim = np.repeat([step.scan.rim for step in steps], [len(step.tracks) for step in steps])
+    stand = road.place(stacked(steps, "id"), t, x[:, :2], x[:, 2:], P, box, merged, edge, rim)
     sigma = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     shared = np.linalg.norm(stand.xy_shared, axis=2)
     return {

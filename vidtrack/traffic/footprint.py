@@ -40,6 +40,8 @@ _EDGE_PX = 1.0
 _HIDDEN_SHARE = 0.12
 """Standard deviation of the edges of a box that may not be the whole vehicle's, in sides of the box: set on simulated
 roads."""
+_LEAST_PX = 1.0
+"""px; sides of boxes, however wide their rims are"""
 _APART_PX = 3.0
 """px; boxes that are farther apart hide nothing of each other"""
 _OUTLINE_M = 0.3
@@ -136,6 +138,7 @@ class Footprints:
         box: Floats,
         merged: Mask | None = None,
         edge: Floats | None = None,
+        rim: Floats | float = 0.0,
     ) -> Stand:
         """The vehicles of N rows, all those of a picture at once.
 
@@ -147,9 +150,10 @@ class Footprints:
         merged (N,) who shares a blob; None: each box is that of its whole vehicle, also where it touches another
         edge   (N, 4) px left, top, right and lower edges that were seen, NaN where there are none; None: velocities
                follow from u alone
+        rim    (N,) px, or one for all; by how much boxes reach beyond vehicles on each side, as outlines of blobs do
         """
         hidden = np.zeros(len(track), bool) if merged is None else partly_hidden(t, box, merged)
-        box = np.where(self._cut(box)[:, None], np.nan, box)
+        box = np.where(self._cut(box)[:, None], np.nan, within(box, rim))
         with np.errstate(invalid="ignore"):
             paced = None if edge is None else self._paced(track, t, edge)
             headings = self._headings(track, xy, u, P, box, paced)
@@ -268,6 +272,12 @@ class Footprints:
         return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
 
 
+def within(box: Floats, rim: Floats | float) -> Floats:
+    """(N, 4) the boxes (left, top, width, height) without rims (N,) px on each side."""
+    rim = np.broadcast_to(rim, len(box))[:, None]
+    return np.hstack([box[:, :2] + rim, np.maximum(box[:, 2:] - 2 * rim, _LEAST_PX)])
+
+
 def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
     """(N, 4) left, top, right and lower edges [px]; NaN where the border of a picture (width, height) may cut them."""
     near = _NEAR * size[0]
@@ -349,7 +359,8 @@ def _nearer(up: Floats, w: Floats, middle: Floats, offset: Floats) -> Floats:
     """(N,) (w + z up_w) / w, with z the height of a point that is seen `offset` from the middle of its footprint."""
     lift = up[:2] - up[2] * middle  # the offset is z lift / (w + z up_w)
     along = np.sum(offset * lift, axis=1)
-    z = w * along / (np.sum(lift**2, axis=1) - up[2] * along)
+    scale = np.sum(lift**2, axis=1) - up[2] * along
+    z = np.divide(w * along, scale, out=np.zeros(len(w)), where=scale != 0)  # right below the camera no height shows
     return np.asarray(1 + z * up[2] / w)
 
 

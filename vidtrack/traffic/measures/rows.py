@@ -318,7 +318,8 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
     box = np.column_stack([column[name] for name in BOX])
     edge = np.column_stack([column[name] for name in EDGE_COLUMNS]) if EDGE_COLUMNS[0] in column else None
-    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge)
+    rim = 0.0 if edge is None else _rim(box, edge)
+    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],
@@ -349,6 +350,13 @@ def whole_pictures(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
             yield whole.slice(0, last)
     if rest is not None:
         yield rest
+
+
+def _rim(box: Floats, edge: Floats) -> float:
+    """px; by how much boxes (N, 4) reach beyond what was seen (N, 4), on the left and on the right; in half pixels."""
+    beyond = np.column_stack([edge[:, 0] - box[:, 0], box[:, 0] + box[:, 2] - edge[:, 2]]) - [-0.5, 0.5]
+    known = beyond[np.isfinite(beyond).all(axis=1)]
+    return max(0.0, round(2 * float(np.median(known))) / 2) if len(known) else 0.0
 
 
 def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
