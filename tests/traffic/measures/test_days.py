@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError, FormatError, SourceError
+from vidtrack.traffic.measures.blocks import blocks
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
-from vidtrack.traffic.measures.rows import blocks
 
 BEGAN = "2026-06-01T05:00:00.000+00:00"
 TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks", "conflicts"}

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 from drawn_runs import CALIBRATED, FPS, SIZE, along, site, write_run
 
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.measures.rows import ROAD_COLUMNS, LiveReader, Reader, Rows, whole_pictures
+from vidtrack.traffic.measures.blocks import whole_pictures
+from vidtrack.traffic.measures.rows import ROAD_COLUMNS, LiveReader, Reader, Rows
 from vidtrack.traffic.measures.runs import open_day
 
 RIM_PX = 560.0

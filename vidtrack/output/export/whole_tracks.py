@@ -9,7 +9,8 @@ from vidtrack.arrays.types import Ints
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.footprint import partly_hidden
 from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
-from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS, edges, numbers, states
+from vidtrack.traffic.measures.blocks import numbers
+from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS, edges, states
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.naming import Named, whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles

@@ -52,7 +52,7 @@ class Measures:
 def measured(runs: Sequence[str], site: Site, *, blocks: int | None = None) -> Measures:
     """The figures of all runs together, each FOLDER or FOLDER@TIME as `open_day` has it.
 
-    blocks  of rows, `rows.BLOCK` each, that are looked at; None: all
+    blocks  of rows, `blocks.BLOCK` each, that are looked at; None: all
 
     Raises ConfigError, SourceError or FormatError for what cannot be used.
     """

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields
-from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.csv
-import pyarrow.parquet as pq
 
 from vidtrack.arrays.covariance import correlation
 from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.errors import ConfigError, FormatError
+from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
-from vidtrack.traffic.measures.runs import Day, Recording, ended
+from vidtrack.traffic.measures.blocks import blocks, columns_of, numbers, whole_pictures
+from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
 
-BLOCK = 1 << 16
-"""Rows that are worked on at a time, while the next are read: 25 columns of 0.5 MB. Larger blocks are not faster."""
 BOX = ("left_px", "top_px", "width_px", "height_px")
 _PICTURE = ("vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", *BOX)
 _ALWAYS = ("time_s", "track_id", "status")
@@ -41,8 +36,6 @@ _STATE = (
 EDGE_COLUMNS = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
 ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *BOX)
 """What is read of a run with metres, besides the edges."""
-_LONGEST_LINE = 1 << 16
-"""Bytes; no line of a table is as long."""
 _NOT_SEEN = "coasting"
 
 
@@ -233,7 +226,7 @@ def _on_road(
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     """The columns to read. Raises ConfigError for a table without them."""
-    names = _columns(folder)
+    names = columns_of(folder)
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
@@ -337,85 +330,8 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
     }
 
 
-def whole_pictures(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
-    """The rows of tables in order of time, cut between pictures: what a picture shows belongs together."""
-    rest: pa.Table | None = None
-    for table in tables:
-        whole = table if rest is None else pa.concat_tables([rest, table])
-        if not len(whole):
-            continue
-        last = np.searchsorted(numbers(whole, "time_s"), whole["time_s"][-1].as_py())
-        rest = whole.slice(last)
-        if last:
-            yield whole.slice(0, last)
-    if rest is not None:
-        yield rest
-
-
 def _rim(box: Floats, edge: Floats) -> float:
     """px; by how much boxes (N, 4) reach beyond what was seen (N, 4), on the left and on the right; in half pixels."""
     beyond = np.column_stack([edge[:, 0] - box[:, 0], box[:, 0] + box[:, 2] - edge[:, 2]]) - [-0.5, 0.5]
     known = beyond[np.isfinite(beyond).all(axis=1)]
     return max(0.0, round(2 * float(np.median(known))) / 2) if len(known) else 0.0
-
-
-def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
-    """Some columns of a run's table of tracks, a block of rows at a time. Raises FormatError."""
-    path = folder / "tracks.parquet"
-    if not path.is_file():
-        yield from _csv_blocks(folder / "tracks.csv", columns)
-        return
-    waiting: list[pa.RecordBatch] = []
-    try:
-        with pq.ParquetFile(path, read_dictionary=["status"], pre_buffer=False) as file:  # else all of it is buffered
-            for batch in file.iter_batches(BLOCK, columns=list(columns)):
-                waiting.append(batch)
-                if sum(map(len, waiting)) >= BLOCK:
-                    yield pa.Table.from_batches(waiting)
-                    waiting.clear()
-    except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
-    if waiting:
-        yield pa.Table.from_batches(waiting)
-
-
-def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
-    """Of the whole lines: a run that goes on may be writing the last one, and in one that ended it may have no end."""
-    kinds = {name: pa.float64() for name in columns} | {"track_id": pa.int64(), "status": pa.string()}
-    convert = pyarrow.csv.ConvertOptions(
-        column_types={name: kinds[name] for name in columns}, include_columns=list(columns)
-    )
-    try:
-        whole = pa.OSFile(str(path)).get_stream(0, path.stat().st_size if ended(path.parent) else _whole_lines(path))
-        with pyarrow.csv.open_csv(whole, convert_options=convert) as reader:
-            for batch in reader:
-                yield pa.Table.from_batches([batch])
-    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
-
-
-def _whole_lines(path: Path) -> int:
-    """Bytes of a table to the end of its last whole line."""
-    with path.open("rb") as file:
-        begin = max(0, file.seek(0, SEEK_END) - _LONGEST_LINE)
-        file.seek(begin)
-        return begin + file.read(_LONGEST_LINE).rfind(b"\n") + 1
-
-
-def _columns(folder: Path) -> set[str]:
-    path = folder / "tracks.parquet"
-    try:
-        if path.is_file():
-            return set(pq.read_schema(path).names)
-        with (folder / "tracks.csv").open(encoding="utf-8") as file:
-            return set(file.readline().strip().split(","))
-    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
-        raise FormatError(f"{path} is damaged: {error}") from None
-
-
-def numbers(table: pa.Table, name: str) -> Floats:
-    """(N,) a column; NaN where it is empty."""
-    return np.concatenate(
-        [np.asarray(pc.cast(chunk, pa.float64()).to_numpy(zero_copy_only=False)) for chunk in table[name].chunks]
-        or [np.empty(0)]
-    )
