@@ -131,7 +131,8 @@ def _rows(frame, who, start, speed, lane, north, length, rng) -> pa.Table:
 
 def read(folder: Path) -> None:
     """Read the columns that figures need, and nothing else."""
-    from vidtrack.traffic.measures.rows import EDGE_COLUMNS, ROAD_COLUMNS, blocks
+    from vidtrack.traffic.measures.blocks import blocks
+    from vidtrack.traffic.measures.rows import EDGE_COLUMNS, ROAD_COLUMNS
 
     for table in blocks(folder, (*ROAD_COLUMNS, *EDGE_COLUMNS)):
         for name in table.column_names:

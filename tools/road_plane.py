@@ -72,7 +72,8 @@ def cuboids():
                 centroid, box = silhouette(camera, at, heading, size)
                 before, after = (silhouette(camera, at + sign * way, heading, size)[0] for sign in (-1, 1))
                 u = (after - before) / (2 * STEP_S)
-                stand = Footprints(ground, (WIDTH, HEIGHT)).place(np.array([1]), centroid[None], u[None], P, box[None])
+                road, one = Footprints(ground, (WIDTH, HEIGHT)), (np.array([1]), np.zeros(1))
+                stand = road.place(*one, centroid[None], u[None], P, box[None])
                 plain = np.linalg.norm(ground.metres(after[None]) - ground.metres(before[None])) / (2 * STEP_S)
                 off = np.linalg.norm(stand.xy[0] - at)
                 rows.append([stand.speed[0] / SPEED - 1, plain / SPEED - 1, off, abs(stand.length[0] - size[0])])
@@ -119,7 +120,7 @@ def speeds(table, whole, box, metres, ground, span=3, rate=7.0):
     order = np.argsort(frame[rows], kind="stable")
     rows, u, v = rows[order], u[order], v[order]
     P = np.repeat(np.diag([0.25, 0.25, 1.0, 1.0])[None], len(rows), axis=0)
-    stand = Footprints(ground, (768, 576)).place(identity[rows], middle[rows], u, P, box[rows])
+    stand = Footprints(ground, (768, 576)).place(identity[rows], frame[rows] / rate, middle[rows], u, P, box[rows])
     true = np.linalg.norm(v, axis=1)
     walking = (true > 0.5) & np.isfinite(stand.speed)
     steps = 0.1 * u[walking]

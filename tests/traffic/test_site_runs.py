@@ -15,7 +15,7 @@ from synthetic_steps import make_step
 
 from vidtrack.arrays.affine import shift
 from vidtrack.config.settings import Settings
-from vidtrack.errors import ConfigError
+from vidtrack.errors import ConfigError, SourceError
 from vidtrack.output.repair import repair
 from vidtrack.output.tables import ROAD, VIDEO, track_rows
 from vidtrack.run.live.part import Part, columns_of
@@ -174,10 +174,14 @@ def test_without_a_site_that_all_runs_have_one_must_be_given(tmp_path):
     for folder, text in zip(folders, (GATE, GATE, GATE.replace("360", "3")), strict=True):
         folder.mkdir()
         (folder / "site.toml").write_text(text)
+        (folder / "tracks.csv").touch()
     a, b, c = map(str, folders)
     assert site_of([f"{a}@2026-06-01T07:00:00Z", b]) == folders[0] / "site.toml"
     with pytest.raises(ConfigError, match=r"a/site.toml and .*c/site.toml are not the same site; give --site"):
         site_of([a, b, c])
+    with pytest.raises(SourceError, match="is not a finished run"):
+        site_of([a, str(tmp_path)])
+    (tmp_path / "tracks.csv").touch()
     with pytest.raises(ConfigError, match=r"has no site.toml: it was tracked without a site; give --site"):
         site_of([a, str(tmp_path)])
 

@@ -174,14 +174,13 @@ def track_rows(steps: Sequence[Step], columns: Sequence[Column] = VIDEO, road: F
 
 def _road_values(steps: Sequence[Step], edge: Floats, road: Footprints) -> dict[str, np.ndarray]:
     """The values of ROAD, all (N,); edge (N, 4) px that were seen."""
-    from vidtrack.traffic.footprint import Seen, partly_hidden
-
     t = np.repeat([step.time_s for step in steps], [len(step.tracks) for step in steps])
     plane = [*steps[0].tracks.position[:2], *steps[0].tracks.velocity[:2]]
     x, P = stacked(steps, "x")[:, plane], stacked(steps, "P")[:, plane][:, :, plane]
     box = stacked(steps, "box")
-    hidden = partly_hidden(t, box, stacked(steps, "status") == Status.MERGED)
-    stand = road.place(stacked(steps, "id"), x[:, :2], x[:, 2:], P, box, Seen(t, edge), hidden)
+    merged = stacked(steps, "status") == Status.MERGED
+    rim = np.repeat([step.scan.rim for step in steps], [len(step.tracks) for step in steps])
+    stand = road.place(stacked(steps, "id"), t, x[:, :2], x[:, 2:], P, box, merged, edge, rim)
     sigma = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     shared = np.linalg.norm(stand.xy_shared, axis=2)
     return {

@@ -83,16 +83,14 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
-            yield step.frame, step.shown, None if road is None else _stand(road, stated(step).tracks)
+            yield step.frame, step.shown, None if road is None else _stand(road, stated(step).tracks, step.scan.rim)
 
 
-def _stand(road: Footprints, tracks: Tracks) -> Stand:
-    """Where the tracks, in pixels of the scene, stand on the road."""
-    from vidtrack.traffic.footprint import partly_hidden
-
+def _stand(road: Footprints, tracks: Tracks, rim: float) -> Stand:
+    """Where the tracks, in pixels of the scene, stand on the road; their boxes have a rim [px]."""
     plane = [*tracks.position, *tracks.velocity]
-    hidden = partly_hidden(np.full(len(tracks), tracks.t), tracks.box, tracks.status == Status.MERGED)
-    return road.place(tracks.id, tracks.xy, tracks.v, tracks.P[:, plane][:, :, plane], tracks.box, hidden=hidden)
+    t, P, merged = np.full(len(tracks), tracks.t), tracks.P[:, plane][:, :, plane], tracks.status == Status.MERGED
+    return road.place(tracks.id, t, tracks.xy, tracks.v, P, tracks.box, merged, rim=rim)
 
 
 @contextmanager

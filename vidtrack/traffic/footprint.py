@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.pace import Pace
 from vidtrack.traffic.vehicles.naming import Naming
@@ -39,6 +40,8 @@ _EDGE_PX = 1.0
 _HIDDEN_SHARE = 0.12
 """Standard deviation of the edges of a box that may not be the whole vehicle's, in sides of the box: set on simulated
 roads."""
+_LEAST_PX = 1.0
+"""px; sides of boxes, however wide their rims are"""
 _APART_PX = 3.0
 """px; boxes that are farther apart hide nothing of each other"""
 _OUTLINE_M = 0.3
@@ -108,14 +111,6 @@ class Stand:
         return np.divide(self.v, speed, out=np.column_stack([np.cos(angle), np.sin(angle)]), where=speed > 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """What was seen of N rows: t (N,) s, edge (N, 4) px left, top, right and lower edges, NaN where there are none."""
-
-    t: Floats
-    edge: Floats
-
-
 class Footprints:
     """Places vehicles on the road. Remembers the heading of those that stop; rows must come in order of time.
 
@@ -136,36 +131,41 @@ class Footprints:
     def place(
         self,
         track: Ints,
+        t: Floats,
         xy: Floats,
         u: Floats,
         P: Floats,
         box: Floats,
-        seen: Seen | None = None,
-        hidden: Mask | None = None,
+        merged: Mask | None = None,
+        edge: Floats | None = None,
+        rim: Floats | float = 0.0,
     ) -> Stand:
-        """The vehicles of N rows.
+        """The vehicles of N rows, all those of a picture at once.
 
         track  (N,) identities
+        t      (N,) s
         xy, u  (N, 2) positions [px] and velocities [px/s] of the tracks
         P      (N, 4, 4) covariance of (x, y, their velocities)
         box    (N, 4) left, top, width, height [px]
-        seen   what was seen of them; None: velocities follow from u alone
-        hidden (N,) whose boxes may not be those of the whole vehicle, see `partly_hidden`; None: nobody's
+        merged (N,) who shares a blob; None: each box is that of its whole vehicle, also where it touches another
+        edge   (N, 4) px left, top, right and lower edges that were seen, NaN where there are none; None: velocities
+               follow from u alone
+        rim    (N,) px, or one for all; by how much boxes reach beyond vehicles on each side, as outlines of blobs do
         """
-        hidden = np.zeros(len(track), bool) if hidden is None else hidden
-        box = np.where(self._cut(box)[:, None], np.nan, box)
+        hidden = np.zeros(len(track), bool) if merged is None else partly_hidden(t, box, merged)
+        box = np.where(self._cut(box)[:, None], np.nan, within(box, rim))
         with np.errstate(invalid="ignore"):
-            paced = None if seen is None else self._paced(track, seen)
+            paced = None if edge is None else self._paced(track, t, edge)
             headings = self._headings(track, xy, u, P, box, paced)
             stand = self._stand(xy, u, P, box, headings[:, :2], headings[:, 2], hidden)
             stand = stand if paced is None else self._at_pace(stand, *paced)
             return self._named(track, stand, hidden)
 
-    def _paced(self, track: Ints, seen: Seen) -> tuple[Floats, Floats]:
+    def _paced(self, track: Ints, t: Floats, edge: Floats) -> tuple[Floats, Floats]:
         """(N, 2) velocities that were filtered on the road, and (N, 2, 2) their covariances."""
-        ground, (left, _, right, bottom) = self.ground, uncut(seen.edge, self._size).T
+        ground, (left, _, right, bottom) = self.ground, uncut(edge, self._size).T
         foot = ground.metres(ground.inside(np.column_stack([(left + right) / 2, bottom])))
-        v, cov = self._pace.follow(track, seen.t, foot, ground.by_own_error(foot))
+        v, cov = self._pace.follow(track, t, foot, ground.by_own_error(foot))
         return v, cov + _SILHOUETTE**2 * v[:, :, None] * v[:, None, :]
 
     def _at_pace(self, stand: Stand, v: Floats, cov: Floats) -> Stand:
@@ -183,8 +183,7 @@ class Footprints:
 
     def _named(self, track: Ints, stand: Stand, hidden: Mask) -> Stand:
         """The same with classes; who is partly hidden has the length of its track so far, and adds nothing to it."""
-        length = np.where(hidden, np.nan, stand.length)
-        kind, mean, sigma = self._naming.named(track, length, stand.length_sigma, stand.speed)
+        kind, mean, sigma = self._naming.named(track, stand.length, stand.length_sigma, stand.speed, hidden)
         hidden = hidden & np.isfinite(stand.length)
         return replace(
             stand,
@@ -238,8 +237,11 @@ class Footprints:
         self, track: Ints, xy: Floats, u: Floats, P: Floats, box: Floats, paced: tuple[Floats, Floats] | None
     ) -> Floats:
         """(N, 3) unit vectors along the vehicles, and the angle's standard deviation; NaN for those that have not
-        moved yet. The direction of the tracker's velocity, or of that on the road, whichever is better known."""
-        middle, _ = footprint(self.ground, box, np.full((len(box), 2), np.nan), _SLENDER)
+        moved yet. The direction of the tracker's velocity, or of that on the road, whichever is better known; at the
+        border, which may cut the box, the centroid goes another way than the vehicle."""
+        edges = uncut(np.column_stack([box[:, :2], box[:, :2] + box[:, 2:]]), self._size)
+        whole = np.where(np.isfinite(edges).all(axis=1, keepdims=True), box, np.nan)
+        middle, _ = footprint(self.ground, whole, np.full((len(box), 2), np.nan), _SLENDER)
         v, M = velocity(self.ground, xy, middle, u)
         found = _direction(v, M @ P[:, 2:, 2:] @ np.swapaxes(M, 1, 2))
         if paced is not None:
@@ -270,6 +272,12 @@ class Footprints:
         return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
 
 
+def within(box: Floats, rim: Floats | float) -> Floats:
+    """(N, 4) the boxes (left, top, width, height) without rims (N,) px on each side."""
+    rim = np.broadcast_to(rim, len(box))[:, None]
+    return np.hstack([box[:, :2] + rim, np.maximum(box[:, 2:] - 2 * rim, _LEAST_PX)])
+
+
 def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
     """(N, 4) left, top, right and lower edges [px]; NaN where the border of a picture (width, height) may cut them."""
     near = _NEAR * size[0]
@@ -281,16 +289,26 @@ def partly_hidden(t: Floats, box: Floats, merged: Mask) -> Mask:
     """(N,) whether the box of a row may not be that of its whole vehicle, and of it alone.
 
     It shares its blob, merged (N,), or touches a box of the same time t (N,) that reaches farther down in the picture:
-    that vehicle is nearer to the camera and may hide a part of this one. box (N, 4) left, top, width, height [px]
+    that vehicle is nearer to the camera and may hide a part of this one. Rows are in order of time.
+
+    box (N, 4) left, top, width, height [px]
     """
     hidden = merged.copy()
-    order = np.argsort(t, kind="stable")
-    low, high = box[:, :2] - _APART_PX / 2, box[:, :2] + box[:, 2:] + _APART_PX / 2
-    for rows in np.split(order, np.flatnonzero(np.diff(t[order])) + 1):
-        touch = (low[rows, None] < high[rows]).all(axis=2)
-        nearer = high[rows, 1] > high[rows, None, 1]
-        hidden[rows] |= (touch & touch.T & nearer).any(axis=1)
+    _hide(t, box[:, :2] - _APART_PX / 2, box[:, :2] + box[:, 2:] + _APART_PX / 2, hidden)
     return hidden
+
+
+@kernel
+def _hide(t: Floats, low: Floats, high: Floats, hidden: Mask) -> None:
+    """Mark rows whose boxes, from low to high (N, 2), touch one of the same time with a lower edge farther down."""
+    for i in range(len(t)):
+        j = i - 1
+        while j >= 0 and t[j] == t[i]:
+            beside = low[i, 0] < high[j, 0] and low[j, 0] < high[i, 0]
+            if beside and low[i, 1] < high[j, 1] and low[j, 1] < high[i, 1]:
+                hidden[i] |= high[j, 1] > high[i, 1]
+                hidden[j] |= high[i, 1] > high[j, 1]
+            j -= 1
 
 
 def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[Floats, Floats]:
@@ -341,7 +359,8 @@ def _nearer(up: Floats, w: Floats, middle: Floats, offset: Floats) -> Floats:
     """(N,) (w + z up_w) / w, with z the height of a point that is seen `offset` from the middle of its footprint."""
     lift = up[:2] - up[2] * middle  # the offset is z lift / (w + z up_w)
     along = np.sum(offset * lift, axis=1)
-    z = w * along / (np.sum(lift**2, axis=1) - up[2] * along)
+    scale = np.sum(lift**2, axis=1) - up[2] * along
+    z = np.divide(w * along, scale, out=np.zeros(len(w)), where=scale != 0)  # right below the camera no height shows
     return np.asarray(1 + z * up[2] / w)
 
 

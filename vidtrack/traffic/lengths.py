@@ -1,4 +1,4 @@
-"""The length of a vehicle from all rows of its track, and its class."""
+"""The length of a vehicle from all rows of its track, and its class: of finished runs, of rows, and live."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
 
 UNKNOWN = "unknown"
 """The class of a vehicle of which none is sure."""
@@ -14,23 +14,34 @@ _LEAST_SIGMA_M = 0.01
 """m; to which lengths are known at best"""
 
 
-def length_sums(track: Ints, length: Floats, sigma: Floats, tracks: int) -> Floats:
-    """(T, 3) sums of length / sigma^2, of 1 / sigma^2 and of 1 over the rows (N,) of each track that have both."""
+def length_terms(length: Floats, sigma: Floats, hidden: Mask) -> Floats:
+    """(N, 4) what rows add to the mean length of their track: 1 / sigma^2, times length, times length^2, and 1.
+
+    0 of rows whose length is not known or, hidden (N,), not that of the whole vehicle.
+
+    length, sigma  (N,) m
+    """
     weight = 1 / np.maximum(sigma, _LEAST_SIGMA_M) ** 2
-    known = np.isfinite(weight * length)
-    terms = (weight * length, weight, np.ones(len(track)))
-    return np.column_stack([np.bincount(track[known], term[known], tracks) for term in terms])
+    terms = np.column_stack([weight, weight * length, weight * length**2, np.ones(len(length))])
+    return np.where((np.isfinite(terms[:, 2]) & ~hidden)[:, None], terms, 0.0)
+
+
+def length_sums(track: Ints, terms: Floats, tracks: int) -> Floats:
+    """(T, 4) sums of `length_terms` (N, 4) over the rows of each track (N,)."""
+    return np.column_stack([np.bincount(track, term, tracks) for term in terms.T])
 
 
 def mean_length(sums: Floats) -> tuple[Floats, Floats]:
-    """(T,) m; the mean weighted by the variances, from `length_sums` (T, 3), and its standard deviation.
+    """(T,) m; the mean weighted by the variances, from sums (T, 4) of `length_terms`, and its standard deviation.
 
-    That is the one of a row, since errors last. NaN where nothing is known.
+    That is the one of a row, since errors last, or as large as lengths that contradict each other say. NaN where
+    nothing is known.
     """
-    total, weight, rows = sums.T
-    known = weight > 0
-    length, variance = (np.divide(a, weight, out=np.full(len(a), np.nan), where=known) for a in (total, rows))
-    return length, np.sqrt(variance)
+    known = np.where(sums[:, 3:] > 0, sums, np.nan)
+    weight, by_length, by_square, rows = known.T
+    mean = by_length / weight
+    apart = (by_square - by_length * mean) / rows  # mean square about it, 1 where errors are as stated
+    return mean, np.sqrt(rows / weight * np.maximum(apart, 1.0))
 
 
 def class_of(length: Floats, classes: dict[str, tuple[float, float]]) -> list[str | None]:

@@ -85,7 +85,7 @@ class RoadScans:
         P[:, :2, :2] = blobs.R[rows]
         name[known] = tracks.id[owner[known]]
         box = np.hstack([blobs.z[rows] + blobs.box[rows, :2] + blobs.rim, blobs.box[rows, 2:] - 2 * blobs.rim])
-        stand = self._footprints.place(name, blobs.z[rows], u, P, box)
+        stand = self._footprints.place(name, np.full(len(rows), blobs.t), blobs.z[rows], u, P, box)
         good = np.isfinite(stand.xy).all(axis=1) & np.isfinite(stand.xy_own).all(axis=(1, 2))
         xy, own, shared = stand.xy[good], stand.xy_own[good], stand.xy_shared[good]
         K = self._ground.by_own_error(xy)

@@ -9,9 +9,10 @@ import os
 import shutil
 import time
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
-import pyarrow as pa
+import numpy as np
 import pytest
 from synthetic_steps import make_step
 
@@ -23,11 +24,12 @@ from vidtrack.output.plot import TrajectoryPlot
 from vidtrack.output.summary import Summary
 from vidtrack.recording.reserve import Reserve
 from vidtrack.recording.retention import Limits, Retention, parts_of
-from vidtrack.run.live.counting import counter_of, counting_of
+from vidtrack.run.live.counting import RoadReadings, counter_of, counting_of
 from vidtrack.run.live.part import Part
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.sinks import Subject, line_counter
 from vidtrack.traffic.measures.measure import measured
+from vidtrack.traffic.measures.rows import Rows, off_road
 from vidtrack.traffic.metres import used_site
 from vidtrack.traffic.site import read_site
 
@@ -155,6 +157,23 @@ def test_frames_that_are_rare_are_watched(tmp_path, clock):
     assert (read_day(day).watched - BEGAN_S).round(2).tolist() == [[3, 14.5], [18.5, 29.5]]
 
 
+def on_road(track, t, length=4.0, hidden=False):
+    """Rows of vehicles of 36 km/h."""
+    one = np.ones(len(track))
+    nothing = Rows(
+        np.array(track), t * one, one > 0, one < 0, hidden * one > 0, *4 * [np.nan * one], *off_road(len(one))
+    )
+    v = np.column_stack([10 * one, 0 * one])
+    return replace(nothing, v=v, speed_sigma=one, speed_shared=one, length=length * one, length_sigma=0.1 * one)
+
+
+def test_who_is_partly_hidden_adds_nothing_to_a_length():
+    readings = RoadReadings()
+    for t, length, hidden in ((0.0, 4.0, False), (0.1, 4.2, False), (0.2, 9.0, True)):
+        readings.add(on_road([1], t, length, hidden))
+    assert readings.of(1)[0] == pytest.approx(4.1)
+
+
 def test_what_is_known_of_a_vehicle_lasts_until_its_crossing_is_decided(tmp_path, clock):
     """It is measured until just beyond the line, and then hidden for 20 s, while another one drives."""
     station = Station(tmp_path, clock, "tracker.hidden_s=20", "tracker.coast_s=20")
@@ -166,9 +185,7 @@ def test_what_is_known_of_a_vehicle_lasts_until_its_crossing_is_decided(tmp_path
         elif t < 21:
             rows.append((1, "o", 102, 100))
         seen = [number for number, word, *_ in rows if word == "c"]
-        names = ("length_m", "length_sigma_m", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
-        road = {name: len(seen) * [value] for name, value in zip(names, (4.0, 0.1, 36.0, 1.0, 1.0), strict=True)}
-        station.counting.step([make_step(frame, rows)], pa.table({"track_id": seen, "time_s": len(seen) * [t]} | road))
+        station.counting.step([make_step(frame, rows)], on_road(seen, t))
     station.counting.close()
     (day,) = day_folders(tmp_path / "intervals")
     (crossing,) = read_day(day).crossings.to_pylist()

@@ -48,7 +48,7 @@ def test_a_long_day_is_begun_in_another_process_if_nothing_is_compiled_yet(
 
 def test_the_beginning_is_so_many_blocks_of_rows(tmp_path, monkeypatch):
     run(tmp_path / "run")
-    monkeypatch.setattr("vidtrack.traffic.measures.rows.BLOCK", 30)
+    monkeypatch.setattr("vidtrack.traffic.measures.blocks.BLOCK", 30)
     runs = [str(tmp_path / "run")]
     assert len(measured(runs, site(CALIBRATED)).tables["crossings"]) == 3
     assert isinstance(measured(runs, site(CALIBRATED), blocks=1).tables["crossings"], pa.Table)

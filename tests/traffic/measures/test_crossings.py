@@ -149,7 +149,7 @@ def test_passings_are_those_of_brute_force(paths, size):
     t = np.array([1000.0 * k for k, _ in rows])  # nobody is back within 2 s
     number = np.array([track for _, track in rows])
     state = xy, unknown, np.full(count, margin), np.zeros((count, 2))
-    whole = Rows(number, t, yes, ~yes, *state, *off_road(count))
+    whole = Rows(number, t, yes, ~yes, ~yes, *state, *off_road(count))
     passing = Passing(gates, 50.0)
     for first in range(0, count, size):  # blocks of any size give the same
         passing.add(whole.only(np.arange(first, min(first + size, count))))

@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError, FormatError, SourceError
+from vidtrack.traffic.measures.blocks import blocks
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
-from vidtrack.traffic.measures.rows import blocks
 
 BEGAN = "2026-06-01T05:00:00.000+00:00"
 TABLES = {"crossings", "trips", "intervals", "stays", "queues", "checks", "conflicts"}
@@ -297,6 +297,14 @@ def test_a_line_that_is_being_written_is_not_read(tmp_path):
             (tmp_path / "tracks.csv").write_text(text + rows + rest)
             read = [row for table in blocks(tmp_path, ("time_s", "track_id")) for row in table["track_id"].to_pylist()]
             assert read == [1, 12][: rows.count("\n")]
+
+
+def test_the_last_row_of_a_run_that_ended_needs_no_line_end(tmp_path):
+    """Some editors leave none."""
+    (tmp_path / "summary.json").write_text('{"interrupted": false}')
+    (tmp_path / "tracks.csv").write_text("time_s,status,track_id\n0.0,confirmed,1\n0.04,confirmed,12")
+    read = [row for table in blocks(tmp_path, ("time_s", "track_id")) for row in table["track_id"].to_pylist()]
+    assert read == [1, 12]
 
 
 def test_a_run_without_a_summary_or_tables(tmp_path):

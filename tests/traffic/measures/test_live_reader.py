@@ -1,11 +1,14 @@
 """Vehicles that are still tracked stand where `vidtrack measure` has them, also beyond where places are known."""
 
+import itertools
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from drawn_runs import CALIBRATED, FPS, SIZE, along, site, write_run
 
 from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.measures.blocks import whole_pictures
 from vidtrack.traffic.measures.rows import ROAD_COLUMNS, LiveReader, Reader, Rows
 from vidtrack.traffic.measures.runs import open_day
 
@@ -33,10 +36,22 @@ def written(tmp_path):
 def test_the_live_reader_carries_vehicles_without_a_place_as_measure_does(tmp_path):
     run, column = written(tmp_path)
     ground = calibrated(site(CALIBRATED))
-    (whole,) = Reader(open_day([str(run)], None), {SIZE: ground})
+    whole = Rows.together(list(Reader(open_day([str(run)], None), {SIZE: ground})))
     reader, table = LiveReader(ground), pq.read_table(run / "tracks.parquet", columns=list(ROAD_COLUMNS))
     live = Rows.together([reader.read(table.slice(first, 7)) for first in range(0, len(table), 7)])
     np.testing.assert_allclose(live.xy, whole.xy)
     alone = column["track_id"] != 3
     np.testing.assert_allclose(live.xy[alone, 0], column["x_px"][alone] / 10, atol=1e-6)
     assert live.xy[~alone, 0].max() < RIM_PX / 10 + 2  # a shared blob carries nobody
+
+
+def test_blocks_end_between_pictures(tmp_path):
+    """However many rows a block has, with three vehicles in most pictures."""
+    run, _ = written(tmp_path)
+    table = pq.read_table(run / "tracks.parquet", columns=["time_s", "track_id", "status"])
+    for size in (1, 2, 7, 1000):
+        parts = list(whole_pictures(table.slice(first, size) for first in range(0, len(table), size)))
+        assert pa.concat_tables(parts).equals(table)
+        ends = [(part["time_s"][0].as_py(), part["time_s"][-1].as_py()) for part in parts]
+        assert all(before < begin for (_, before), (begin, _) in itertools.pairwise(ends))
+    assert list(whole_pictures([])) == list(whole_pictures([table.slice(0, 0)])) == []

@@ -78,7 +78,7 @@ def test_what_lies_above_the_horizon_counts_nothing_and_the_rest_goes_on(run):
 
 
 def test_of_a_long_run_the_beginning_is_counted(run, monkeypatch):
-    monkeypatch.setattr("vidtrack.traffic.measures.rows.BLOCK", 100)
+    monkeypatch.setattr("vidtrack.traffic.measures.blocks.BLOCK", 100)
     recount = Recount([run], most=1000)
     assert 0 < recount.until_s < 30
     seen = sum(recount.of(site(), None).counts["middle"].values())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn_runs import CALIBRATED, along, site, straight, write_run
+from drawn_runs import CALIBRATED, FPS, along, site, straight, write_run
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -73,6 +73,21 @@ def test_an_impossible_movement_is_told(tmp_path):
     found = measured([write_run(tmp_path / "run", [straight(1, 10.0, 50, 240, 100, 3)], metres=True)], place)
     assert found.report["impossible_movements"] == [{"from": "west", "to": "middle", "trips": 1}]
     assert found.tables["trips"].to_pylist()[0]["possible"] is False
+
+
+@pytest.mark.parametrize(("words", "passed"), [("merged", ["west"]), ("confirmed", ["west", "back"])])
+def test_where_no_trip_may_lead_another_vehicle_of_the_blob_has_passed(tmp_path, words, passed):
+    """In on a leg, and out on it again: in a blob with one that drives out there, or seen alone all the way."""
+    t = np.arange(0, 10, 1 / FPS)
+    angle = np.clip(t - 4, 0, np.pi)  # half a circle of 60 px
+    ahead = 60 * np.minimum(t, 4) - 60 * np.maximum(t - 4 - np.pi, 0)
+    track = along(1, 2 + t, 50 + ahead + 60 * np.sin(angle), 240 + 60 * (1 - np.cos(angle)))
+    run = write_run(tmp_path / "run", [track], metres=True, status=np.where(angle > 1, words, "confirmed"))
+    gates = {name: PLACE["gates"][name] for name in ("west", "east")}
+    gates["back"] = {"line": [[150, 300], [150, 479]], "role": "exit", "leg": "west"}
+    tables = measured([run], site(PLACE, gates=gates)).tables
+    assert [row["gate"] for row in tables["crossings"].to_pylist()] == passed
+    assert [row["complete"] for row in tables["trips"].to_pylist()] == [len(passed) == 2]
 
 
 def broken(gap_s, aside_px=0.0):

@@ -85,6 +85,25 @@ def test_without_a_fit_the_lengths_of_rows_tell_a_site_s_class_and_how_likely_it
         assert probability is None if np.isnan(low) else low < probability <= high
 
 
+@pytest.mark.parametrize(("hides", "name", "length"), [("merged", "short", 4.0), ("confirmed", "unknown", 6.5)])
+def test_without_a_fit_whoever_is_partly_hidden_adds_nothing_and_lengths_that_contradict_name_no_class(
+    tmp_path, hides, name, length
+):
+    """In half of the rows the box is as long as 9 m; there another one shares the blob, or nothing says why."""
+    write_run(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)], metres=True)
+    path = tmp_path / "run" / "tracks.parquet"
+    table = pq.read_table(path)
+    odd = np.arange(len(table)) % 2 == 1
+    told = {"length_m": np.where(odd, 9.0, 4.0), "status": np.where(odd, hides, "confirmed")}
+    for column, values in told.items():
+        table = table.set_column(table.column_names.index(column), column, pa.array(values))
+    pq.write_table(table, path)
+    own = site(CALIBRATED, classes={"short": (3.0, 6.0), "long": (6.0, 12.0)})
+    crossings = measured([str(tmp_path / "run")], own).tables["crossings"]
+    assert set(crossings["class"].to_pylist()) == {name}
+    assert crossings["length_m"].to_pylist() == pytest.approx([length] * len(crossings), abs=0.1)
+
+
 @pytest.mark.parametrize(("length_m", "said"), [(20.0, False), (21.0, False), (10.0, True), (90.0, True)])
 def test_a_section_that_is_not_as_long_as_the_calibration_says_is_told(tmp_path, length_m, said):
     runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
@@ -92,3 +111,12 @@ def test_a_section_that_is_not_as_long_as_the_calibration_says_is_told(tmp_path,
     told = measured(runs, lengths).report["sections"]
     assert len(told) == said
     assert not said or "the calibration the gates are 18.0 to" in told[0]
+
+
+def test_measures_tell_what_the_points_say_against_their_calibration(tmp_path):
+    runs = run_with_edges(tmp_path / "run", [straight(1, 2.0, 20, 240, 120.0, 4.8)])
+    assert measured(runs, site(CALIBRATED)).report["calibration"] == []
+    points = CALIBRATED["calibration"]
+    ground = [*points["ground"][:4], [35, 47], *points["ground"][5:]]
+    (told,) = measured(runs, site(CALIBRATED | {"calibration": points | {"ground": ground}})).report["calibration"]
+    assert told.startswith("pair 5 of the calibration")

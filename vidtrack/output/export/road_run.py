@@ -16,8 +16,9 @@ import pyarrow.parquet as pq
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.output.export.whole_tracks import WholeTracks
-from vidtrack.traffic.lengths import UNKNOWN, length_sums, mean_length
-from vidtrack.traffic.measures.rows import EDGE_COLUMNS
+from vidtrack.traffic.lengths import UNKNOWN
+from vidtrack.traffic.measures.blocks import whole_pictures
+from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
 
@@ -168,7 +169,7 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
     whole = WholeTracks(_of_size(drawn, summary))
     look = _FirstLook()
     edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= _column_names(folder) else ()
-    for table in _batches(folder, (*_NEEDED[:6], "length_m", "length_sigma_m", *edges)):
+    for table in whole_pictures(_batches(folder, (*_NEEDED[:6], "length_m", "length_sigma_m", *BOX, *edges))):
         whole.add(table)
         look.add(table)
     if not look.positions:
@@ -200,7 +201,7 @@ class _FirstLook:
     def __init__(self) -> None:
         self.rows = self.positions = 0
         self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
-        self._parts: list[Floats] = []
+        self._parts: list[Ints] = []
 
     def add(self, table: pa.Table) -> None:
         """Take a batch."""
@@ -215,17 +216,15 @@ class _FirstLook:
         seen = table["status"].to_numpy(zero_copy_only=False) != "coasting"
         until = np.full(len(track), -1)
         np.maximum.at(until, index[seen], table["frame"].to_numpy()[seen])
-        sums = length_sums(index, table["length_m"].to_numpy(), table["length_sigma_m"].to_numpy(), len(track))
-        self._parts.append(np.column_stack([track, until, sums]))
+        self._parts.append(np.column_stack([track, until]))
 
     def vehicles(self, whole: WholeTracks) -> Vehicles:
         """Those of all batches."""
         parts = np.concatenate(self._parts)
-        track, index = np.unique(parts[:, 0].astype(np.int64), return_inverse=True)
+        track, index = np.unique(parts[:, 0], return_inverse=True)
         until = np.full(len(track), -1)
-        np.maximum.at(until, index, parts[:, 1].astype(np.int64))
-        lengths = mean_length(np.column_stack([np.bincount(index, parts[:, k]) for k in (2, 3, 4)]))
-        named = whole.named(track, *lengths)
+        np.maximum.at(until, index, parts[:, 1])
+        named = whole.named(track)
         return Vehicles(track, until, named.length, np.array([name or UNKNOWN for name in named.kind]))
 
 

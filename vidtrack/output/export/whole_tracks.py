@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Ints
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.measures.rows import EDGE_COLUMNS, edges, numbers
+from vidtrack.traffic.footprint import partly_hidden
+from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
+from vidtrack.traffic.measures.blocks import numbers
+from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS, edges, states
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.naming import Named, whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles
@@ -23,18 +26,25 @@ class WholeTracks:
         self._size = site.camera.width, site.camera.height
         self._classes = site.classes
         self._vehicles = Vehicles(None if site.calibration is None else calibrated(site))
+        self._sums = np.zeros((0, 4))
 
     def add(self, table: pa.Table) -> None:
-        """Look at rows; those of runs of earlier versions have no edges, and tell nothing."""
-        if not set(EDGE_COLUMNS) <= set(table.column_names):
-            return
-        column = {name: numbers(table, name) for name in ("time_s", "x_m", "y_m", *EDGE_COLUMNS)}
-        xy = np.column_stack([column["x_m"], column["y_m"]])
-        self._vehicles.add(table["track_id"].to_numpy(), column["time_s"], xy, edges(column, self._size))
+        """Look at the rows of whole pictures; those of runs of earlier versions have no edges, and tell less."""
+        column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
+        track, t = table["track_id"].to_numpy(), column["time_s"]
+        box = np.column_stack([column[name] for name in BOX])
+        hidden = partly_hidden(t, box, states(table)[1])
+        terms = length_terms(column["length_m"], column["length_sigma_m"], hidden)
+        sums = length_sums(track, terms, max(len(self._sums), int(track.max(initial=-1)) + 1))
+        sums[: len(self._sums)] += self._sums
+        self._sums = sums
+        if EDGE_COLUMNS[0] in column:
+            xy = np.column_stack([column["x_m"], column["y_m"]])
+            self._vehicles.add(track, t, xy, edges(column, self._size))
 
-    def named(self, track: Ints, length: Floats, sigma: Floats) -> Named:
-        """Of tracks (T,), with the mean lengths of their rows and their standard deviations (T,) m."""
-        tracks = int(track.max(initial=-1)) + 1
+    def named(self, track: Ints) -> Named:
+        """Of tracks (T,)."""
         nothing = np.empty(0, np.int64)
-        found = self._vehicles.fitted(np.arange(tracks), nothing, np.empty(0))
-        return whole_tracks(None if found is None else found.classes.of(track), length, sigma, self._classes)
+        found = self._vehicles.fitted(np.arange(len(self._sums)), nothing, np.empty(0))
+        classes = None if found is None else found.classes.of(track)
+        return whole_tracks(classes, *mean_length(self._sums[track]), self._classes)

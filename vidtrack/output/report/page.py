@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from vidtrack.traffic.calibration.account import examined
 from vidtrack.traffic.measures.doubts import against
 from vidtrack.traffic.report.close import Close
 from vidtrack.traffic.report.findings import CONFLICTS, Findings
@@ -54,14 +53,6 @@ class Page:
     def times(self) -> list[str]:
         """(I + 1,) the ends of the intervals in words."""
         return [self.found.clock.label(t) for t in self.found.edges]
-
-    @property
-    def against(self) -> list[str]:
-        """What contradicts the calibration: its own points, the traffic, the lengths of sections."""
-        if not self.found.metres:
-            return []
-        account = examined(self.found.site).report
-        return [*(account["warnings"] if account["contradiction"] else []), *against(self.found.report)]
 
     @property
     def peaks(self) -> list[tuple[str, float, float, float, float]]:
@@ -111,6 +102,7 @@ def rendered(page: Page, drawn: Mapping[str, bytes], missing: Mapping[str, str])
         page=page,
         found=found,
         report=report,
+        against=against(report) if found.metres else [],
         clock=found.clock,
         date=found.clock.date(float(found.edges[0])),
         pictures={name: f"data:image/png;base64,{b64encode(content).decode()}" for name, content in drawn.items()},

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from vidtrack.arrays.types import Floats
 from vidtrack.config.settings import Settings
@@ -16,7 +15,7 @@ from vidtrack.output.intervals.book import CountBook, Passage, totals
 from vidtrack.output.intervals.day import Plan
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.lengths import length_sums, mean_length
+from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
 from vidtrack.traffic.lines import Crossing, Line, LineCounter, parse_line, parse_lines
 from vidtrack.traffic.measures.rows import Rows
 from vidtrack.traffic.metres import UsedSite
@@ -31,7 +30,6 @@ _MARGIN_S = 1.0  # for a vehicle to be clear of the line
 _SURE = 0.6  # share of the time that tracks coast in which they are surely found again: later a box may miss its own
 _UNUSUAL, _LATELY = 2.5, 0.2  # times the usual pause between frames; weight of the last one in it
 _STEP_S = 0.5  # the wall clock was set if it moved by more than this
-_SPEEDS = ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh")
 _NOTHING = (np.nan, np.nan, np.nan)
 
 
@@ -43,19 +41,18 @@ class RoadReadings:
         self._speeds: dict[int, tuple[float, float, float]] = {}
         self._seen_s: dict[int, float] = {}
 
-    def add(self, rows: pa.Table) -> None:
-        """Take rows of tracks with the columns of ROAD, in order of time."""
-        ids, track = np.unique(rows["track_id"].to_numpy(), return_inverse=True)
-        time_s, length, sigma = (_reals(rows, name) for name in ("time_s", "length_m", "length_sigma_m"))
-        speeds = np.column_stack([_reals(rows, name) for name in _SPEEDS]) / 3.6
-        sums = length_sums(track, length, sigma, len(ids))
+    def add(self, rows: Rows) -> None:
+        """Take rows of tracks on the road, in order of time."""
+        ids, track = np.unique(rows.track, return_inverse=True)
+        speeds = np.column_stack([np.linalg.norm(rows.v, axis=1), rows.speed_sigma, rows.speed_shared])
+        sums = length_sums(track, length_terms(rows.length, rows.length_sigma, rows.hidden), len(ids))
         last, fast = np.zeros((2, len(ids)), int)
         last[track] = np.arange(len(track))
         known = np.flatnonzero(np.isfinite(speeds[:, 0]))
         fast[track[known]] = known + 1
         for number, one in enumerate(ids.tolist()):
             self._sums[one] = self._sums.get(one, 0.0) + sums[number]
-            self._seen_s[one] = time_s[last[number]]
+            self._seen_s[one] = float(rows.t[last[number]])
             if fast[number]:
                 speed, own, shared = speeds[fast[number] - 1].tolist()
                 self._speeds[one] = speed, own, shared
@@ -118,15 +115,11 @@ class Counting:
         """Number of crossings that could not be written to the intervals."""
         return self._book.lost
 
-    def step(self, steps: Sequence[Step], rows: pa.Table | None, seen: Rows | None = None) -> list[Crossing]:
-        """Count a batch of steps.
-
-        rows  of their tracks, with the columns of ROAD; None without a calibrated site
-        seen  the same as the live reader has them: where they stand
-        """
+    def step(self, steps: Sequence[Step], seen: Rows | None) -> list[Crossing]:
+        """Count a batch of steps; `seen`: the tracks of these steps on the road, None without a calibrated site."""
         self._set_clock()
-        if rows is not None and len(rows):
-            self._readings.add(rows)
+        if seen is not None and len(seen):
+            self._readings.add(seen)
         crossings = [
             crossing
             for step, stand in zip(steps, self._stands(steps, seen), strict=True)
@@ -260,7 +253,3 @@ def lines_at(own: Sequence[Line], site: UsedSite | None) -> list[Line]:
 def ways_of(counter: LineCounter) -> dict[str, tuple[str, str]]:
     """The two directions of each line."""
     return {line.name: line.directions for line in counter.lines}
-
-
-def _reals(rows: pa.Table, name: str) -> Floats:
-    return np.asarray(rows[name].to_numpy(), float)

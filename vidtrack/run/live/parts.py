@@ -104,12 +104,11 @@ class Parts:
         rows = track_rows(filled, columns_of(self._subject), self._subject.road) if filled and needed else None
         if self._whole is not None:
             count(self._whole, steps)
-        on_road = None if self._reader is None else rows
         seen = None if self._reader is None or rows is None else self._reader.read(rows)
         with ExitStack() as stack:  # called from the last to the first
             stack.callback(self._write_part, steps, rows)
             if self._counting is not None:
-                self._crossings.extend(self._counting.step(steps, on_road, seen))
+                self._crossings.extend(self._counting.step(steps, seen))
                 stack.callback(self._counting.save)
             if self._events is not None:
                 self._events.step(steps, seen)

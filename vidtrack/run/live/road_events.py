@@ -101,6 +101,7 @@ def prepare() -> None:
             time_s,
             yes,
             ~yes,
+            ~yes,
             xy,
             one,
             one,

@@ -30,6 +30,11 @@ class Account:
     picture: Floats
     fitted: Floats
 
+    @property
+    def against(self) -> list[str]:
+        """What of its own points and its stated height contradicts the calibration, one line each."""
+        return list(self.report["warnings"]) if self.report["contradiction"] else []
+
 
 def examined(site: Site) -> Account:
     """The account of a site's calibration. Raises ConfigError as `calibrated` does."""

@@ -26,8 +26,8 @@ def sayings(traffic: dict[str, Any]) -> list[Saying]:
 
 
 def against(report: dict[str, Any]) -> list[str]:
-    """What contradicts the calibration of a measured site, one line each: the traffic, and the lengths of sections."""
-    return [*doubts(report), *report.get("sections", [])]
+    """What contradicts the calibration of a measured site, one line each: itself, the traffic, lengths of sections."""
+    return [*report.get("calibration", []), *doubts(report), *report.get("sections", [])]
 
 
 def doubts(traffic: dict[str, Any]) -> list[str]:

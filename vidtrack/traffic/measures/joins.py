@@ -141,7 +141,7 @@ def step_rows(begin: End, end: End) -> Rows:
     number = np.repeat(np.arange(len(begin.t)), 2)
     sigma = np.sqrt(both(begin.spread[:, 0], end.spread[:, 0]))
     state = both(begin.xy, end.xy), sigma, np.zeros(rows), np.full((rows, 2), np.nan)
-    return Rows(number, both(begin.t, end.t), yes, ~yes, *state, *off_road(rows))
+    return Rows(number, both(begin.t, end.t), yes, ~yes, ~yes, *state, *off_road(rows))
 
 
 def _at(end: End, who: Ints) -> End:

@@ -49,6 +49,7 @@ def journeys(
     passed = passed.only(passed.t <= lives.until[passed.track])
     may = _may(gates, allowed)
     passed = passed.only(~passed.beside | _needed(gates, passed, may))
+    passed = passed.only(~_of_another(gates, passed, lives, may))
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
@@ -93,15 +94,32 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
     beside[k] = gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0] == passed.gate[k]
     leg, inwards = gates.leg[passed.gate], gates.inward[passed.gate] == passed.side
     enters, leaves = gates.ways(passed.gate, passed.side)
-    tracks = int(passed.track.max(initial=-1)) + 1
-    order = np.argsort(passed.t, kind="stable")
-    first_in = first_of(passed.track, order[(enters & drawn)[order]], tracks)
-    last_out = first_of(passed.track, order[(leaves & drawn)[order]][::-1], tracks)
-    entry, exit_ = first_in[passed.track], last_out[passed.track]
+    entry, exit_ = _ends(passed, enters & drawn, leaves & drawn)
     t, leg_of = np.append(passed.t, np.nan), np.append(leg, -1)
     enters &= beside & inwards & (entry < 0) & (t[exit_] > passed.t) & may[leg, leg_of[exit_]]
     leaves &= beside & ~inwards & (exit_ < 0) & (t[entry] < passed.t) & may[leg_of[entry], leg]
     return np.asarray(enters | leaves)
+
+
+def _of_another(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
+    """(P,) entries and exits of trips that may not be, while the track was not yet, or no more, seen alone.
+
+    Another vehicle of the blob has passed there.
+    """
+    entry, exit_ = _ends(passed, *gates.ways(passed.gate, passed.side))
+    number, leg, t = np.arange(len(passed)), np.append(gates.leg[passed.gate], -1), np.append(passed.t, np.nan)
+    early = (number == entry) & (passed.t < lives.head.t[passed.track])
+    late = (number == exit_) & (passed.t > lives.tail.t[passed.track])
+    return np.asarray((early | late) & (t[exit_] > t[entry]) & ~may[leg[entry], leg[exit_]])
+
+
+def _ends(passed: Passed, enters: Mask, leaves: Mask) -> tuple[Ints, Ints]:
+    """(P,) the first passing that enters, and the last one that leaves, of the track of each passing; -1: none."""
+    tracks = int(passed.track.max(initial=-1)) + 1
+    order = np.argsort(passed.t, kind="stable")
+    first_in = first_of(passed.track, order[enters[order]], tracks)
+    last_out = first_of(passed.track, order[leaves[order]][::-1], tracks)
+    return first_in[passed.track], last_out[passed.track]
 
 
 def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import pyarrow as pa
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.calibration.calibrate import calibrated
+from vidtrack.traffic.calibration.account import examined
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.calibration.sections import section_doubts
 from vidtrack.traffic.measures.ahead import compile_ahead
@@ -37,6 +38,8 @@ from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.naming import whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles
 
+_log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True, slots=True)
 class Measures:
@@ -49,7 +52,7 @@ class Measures:
 def measured(runs: Sequence[str], site: Site, *, blocks: int | None = None) -> Measures:
     """The figures of all runs together, each FOLDER or FOLDER@TIME as `open_day` has it.
 
-    blocks  of rows, `rows.BLOCK` each, that are looked at; None: all
+    blocks  of rows, `blocks.BLOCK` each, that are looked at; None: all
 
     Raises ConfigError, SourceError or FormatError for what cannot be used.
     """
@@ -60,7 +63,12 @@ def measured(runs: Sequence[str], site: Site, *, blocks: int | None = None) -> M
     if len(sizes) > 1 and site.calibration is None:
         raise ConfigError("the runs have pictures of several sizes; give the site a calibration, or measure each alone")
     drawn = {size: site.scaled(*size) for size in sizes}
-    grounds = {size: None if one.calibration is None else calibrated(one) for size, one in drawn.items()}
+    accounts = {size: examined(one) for size, one in drawn.items() if one.calibration is not None}
+    grounds = {size: accounts[size].ground if size in accounts else None for size in sizes}
+    against = accounts[sizes[0]].against if accounts else []
+    if accounts and not against:
+        for line in accounts[sizes[0]].report["warnings"]:
+            _log.warning("%s", line)
     gates = gates_of(drawn[sizes[0]], grounds[sizes[0]])
     outlines = outlines_of(drawn[sizes[0]], grounds[sizes[0]])
     metres, ground = site.calibration is not None, grounds[sizes[0]]
@@ -79,7 +87,7 @@ def measured(runs: Sequence[str], site: Site, *, blocks: int | None = None) -> M
     del stretches, passing  # which are large
     pa.default_memory_pool().release_unused()  # what the tables were read into
     return _Figures(
-        day, site, drawn[sizes[0]], gates, ground, reader, passed, ways, lives, staying, meeting, vehicles
+        day, site, drawn[sizes[0]], gates, ground, against, reader, passed, ways, lives, staying, meeting, vehicles
     ).measures()
 
 
@@ -99,6 +107,7 @@ class _Figures:
         drawn: Site,
         gates: Gates,
         ground: Ground | None,
+        against: list[str],
         reader: Reader,
         passed: Passed,
         ways: Floats,
@@ -119,7 +128,7 @@ class _Figures:
         self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
-        self.against = contradicting(found)
+        self.against = {"calibration": against, **contradicting(found)}
         if found is not None:
             self.passed = self.passed.with_speeds(found.speeds.speed, found.speeds.own, found.speeds.shared)
         classes = site.classes if self.metres else {}

@@ -5,30 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields
-from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
-import pyarrow.csv
-import pyarrow.parquet as pq
 
 from vidtrack.arrays.covariance import correlation
 from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.errors import ConfigError, FormatError
+from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, Seen, footprint, partly_hidden, uncut
+from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
+from vidtrack.traffic.measures.blocks import blocks, columns_of, numbers, whole_pictures
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
 
-BLOCK = 1 << 16
-"""Rows that are worked on at a time, while the next are read: 25 columns of 0.5 MB. Larger blocks are not faster."""
-_BOX = ("left_px", "top_px", "width_px", "height_px")
-_PICTURE = ("vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", *_BOX)
+BOX = ("left_px", "top_px", "width_px", "height_px")
+_PICTURE = ("vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", *BOX)
 _ALWAYS = ("time_s", "track_id", "status")
 _ROAD = (
     *("x_m", "y_m", "sigma_x_m", "sigma_y_m", "corr_xy_m", "speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"),
@@ -36,13 +31,11 @@ _ROAD = (
 )
 _STATE = (
     *("x_px", "y_px", "vx_px_s", "vy_px_s", "sigma_x_px", "sigma_y_px", "sigma_vx_px_s", "sigma_vy_px_s"),
-    *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *_BOX),
+    *("corr_xy", "corr_vxy", "corr_x_vx", "corr_x_vy", "corr_y_vx", "corr_y_vy", *BOX),
 )
 EDGE_COLUMNS = ("seen_left_px", "seen_top_px", "seen_right_px", "seen_bottom_px")
-ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *_BOX)
+ROAD_COLUMNS = (*_ALWAYS, *_ROAD, *BOX)
 """What is read of a run with metres, besides the edges."""
-_LONGEST_LINE = 1 << 16
-"""Bytes; no line of a table is as long."""
 _NOT_SEEN = "coasting"
 
 
@@ -54,6 +47,7 @@ class Rows:
     t        (N,) s, of the site
     seen     (N,) the picture of that time shows the track
     merged   (N,) it shares a blob with others
+    hidden   (N,) its box may not be that of its whole vehicle, see `partly_hidden`: its length is no measurement
     xy       (N, 2) where it stands: the middle of the footprint in metres with a calibration, else in pixels as far as
              its box tells
     sigma    (N,) standard deviation of its own position error, in the unit of xy
@@ -71,6 +65,7 @@ class Rows:
     t: Floats
     seen: Mask
     merged: Mask
+    hidden: Mask
     xy: Floats
     sigma: Floats
     margin: Floats
@@ -142,22 +137,22 @@ class Reader:
             wanted, road = _needed(recording.folder, ground), None
             if ground is not None and "x_m" not in wanted:
                 road = roads.setdefault(recording.session, Footprints(ground, recording.size))
-            with closing(ReadAhead(blocks(recording.folder, wanted), depth=1)) as tables:
+            with closing(ReadAhead(whole_pictures(blocks(recording.folder, wanted)), depth=1)) as tables:
                 for table in tables:
                     yield self._rows(table, recording, ground, road)
 
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
         column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
         track = self._numbered(table, recording.session)
-        seen, merged = _states(table)
+        seen, merged = states(table)
         t = column["time_s"] + recording.offset_s
         if ground is None:
             high = column["height_px"]
-            xy = foot_of(np.column_stack([column[name] for name in _BOX]))
+            xy = foot_of(np.column_stack([column[name] for name in BOX]))
             sigma = np.sqrt((column["sigma_x_px"] ** 2 + column["sigma_y_px"] ** 2 + (_FOOT_SIGMA * high) ** 2) / 2)
             margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
-            return Rows(track, t, seen, merged, xy, sigma, margin, v, *off_road(len(t)))
+            return Rows(track, t, seen, merged, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
             column |= _stand(road, track, column, merged)
         edge = edges(column, recording.size)
@@ -191,7 +186,7 @@ class LiveReader:
         """The rows of the next table; vehicles without a place are carried as in `Reader`."""
         column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
         track, t, edge = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
-        rows = _on_road(self._ground, column, track, t, *_states(table), edge)
+        rows = _on_road(self._ground, column, track, t, *states(table), edge)
         if len(t) == 0:
             return rows
         ids, number = np.unique(track, return_inverse=True)
@@ -203,7 +198,7 @@ class LiveReader:
         return rows
 
 
-def _states(table: pa.Table) -> tuple[Mask, Mask]:
+def states(table: pa.Table) -> tuple[Mask, Mask]:
     """(N,) whether the picture shows the track, and whether it shares a blob with others."""
     status = table["status"].combine_chunks().dictionary_encode()
     words = status.dictionary.to_pylist()
@@ -225,12 +220,13 @@ def _on_road(
     sides = length, column["length_sigma_m"], column["width_m"]
     spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
     state = xy, sigma, margin, speed[:, None] * ahead
-    return Rows(track, t, seen, merged, *state, *sigmas, *sides, ahead, spread, edge)
+    hidden = partly_hidden(t, np.column_stack([column[name] for name in BOX]), merged)
+    return Rows(track, t, seen, merged, hidden, *state, *sigmas, *sides, ahead, spread, edge)
 
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     """The columns to read. Raises ConfigError for a table without them."""
-    names = _columns(folder)
+    names = columns_of(folder)
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
@@ -249,8 +245,8 @@ def _demand(folder: Path, names: set[str], needed: tuple[str, ...], what: str) -
 
 def _of_this_site(folder: Path, ground: Ground) -> bool:
     """Whether the metres of a run are where the site has them: at the lower half of the boxes."""
-    for table in blocks(folder, ("x_m", "y_m", *_BOX)):
-        left, top, width, height = (numbers(table, name) for name in _BOX)
+    for table in blocks(folder, ("x_m", "y_m", *BOX)):
+        left, top, width, height = (numbers(table, name) for name in BOX)
         x, y = ground.pixels(np.column_stack([numbers(table, "x_m"), numbers(table, "y_m")])).T
         known = np.isfinite(x)
         if known.any():
@@ -277,7 +273,7 @@ def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Float
     sigma = np.hypot(column["sigma_x_m"], column["sigma_y_m"]) / np.sqrt(2)
     rough = np.flatnonzero(np.isnan(xy[:, 0]))
     if len(rough):
-        box = np.column_stack([column[name][rough] for name in _BOX])
+        box = np.column_stack([column[name][rough] for name in BOX])
         with np.errstate(invalid="ignore", divide="ignore"):
             middle, _ = footprint(ground, box, np.full((len(rough), 2), np.nan), 0.0)
             xy[rough] = ground.metres(middle)
@@ -313,11 +309,10 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
         corr[:, i, j] = corr[:, j, i] = column[f"corr_{name}"]
     P = corr * sigma[:, :, None] * sigma[:, None, :]
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
-    box = np.column_stack([column[name] for name in _BOX])
-    edge = [column[name] for name in EDGE_COLUMNS if name in column]
-    seen = Seen(column["time_s"], np.column_stack(edge)) if edge else None
-    hidden = partly_hidden(column["time_s"], box, merged)
-    stand = road.place(track, xy, u, P, box, seen, hidden)
+    box = np.column_stack([column[name] for name in BOX])
+    edge = np.column_stack([column[name] for name in EDGE_COLUMNS]) if EDGE_COLUMNS[0] in column else None
+    rim = 0.0 if edge is None else _rim(box, edge)
+    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],
@@ -335,63 +330,8 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
     }
 
 
-def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
-    """Some columns of a run's table of tracks, a block of rows at a time. Raises FormatError."""
-    path = folder / "tracks.parquet"
-    if not path.is_file():
-        yield from _csv_blocks(folder / "tracks.csv", columns)
-        return
-    waiting: list[pa.RecordBatch] = []
-    try:
-        with pq.ParquetFile(path, read_dictionary=["status"], pre_buffer=False) as file:  # else all of it is buffered
-            for batch in file.iter_batches(BLOCK, columns=list(columns)):
-                waiting.append(batch)
-                if sum(map(len, waiting)) >= BLOCK:
-                    yield pa.Table.from_batches(waiting)
-                    waiting.clear()
-    except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
-    if waiting:
-        yield pa.Table.from_batches(waiting)
-
-
-def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
-    """Of the whole lines: a live run may be writing the last one."""
-    kinds = {name: pa.float64() for name in columns} | {"track_id": pa.int64(), "status": pa.string()}
-    convert = pyarrow.csv.ConvertOptions(
-        column_types={name: kinds[name] for name in columns}, include_columns=list(columns)
-    )
-    try:
-        whole = pa.OSFile(str(path)).get_stream(0, _whole_lines(path))
-        with pyarrow.csv.open_csv(whole, convert_options=convert) as reader:
-            for batch in reader:
-                yield pa.Table.from_batches([batch])
-    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
-
-
-def _whole_lines(path: Path) -> int:
-    """Bytes of a table to the end of its last whole line."""
-    with path.open("rb") as file:
-        begin = max(0, file.seek(0, SEEK_END) - _LONGEST_LINE)
-        file.seek(begin)
-        return begin + file.read(_LONGEST_LINE).rfind(b"\n") + 1
-
-
-def _columns(folder: Path) -> set[str]:
-    path = folder / "tracks.parquet"
-    try:
-        if path.is_file():
-            return set(pq.read_schema(path).names)
-        with (folder / "tracks.csv").open(encoding="utf-8") as file:
-            return set(file.readline().strip().split(","))
-    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
-        raise FormatError(f"{path} is damaged: {error}") from None
-
-
-def numbers(table: pa.Table, name: str) -> Floats:
-    """(N,) a column; NaN where it is empty."""
-    return np.concatenate(
-        [np.asarray(pc.cast(chunk, pa.float64()).to_numpy(zero_copy_only=False)) for chunk in table[name].chunks]
-        or [np.empty(0)]
-    )
+def _rim(box: Floats, edge: Floats) -> float:
+    """px; by how much boxes (N, 4) reach beyond what was seen (N, 4), on the left and on the right; in half pixels."""
+    beyond = np.column_stack([edge[:, 0] - box[:, 0], box[:, 0] + box[:, 2] - edge[:, 2]]) - [-0.5, 0.5]
+    known = beyond[np.isfinite(beyond).all(axis=1)]
+    return max(0.0, round(2 * float(np.median(known))) / 2) if len(known) else 0.0

@@ -168,7 +168,7 @@ def site_of(runs: Sequence[str]) -> Path:
     """
     copies = [_split(run)[0] / SITE_COPY for run in runs]
     for copy in copies:
-        if not copy.parent.is_dir():
+        if not has_tracks(copy.parent):
             raise SourceError(_NO_RUN.format(copy.parent))
         if not copy.is_file() or not _had_site(copy.parent):
             raise ConfigError(f"{copy.parent} has no {SITE_COPY}: it was tracked without a site; give --site SITE.toml")
@@ -223,7 +223,7 @@ def _found(run: str) -> _Found:
         raise ConfigError(f"{folder} is not a run over video: its summary.json has no frames, size and times") from None
     if frames < 1 or fps <= 0 or min(size) < 1:
         raise SourceError(f"{folder} has no frames; there is nothing to measure")
-    if summary.get("interrupted") is False and _cut_off(folder):
+    if ended(folder) and _cut_off(folder):
         raise FormatError(f"{folder / 'tracks.csv'} is cut off in its last line, though the run ended; copy it again")
     began = summary.get("began")
     zero = time or (datetime.fromisoformat(began) if began else None)
@@ -232,6 +232,15 @@ def _found(run: str) -> _Found:
         begin = spans[0][0] if spans else end - (frames - 1) / fps
     breaks = tuple((before[1] + 1 / fps, after[0]) for before, after in pairwise(spans))
     return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks)
+
+
+def ended(folder: Path) -> bool:
+    """Whether a run came to its end, so that nobody is writing its tables and each line is whole, or was cut off."""
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(summary, dict) and summary.get("interrupted") is False
 
 
 def _cut_off(folder: Path) -> bool:

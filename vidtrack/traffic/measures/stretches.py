@@ -20,7 +20,7 @@ import numpy as np
 from vidtrack.arrays.rows import room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.traffic.lengths import length_sums, mean_length
+from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
 from vidtrack.traffic.measures.rows import Rows
 
 _PLACE_M = 0.3
@@ -69,7 +69,7 @@ class Lives:
     """What is left of T stretches when their rows have gone by.
 
     head, tail   where they began and ended, seen alone
-    length, length_sigma   (T,) m; the mean weighted by the variances, NaN where it is not known
+    length, length_sigma   (T,) m; the mean of the rows, as `mean_length` has it, NaN where it is not known
     track        (T,) number of the track
     until        (T,) s; what the track did afterwards is of nobody; inf: it was not broken
     """
@@ -92,7 +92,7 @@ class Stretches:
         self._current = np.empty(0, np.int64)
         self._head, self._tail = np.full((2, 0, 9), np.nan)
         self._track, self._until = np.empty(0, np.int64), np.empty(0)
-        self._sums = np.zeros((0, 3))
+        self._sums = np.zeros((0, 4))
         self._count = 0
 
     def add(self, rows: Rows) -> Rows:
@@ -107,8 +107,8 @@ class Stretches:
             self._since, self._current, self._head, self._tail, self._track, self._until, number, self._count,
         )  # fmt: skip
         low = int(number.min())
-        some = length_sums(number - low, rows.length, rows.length_sigma, self._count - low)
-        self._sums[low : self._count] += some
+        terms = length_terms(rows.length, rows.length_sigma, rows.hidden)
+        self._sums[low : self._count] += length_sums(number - low, terms, self._count - low)
         return replace(rows, track=number)
 
     def lives(self) -> Lives:
@@ -131,7 +131,7 @@ class Stretches:
             self._head, self._tail = np.vstack([self._head, unknown]), np.vstack([self._tail, unknown])
             self._track = np.concatenate([self._track, np.full(more, -1)])
             self._until = np.concatenate([self._until, np.full(more, np.inf)])
-            self._sums = np.concatenate([self._sums, np.zeros((more, 3))])
+            self._sums = np.concatenate([self._sums, np.zeros((more, 4))])
 
 
 def _end(states: Floats) -> End:

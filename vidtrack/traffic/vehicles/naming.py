@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vidtrack.arrays.types import Floats, Ints
-from vidtrack.traffic.lengths import UNKNOWN
+from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.traffic.lengths import UNKNOWN, length_terms, mean_length
 from vidtrack.traffic.vehicles.classes import Classified, classified, named, named_by_length
-
-_LEAST_SIGMA_M = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,34 +52,26 @@ class Naming:
         self._sums: dict[int, Floats] = {}
 
     def named(
-        self, track: Ints, length: Floats, sigma: Floats, speed: Floats
+        self, track: Ints, length: Floats, sigma: Floats, speed: Floats, hidden: Mask
     ) -> tuple[NDArray[np.str_], Floats, Floats]:
         """(N,) classes, UNKNOWN where none is sure; (N,) m, the mean lengths of the tracks so far and their errors.
 
         Before a track has a length its class is "", and its mean NaN.
 
-        track (N,), length and sigma (N,) m, NaN where it is not known; speed (N,) m/s
+        track (N,), length and sigma (N,) m, NaN where it is not known, speed (N,) m/s; hidden (N,) who adds nothing
         """
-        weight = np.nan_to_num(1 / np.maximum(sigma, _LEAST_SIGMA_M) ** 2) * np.isfinite(length)
-        length = np.nan_to_num(length)
-        sums = self._added(track, np.column_stack([weight, weight * length, weight * length**2, weight > 0]))
-        known = sums[:, 3] > 0
-        total, by_length, by_square, rows = sums[known].T
-        mean = by_length / total
-        apart = (by_square - by_length * mean) / rows  # mean square about it, 1 where errors are as stated
-        information = total / rows / np.maximum(apart, 1.0)  # errors last: many rows are no better than one
+        mean, error = mean_length(self._added(track, length_terms(length, sigma, hidden)))
+        known = np.isfinite(mean)
         names = np.full(len(track), "", dtype=object)
-        names[known] = self._class_of(mean, information, np.nan_to_num(speed[known]))
-        means = np.full((2, len(track)), np.nan)
-        means[:, known] = mean, 1 / np.sqrt(information)
-        return names.astype(str), *means
+        names[known] = self._class_of(mean[known], error[known], np.nan_to_num(speed[known]))
+        return names.astype(str), mean, error
 
-    def _class_of(self, mean: Floats, information: Floats, speed: Floats) -> list[str]:
+    def _class_of(self, mean: Floats, sigma: Floats, speed: Floats) -> list[str]:
         if self._classes:
-            return named_by_length(mean, 1 / np.sqrt(information), self._classes)[0]
+            return named_by_length(mean, sigma, self._classes)[0]
         about = np.zeros((len(mean), 3, 3))
-        about[:, 0, 0] = information
-        vector = np.column_stack([information * mean, np.zeros((len(mean), 2))])
+        about[:, 0, 0] = 1 / sigma**2
+        vector = np.column_stack([mean / sigma**2, np.zeros((len(mean), 2))])
         return [name or UNKNOWN for name in named(classified(about, vector, speed))[0]]
 
     def _added(self, track: Ints, terms: Floats) -> Floats:

@@ -1,0 +1,99 @@
+"""The table of tracks of a finished run, a block of rows at a time: only the columns that are wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from os import SEEK_END
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
+import pyarrow.parquet as pq
+
+from vidtrack.arrays.types import Floats
+from vidtrack.errors import FormatError
+from vidtrack.traffic.measures.runs import ended
+
+BLOCK = 1 << 16
+"""Rows that are worked on at a time, while the next are read: 25 columns of 0.5 MB. Larger blocks are not faster."""
+_LONGEST_LINE = 1 << 16
+"""Bytes; no line of a table is as long."""
+
+
+def whole_pictures(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
+    """The rows of tables in order of time, cut between pictures: what a picture shows belongs together."""
+    rest: pa.Table | None = None
+    for table in tables:
+        whole = table if rest is None else pa.concat_tables([rest, table])
+        if not len(whole):
+            continue
+        last = np.searchsorted(numbers(whole, "time_s"), whole["time_s"][-1].as_py())
+        rest = whole.slice(last)
+        if last:
+            yield whole.slice(0, last)
+    if rest is not None:
+        yield rest
+
+
+def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
+    """Some columns of a run's table of tracks, a block of rows at a time. Raises FormatError."""
+    path = folder / "tracks.parquet"
+    if not path.is_file():
+        yield from _csv_blocks(folder / "tracks.csv", columns)
+        return
+    waiting: list[pa.RecordBatch] = []
+    try:
+        with pq.ParquetFile(path, read_dictionary=["status"], pre_buffer=False) as file:  # else all of it is buffered
+            for batch in file.iter_batches(BLOCK, columns=list(columns)):
+                waiting.append(batch)
+                if sum(map(len, waiting)) >= BLOCK:
+                    yield pa.Table.from_batches(waiting)
+                    waiting.clear()
+    except (pa.ArrowInvalid, OSError) as error:
+        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
+    if waiting:
+        yield pa.Table.from_batches(waiting)
+
+
+def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
+    """Of the whole lines: a run that goes on may be writing the last one, and in one that ended it may have no end."""
+    kinds = {name: pa.float64() for name in columns} | {"track_id": pa.int64(), "status": pa.string()}
+    convert = pyarrow.csv.ConvertOptions(
+        column_types={name: kinds[name] for name in columns}, include_columns=list(columns)
+    )
+    try:
+        whole = pa.OSFile(str(path)).get_stream(0, path.stat().st_size if ended(path.parent) else _whole_lines(path))
+        with pyarrow.csv.open_csv(whole, convert_options=convert) as reader:
+            for batch in reader:
+                yield pa.Table.from_batches([batch])
+    except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
+        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
+
+
+def _whole_lines(path: Path) -> int:
+    """Bytes of a table to the end of its last whole line."""
+    with path.open("rb") as file:
+        begin = max(0, file.seek(0, SEEK_END) - _LONGEST_LINE)
+        file.seek(begin)
+        return begin + file.read(_LONGEST_LINE).rfind(b"\n") + 1
+
+
+def columns_of(folder: Path) -> set[str]:
+    path = folder / "tracks.parquet"
+    try:
+        if path.is_file():
+            return set(pq.read_schema(path).names)
+        with (folder / "tracks.csv").open(encoding="utf-8") as file:
+            return set(file.readline().strip().split(","))
+    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
+        raise FormatError(f"{path} is damaged: {error}") from None
+
+
+def numbers(table: pa.Table, name: str) -> Floats:
+    """(N,) a column; NaN where it is empty."""
+    return np.concatenate(
+        [np.asarray(pc.cast(chunk, pa.float64()).to_numpy(zero_copy_only=False)) for chunk in table[name].chunks]
+        or [np.empty(0)]
+    )
