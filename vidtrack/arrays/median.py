@@ -10,7 +10,7 @@ from vidtrack.compiled import inlined, kernel
 def median(values: Floats) -> float:
     """Median of values (N,), N > 0, without NaN; their order changes. NumPy's takes 2 s to compile."""
     half = len(values) // 2
-    upper = _ranked(values, half)
+    upper = ranked(values, half)
     if len(values) % 2:
         return upper
     lower = values[0]
@@ -20,7 +20,7 @@ def median(values: Floats) -> float:
 
 
 @inlined
-def _ranked(values: Floats, rank: int) -> float:
+def ranked(values: Floats, rank: int) -> float:
     """The value with so many before it in ascending order, moved to its place, by Hoare's selection."""
     low, high = 0, len(values) - 1
     while low < high:

@@ -51,7 +51,10 @@ class Frontier(NamedTuple):
 @kernel
 def frontier(start: Ints) -> Frontier:
     """The frontier before the first step, for members with the edges start[i]..start[i + 1]."""
-    return Frontier(np.diff(start), np.full(len(start) - 1, -1), np.full(len(start) - 1, -1))
+    left = np.empty(len(start) - 1, np.int64)
+    for i in range(len(left)):
+        left[i] = start[i + 1] - start[i]
+    return Frontier(left, np.full(len(left), -1), np.full(len(left), -1))
 
 
 @kernel

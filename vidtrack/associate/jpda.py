@@ -110,7 +110,8 @@ def _marginals(
             elif solved:
                 exact(by_column, column_width, columns, row_frontier, miss, factor, beta, idle, beta0)
         if not solved:
-            approximate[tracks] = True
+            for t in tracks:
+                approximate[t] = True
             propagate(tracks, contested, rows, columns, factor, beta, beta0)
     return beta, beta0, approximate
 

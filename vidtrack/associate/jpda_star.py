@@ -22,7 +22,8 @@ def likeliest_events(
     """
     if len(tracks) + len(measurements) > 30 or 1 << len(tracks) + len(measurements) > largest:
         return False
-    place[measurements] = np.arange(len(measurements))
+    for b in range(len(measurements)):
+        place[measurements[b]] = b
     sets, all_tracks = 1 << len(measurements), 1 << len(tracks)
     missed, unused = _alone(rows.alone[tracks]), _alone(columns.alone[measurements])
     by_size, first = _by_size(sets)
@@ -49,7 +50,8 @@ def likeliest_events(
         for i in range(len(tracks)):
             if not d >> i & 1:
                 row_share[tracks[i]] += mass
-    row_share[tracks] /= total
+    for t in tracks:
+        row_share[t] /= total
     for d in range(all_tracks - 1, 0, -1):
         _, top, size = _highest(d, tracks)
         for m in by_size[first[size] : first[size + 1]]:
@@ -77,7 +79,16 @@ def _by_size(sets: int) -> tuple[Ints, Ints]:
     size = np.empty(sets, np.int64)
     for s in range(sets):
         size[s] = size[s >> 1] + (s & 1) if s else 0
-    return np.argsort(size, kind="mergesort"), np.searchsorted(np.sort(size), np.arange(64))
+    first = np.zeros(64, np.int64)
+    for s in range(sets):
+        first[size[s] + 1] += 1
+    for of in range(1, len(first)):
+        first[of] += first[of - 1]
+    order, free = np.empty(sets, np.int64), first.copy()
+    for s in range(sets):
+        order[free[size[s]]] = s
+        free[size[s]] += 1
+    return order, first
 
 
 @kernel

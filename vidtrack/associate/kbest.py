@@ -91,7 +91,9 @@ def k_best(
                 solution.append(-1)
     of, choice = np.empty(found, np.int64), np.empty((found, rows), np.int64)
     for n in range(found):
-        of[n], choice[n] = problem[order[n]], choices[solution[order[n]]]
+        of[n] = problem[order[n]]
+        for i in range(rows):
+            choice[n, i] = choices[solution[order[n]], i]
     return of, choice, total[:found]
 
 
@@ -154,5 +156,7 @@ def _complete(
 def _doubled(array: np.ndarray) -> np.ndarray:
     """A copy with room for twice as many rows."""
     wider = np.empty((2 * len(array), array.shape[1]), array.dtype)
-    wider[: len(array)] = array
+    for i in range(array.shape[0]):
+        for j in range(array.shape[1]):
+            wider[i, j] = array[i, j]
     return wider

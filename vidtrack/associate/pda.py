@@ -46,13 +46,16 @@ def _shared_out(start: Ints, log_pair: Floats, log_miss: Floats) -> tuple[Floats
     """(N,) weights of the pairs and (T,) of the misses; they sum to one in each row."""
     beta, beta0 = np.empty(len(log_pair)), np.empty(len(log_miss))
     for t in range(len(log_miss)):
-        mine = slice(start[t], start[t + 1])
         most = log_miss[t]
         for k in range(start[t], start[t + 1]):
             most = max(most, log_pair[k])
-        beta[mine] = np.exp(log_pair[mine] - most)
         beta0[t] = np.exp(log_miss[t] - most)
-        total = beta0[t] + beta[mine].sum()
-        beta[mine] /= total
+        pairs = 0.0
+        for k in range(start[t], start[t + 1]):
+            beta[k] = np.exp(log_pair[k] - most)
+            pairs += beta[k]
+        total = beta0[t] + pairs
+        for k in range(start[t], start[t + 1]):
+            beta[k] /= total
         beta0[t] /= total
     return beta, beta0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.median import ranked
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.kbest import k_best
 from vidtrack.compiled import kernel
@@ -148,8 +149,10 @@ def likeliest(start: Ints, value: Floats, most: int) -> Mask:
         mine = value[start[t] : start[t + 1]]
         if len(mine) <= most:
             continue
-        least = np.partition(mine, len(mine) - most)[len(mine) - most]
-        equals = most - (mine > least).sum()
+        least = ranked(mine.copy(), len(mine) - most)
+        equals = most
+        for k in range(len(mine)):
+            equals -= mine[k] > least
         for k in range(len(mine)):
             if mine[k] == least and equals > 0:
                 equals -= 1

@@ -273,7 +273,8 @@ def _look(
             if passing >= 0:
                 real[passing, AFTER] = far[k, g]
                 whole[passing, SEEN] |= seen[i]
-        state[k] = now
+        for column in range(len(now)):
+            state[k, column] = now[column]
         dx, dy = x - way[k, 0], y - way[k, 1]
         if dx * dx + dy * dy >= _CORNER**2:
             way[k, 0], way[k, 1], way[k, 2] = x, y, way[k, 2] + np.hypot(dx, dy)
