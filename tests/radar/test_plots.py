@@ -138,6 +138,21 @@ def test_a_pass_over_a_sector_is_one_scan_where_rounded_times_part_it(tmp_path, 
     assert "passes over a sector, the plots of one pass are one scan; 57 scans, 4 s apart" in caplog.text
 
 
+@pytest.mark.parametrize("header", ["time_s,range_m,azimuth_deg", "time_s,x_m,y_m"])
+@pytest.mark.parametrize("at_random", [False, True])
+def test_vehicles_that_pass_a_radar_that_stares_one_after_the_other_are_no_antenna(tmp_path, caplog, header, at_random):
+    rng = np.random.default_rng(0)
+    begin = np.cumsum(rng.exponential(20, 60) if at_random else np.full(60, 6.0)).round(1)
+    seen = {round(t + k / 10, 1): np.radians(-40 + 5.5 * k) for t in begin for k in range(15)}
+    rows = [
+        f"{t},{20 / np.cos(a):.2f},{np.degrees(a):.2f}" if "range_m" in header else f"{t},{20 * np.tan(a):.2f},20"
+        for t, a in seen.items()
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=header))
+    assert len(np.unique(plots.scan)) == len(seen)
+    assert "antenna" not in caplog.text
+
+
 def test_scans_in_bursts_are_no_turns_of_an_antenna(tmp_path, caplog):
     rng = np.random.default_rng(0)
     scans_s = [60 * k + j for k in range(4) for j in range(10)]

@@ -13,7 +13,7 @@ from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import PlotFormatError
 from vidtrack.radar.checks import CARTESIAN, KNOWN, MEASURED, POLAR, TIME, possible_times
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
+from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, are_apart, pace_of, turn_within
 from vidtrack.radar.rhythm import (
     DAY_S,
     FEW,
@@ -56,7 +56,9 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
     steps = np.diff(times[np.isfinite(times)])
     usual = float(np.median(steps)) if len(steps) else 1.0
     one_by_one = _one_by_one(steps, len(member))
-    turned = _turned(table, time_s, place, 0.0 if one_by_one else _coarse(steps))
+    coarse_s = float(np.quantile(steps, 0.1)) if len(steps) else np.inf  # times that several plots share
+    polar = _polar(table, time_s, place)
+    turned = _turned(table, *polar, 0.0 if one_by_one else coarse_s) if polar else None
     if turned is not None:
         return replace(table, columns=table.columns | {scan: turned})
     told = "plots of the same time are one scan"
@@ -65,7 +67,7 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
             "%s has no column 'scan', and nearly every plot its own time: give the plots of one turn the same scan",
             table.path,
         )
-    elif (swept_s := _swept(table, time_s, place, _coarse(steps))) is not None:
+    elif polar and (swept_s := _swept(table, *polar, coarse_s)) is not None:
         told = "an antenna passes over a sector, the plots of one pass are one scan"
         times, member = np.unique(swept_s, return_inverse=True)
         steps = np.diff(times[np.isfinite(times)])
@@ -182,26 +184,12 @@ def _one_by_one(steps: Floats, plots: int) -> bool:
     return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
 
 
-def _coarse(steps: Floats) -> float:
-    """The step [s] of times that several plots share, by steps (N,) between different times: nearly the shortest."""
-    return float(np.quantile(steps, 0.1)) if len(steps) else np.inf
+def _turned(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:
+    """The turn of a rotating antenna that each row of the table is of, by plots of times in steps of coarse_s.
 
-
-def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
-    """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times in steps of coarse_s.
-
+    rows  (N,) of the plots
     None: they follow no antenna.
     """
-    found = _polar(table, place)
-    if found is None:
-        return None
-    range_m, azimuth = found
-    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(range_m) & np.isfinite(azimuth))
-    if len(rows) < 2:
-        return None
-    rows = rows[np.argsort(time_s[rows], kind="stable")]
-    polar = (Message(Kind.POLAR, 0, 0, *one) for one in zip(time_s[rows], range_m[rows], azimuth[rows], strict=True))
-    plots = Messages.of(list(polar))
     pace = pace_of(plots, None, coarse_s)
     if not isinstance(pace, Turns):
         short_s = turn_within(plots, coarse_s) if 0 < coarse_s < np.inf else None
@@ -215,7 +203,7 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
     unsure = coarse_s > 0 or pace.period_s > USUAL_S
     if unsure and (np.diff(scan_times(turn, plots.time_s)[2]) < 0).any():
         return None  # the check of order would refuse the table
-    scan = np.zeros(len(time_s))
+    scan = np.zeros(len(table.line))
     scan[rows] = turn - turn.min()
     _log.warning(
         "%s has no column 'scan': azimuths and times follow an antenna, its turns are scans; %d scans, %.6g s apart",
@@ -224,27 +212,32 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
     return scan
 
 
-def _swept(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
-    """(N,) s; the mean time of the pass of an antenna over a sector that each plot is of; None: there are no passes."""
-    found = _polar(table, place)
-    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(found[1])) if found else np.zeros(0, np.int64)
-    if found is None or not len(rows):
-        return None
-    number = passes(time_s[rows], found[1][rows], coarse_s)
+def _swept(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:
+    """The mean time [s] of the pass of an antenna over a sector that each row of the table is of.
+
+    rows  (N,) of the plots
+    None: there are no passes, or each may be a target that passes before a radar that stares.
+    """
+    number = passes(plots.time_s, plots.v, coarse_s) if are_apart(plots) else None
     if number is None:
         return None
-    mean_s = np.full(len(time_s), np.nan)
-    mean_s[rows] = scan_times(number, time_s[rows])[2][number]
+    mean_s = np.full(len(table.line), np.nan)
+    mean_s[rows] = scan_times(number, plots.time_s)[2][number]
     return mean_s
 
 
-def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:
-    """Range [m] and azimuth [rad] (N,) of each row from a radar at (x, y) [m]; None without the columns for them."""
-    for names in (POLAR[:2], CARTESIAN[:2]):
-        if set(names) <= table.columns.keys():
-            first, second = (table.columns[name] for name in names)
-            if names == POLAR[:2]:
-                return first, np.radians(second)
-            east, north = first - place[0], second - place[1]
-            return np.hypot(east, north), np.arctan2(east, north)
-    return None
+def _polar(table: Table, time_s: Floats, place: tuple[float, float]) -> tuple[Ints, Messages] | None:
+    """Rows (N,) of plots of a radar at (x, y) [m] in order of time_s, and the plots; None for fewer than two."""
+    if set(POLAR[:2]) <= table.columns.keys():
+        range_m, azimuth = table.columns[POLAR[0]], np.radians(table.columns[POLAR[1]])
+    elif set(CARTESIAN[:2]) <= table.columns.keys():
+        east, north = (table.columns[name] - from_m for name, from_m in zip(CARTESIAN[:2], place, strict=True))
+        range_m, azimuth = np.hypot(east, north), np.arctan2(east, north)
+    else:
+        return None
+    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(range_m) & np.isfinite(azimuth))
+    if len(rows) < 2:
+        return None
+    rows = rows[np.argsort(time_s[rows], kind="stable")]
+    plots = (Message(Kind.POLAR, 0, 0, *one) for one in zip(time_s[rows], range_m[rows], azimuth[rows], strict=True))
+    return rows, Messages.of(list(plots))
