@@ -327,6 +327,26 @@ def test_a_column_that_tells_several_radars_apart_is_not_ignored_in_silence(tmp_
     assert (f"column {column!r} has 2 values, but all plots are taken as of one radar" in caplog.text) is told
 
 
+@pytest.mark.parametrize(
+    ("values", "count"),
+    [
+        ([[1], [2]], 2),
+        ([[1], [1]], 1),
+        ([{"id": 1}, {"id": 2}], 2),
+        (["a", None], 1),
+        ([1.0, float("nan")], 1),
+        ([None, None], 0),
+        (["a", ""], 1),
+    ],
+)
+def test_values_of_any_kind_tell_several_radars_apart(tmp_path, caplog, values, count):
+    columns = {"scan": [0, 1], "time_s": [0.0, 1.0], "range_m": [1e3, 1e3], "azimuth_deg": [5.0, 5.0], "radar": values}
+    pq.write_table(pa.table(columns), tmp_path / "p.parquet")
+    assert len(read_plots(tmp_path / "p.parquet")) == 2
+    assert (f"column 'radar' has {count} values" in caplog.text) is (count > 1)
+    assert ("several radars" in caplog.text) is (count > 1)
+
+
 def test_many_pieces_that_begin_anywhere_are_sorted_and_told(tmp_path, caplog):
     begins = [0, 300, 100, 400, 200, 500, 50, 250, 150]
     rows = [f"{begin + 4 * k},{1000 + 10 * k},{40 * n}" for n, begin in enumerate(begins) for k in range(40)]

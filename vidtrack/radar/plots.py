@@ -148,7 +148,7 @@ def _hint_at_several(table: Table) -> None:
     """Warn of a column by which the plots are of several radars: they are tracked as if they were of one."""
     for name in table.names:
         if name not in KNOWN and re.fullmatch(SENSOR, bare(name)):
-            count = len(table.cells[name].unique())
+            count = len(table.values(name))
             if count > 1:
                 _log.warning(
                     "%s: column %r has %d values, but all plots are taken as of one radar; of several radars give a "

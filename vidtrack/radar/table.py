@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +30,8 @@ Faults = dict[int, str]
 
 SHOWN = 5
 """Number of faults that a message lists."""
+EMPTY = ("", "none", "null", "nan")
+"""Cells without a value, in lower case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,13 @@ class Table:
         except pa.ArrowNotImplementedError:  # cells that cannot be compared
             return np.arange(len(column)) > 0
         return np.concatenate([[False], ~same.to_numpy()])
+
+    def values(self, name: str) -> set[str]:
+        """The different values of a column, as text; empty cells have none."""
+        column = self.cells[name]
+        with suppress(pa.ArrowNotImplementedError):  # cells that cannot be compared
+            column = column.unique()
+        return {text for text in map(str, column.to_pylist()) if text.strip().lower() not in EMPTY}
 
     def refuse(self, bad: Mask, name: str, rule: str) -> None:
         """Add a fault for the rows of a mask (N,) whose value in column `name` breaks a rule."""
