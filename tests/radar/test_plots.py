@@ -287,6 +287,13 @@ def test_a_gap_at_midnight_is_kept(tmp_path, caplog, gap_s):
     assert f"goes back from 86396 to {gap_s} s at line 102, as if a day ended: time goes on there" in caplog.text
 
 
+def test_gaps_at_many_midnights_are_kept(tmp_path):
+    times = [86_400 * d + t for d in range(9) for t in range(30_000 if d == 0 else 900, 85_500, 300)]
+    rows = [f"{t % 86_400},{5000 + k},{72 * n}" for k, t in enumerate(times) for n in range(2)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == [t for t in times for _ in range(2)]
+
+
 @pytest.mark.parametrize(
     ("column", "values"),
     [
@@ -304,8 +311,10 @@ def test_a_column_of_dates_tells_the_days(tmp_path, caplog, column, values, by_t
     if not by_target:
         plots.sort(key=lambda one: one[1:])
     rows = [f"{t},{5000 + 1000 * k},{72 * k},{values[d]},{k}" for k, d, t in plots]
-    found = read_plots(write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{column},id"))
-    assert found.time_s.tolist() == sorted(86_400 * given[d] + t for _, d, t in plots)
+    rows[3] = rows[3].replace(str(plots[3][2]), "9000000")  # a wrong time
+    found = read_plots(write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{column},id"), SKIP)
+    del plots[3]
+    assert found.time_s[:-1].tolist() == sorted(86_400 * given[d] + t for _, d, t in plots)
     assert (f"days are those of column {column!r}" in caplog.text) is not by_target
     assert ("where column 'id' changes: rows are sorted by time_s" in caplog.text) is by_target
 

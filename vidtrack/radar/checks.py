@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.radar.rhythm import scan_times
-from vidtrack.radar.table import Table, bare
+from vidtrack.radar.table import Table
 
 TIME = ("scan", "time_s")
 POLAR = ("range_m", "azimuth_deg", "elevation_deg")
@@ -18,9 +17,6 @@ DOPPLER = "doppler_m_s"
 AMPLITUDE = "amplitude"
 MEASURED = (*POLAR, *CARTESIAN, DOPPLER)
 KNOWN = (*TIME, *MEASURED, *(f"sigma_{name}" for name in MEASURED), AMPLITUDE)
-
-SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
-"""Names, without case and punctuation, of a column that tells which radar a plot is of."""
 
 FARTHEST_M = 1e6
 FASTEST_M_S = 1e5
@@ -48,11 +44,6 @@ def check_numbers(table: Table, measured: list[str]) -> None:
                 table.refuse(columns[name] > WIDEST_DEG, name, f"at most {WIDEST_DEG:g} degrees make sense")
         if AMPLITUDE in columns:
             table.refuse(columns[AMPLITUDE] < 0, AMPLITUDE, "an amplitude is linear and not below zero")
-
-
-def names_sensors(name: str) -> bool:
-    """Whether a column of this name tells which radar a plot is of."""
-    return name not in KNOWN and re.fullmatch(SENSOR, bare(name)) is not None
 
 
 def possible_times(time_s: Floats) -> Floats:

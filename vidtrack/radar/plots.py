@@ -22,12 +22,11 @@ from vidtrack.radar.checks import (
     TIME,
     check_numbers,
     check_order,
-    names_sensors,
 )
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.numbering import numbered
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.table import Table, bare, nearest, read_table
+from vidtrack.radar.table import Table, bare, names_sensors, nearest, read_table
 
 _log = logging.getLogger(__name__)
 
@@ -80,8 +79,8 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set, or
     a day ended: time goes on. Standard deviations come from columns, else from the settings.
     Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, rows of
-    one radar after the other, times that begin anew and may be of several radars, and bad rows. With settings.skip_bad_rows bad rows are left out with a
-    warning.
+    one radar after the other, times that begin anew and may be of several radars, and bad rows. With
+    settings.skip_bad_rows bad rows are left out with a warning.
     """
     settings = settings or RadarSettings()
     table = numbered(read_table(Path(path), KNOWN), settings.position[:2])

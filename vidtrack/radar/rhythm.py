@@ -154,7 +154,7 @@ def whole_days(time_s: Floats) -> bool:
 def _near_midnight(time_s: Floats) -> float:
     """How near to midnight [s] the last of times of day (N,) before it, and the first one after it, are together."""
     step_s = np.abs(np.diff(time_s))
-    return max(MIDNIGHT_S, MIDNIGHT_STEPS * float(np.median(step_s[step_s > 0])))
+    return min(max(MIDNIGHT_S, MIDNIGHT_STEPS * float(np.median(step_s[step_s > 0]))), DAY_S / 2)
 
 
 def passes(time_s: Floats, azimuth: Floats, coarse_s: float) -> Ints | None:

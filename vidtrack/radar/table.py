@@ -33,6 +33,10 @@ SHOWN = 5
 """Number of faults that a message lists."""
 EMPTY = ("", "none", "null", "nan")
 """Cells without a value, in lower case."""
+SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
+"""Names, without case and punctuation, of a column that tells which radar a plot is of."""
+DATED = ("date", "day")
+"""Words, one of which is in the name of a column that tells the day of a plot, whatever is in its cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +81,9 @@ class Table:
     def days(self, name: str) -> Ints | None:
         """(N,) the day that a column tells of each row; None if it tells none, or not of all.
 
-        Columns of dates do, and those that are named `date` or `day`, of numbers or else of names in order of days.
+        Columns of dates do, and those whose names have a word of DATED, of numbers or else of names in order of days.
         """
-        named = any(word in ("date", "day") for word in re.split(r"[\W_]+", name.lower()))
+        named = any(word in DATED for word in re.split(r"[\W_]+", name.lower()))
         try:
             coded = self.cells[name].combine_chunks().dictionary_encode()
         except pa.ArrowNotImplementedError:  # cells that cannot be compared
@@ -172,6 +176,11 @@ def bare(name: str) -> str:
     """A column's name without case, punctuation and unit."""
     words = re.split(r"[\W_]+", name.lower())
     return "".join(word for word in words if word not in ("m", "s", "deg", "rad", "km", "degrees"))
+
+
+def names_sensors(name: str) -> bool:
+    """Whether a column of this name tells which radar a plot is of."""
+    return re.fullmatch(SENSOR, bare(name)) is not None
 
 
 def _complaint(path: Path, unit: str, faults: Faults) -> str:
