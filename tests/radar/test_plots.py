@@ -340,6 +340,16 @@ def test_targets_one_after_the_other_over_midnight_are_of_one_night(tmp_path, ca
             read_plots(path)
 
 
+@pytest.mark.parametrize("column", [True, False])
+@pytest.mark.parametrize("apart_s", [600, -600, 0])
+def test_targets_that_begin_before_midnight_and_after_it_are_of_one_night(tmp_path, column, apart_s):
+    begins_s = [86_400 - 5 * apart_s + 100 + apart_s * j - 300 * (j % 3) - 200 * (j == 0) for j in range(10)]
+    seen = [(begin_s + 4 * k, j) for j, begin_s in enumerate(begins_s) for k in range(200)]
+    rows = [f"{t % 86_400},{5000 + 100 * j},{9 * j}" + column * f",{j}" for t, j in seen]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg" + column * ",id"))
+    assert plots.time_s.tolist() == sorted(t for t, _ in seen)
+
+
 def test_a_long_gap_on_the_second_day_is_a_gap(tmp_path):
     times = [*range(86_320, 86_480, 4), *range(140_000, 140_400, 4)]
     rows = [f"{t % 86_400},{5000 + t},10" for t in times]

@@ -50,7 +50,7 @@ def on_one_clock(table: Table) -> Table:
     ended, back = np.flatnonzero(np.diff(day)) + 1, set_back(clock_s)
     if dated is None and len(far := day_before(time_s, day)):
         both = np.union1d(back, far)
-        if begins_again(time_s, both) or _changing(table, rows[both], dated) is not None:
+        if len(far) > FEW or begins_again(time_s, both) or _changing(table, rows[both], dated) is not None:
             back = both
     steps = back if len(back) else ended
     if not len(steps):
@@ -85,7 +85,7 @@ def _gone_on(where: str, column: str | None, time_s: Floats, clock_s: Floats, ba
     if column is not None and one_target_each(clock_s, back):
         told = f"where column {column!r} changes: rows are sorted by time_s, as if they were in order of {column!r}"
         _log.warning("%s, %s; %s; %s", where, told, _WAS_SET, _SEVERAL)
-        return clock_s if with_days else _shifted(clock_s, back, _since(time_s - clock_s, back))
+        return clock_s if with_days else _by_target(time_s, clock_s, back)
     if column is not None:
         raise PlotFormatError(f"{where}, where column {column!r} changes: {_WAS_SET}; {_SEVERAL}")
     if begins_again(time_s, back):
@@ -93,16 +93,24 @@ def _gone_on(where: str, column: str | None, time_s: Floats, clock_s: Floats, ba
     if (~over).sum() > FEW:
         told = "rows are sorted by time_s, as if they were of one target after the other"
         _log.warning("%s: %s; %s; %s", where, told, _WAS_SET, _SEVERAL)
-        return clock_s
+        return clock_s if with_days else _by_target(time_s, clock_s, back)
     told = "a day ended" if over[0] else "the clock was set"
     _log.warning("%s, as if %s: time goes on there; %s; %s", where, told, _BY_TIME, _SEVERAL)
     step_s = np.diff(clock_s)
     return _shifted(clock_s, back, np.where(over, DAY_S, np.median(step_s[step_s > 0]) - step_s[back - 1]))
 
 
-def _since(value: Floats, back: Ints) -> Floats:
-    """(K,) by how much values (N,) at the rows (K,) differ from one of these rows to the next; the first from zero."""
-    return np.diff(value[back], prepend=0.0)
+def _by_target(time_s: Floats, clock_s: Floats, back: Ints) -> Floats:
+    """The times (N,) of targets of which another begins at each of the rows (K,).
+
+    If days ended, each begins within half a day of the begin of the one before.
+    """
+    if (time_s == clock_s).all():
+        return clock_s
+    begin = np.concatenate([[0], back])
+    begin_s = np.unwrap(time_s[begin], period=DAY_S)
+    begin_s -= DAY_S * np.floor(begin_s.min() / DAY_S)
+    return _shifted(clock_s, begin, np.diff(begin_s - clock_s[begin], prepend=0.0))
 
 
 def _shifted(time_s: Floats, back: Ints, shift_s: Floats) -> Floats:
