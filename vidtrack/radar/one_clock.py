@@ -59,6 +59,8 @@ def on_one_clock(table: Table) -> Table:
     _refuse_sensors(table, where, rows[np.union1d(ended, back)])
     column = _changing(table, rows[steps], dated)
     if len(back):
+        if column is not None:  # each of its values is a piece, also where time goes on
+            back = np.unique(np.searchsorted(rows[:-1], np.flatnonzero(table.changes(column))))
         clock_s = _gone_on(where, column, time_s, clock_s, back, dated is not None)
     elif dated is not None:
         _log.warning("%s: days are those of column %r", where, dated)
@@ -77,6 +79,7 @@ def on_one_clock(table: Table) -> Table:
 def _gone_on(where: str, column: str | None, time_s: Floats, clock_s: Floats, back: Ints, with_days: bool) -> Floats:
     """The times (N,) of a clock that was set back at the rows (K,), or of rows to be sorted by time. Raises, see above.
 
+    column     another one that changes at the rows (K,)
     time_s     (N,) as in the table
     clock_s    (N,) with the days that ended
     with_days  a column tells the days
