@@ -138,6 +138,21 @@ def test_a_pass_over_a_sector_is_one_scan_where_rounded_times_part_it(tmp_path, 
     assert "passes over a sector, the plots of one pass are one scan; 57 scans, 4 s apart" in caplog.text
 
 
+@pytest.mark.parametrize("header", ["time_s,range_m,azimuth_deg", "time_s,x_m,y_m"])
+@pytest.mark.parametrize("at_random", [False, True])
+def test_vehicles_that_pass_a_radar_that_stares_one_after_the_other_are_no_antenna(tmp_path, caplog, header, at_random):
+    rng = np.random.default_rng(0)
+    begin = np.cumsum(rng.exponential(20, 60) if at_random else np.full(60, 6.0)).round(1)
+    seen = {round(t + k / 10, 1): np.radians(-40 + 5.5 * k) for t in begin for k in range(15)}
+    rows = [
+        f"{t},{20 / np.cos(a):.2f},{np.degrees(a):.2f}" if "range_m" in header else f"{t},{20 * np.tan(a):.2f},20"
+        for t, a in seen.items()
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header=header))
+    assert len(np.unique(plots.scan)) == len(seen)
+    assert "antenna" not in caplog.text
+
+
 def test_scans_in_bursts_are_no_turns_of_an_antenna(tmp_path, caplog):
     rng = np.random.default_rng(0)
     scans_s = [60 * k + j for k in range(4) for j in range(10)]
@@ -195,7 +210,7 @@ def test_turns_of_the_antenna_are_found_over_a_clock_that_was_set_back(tmp_path)
 
 
 @pytest.mark.parametrize(
-    "order", ["shuffled", "downwards", "downwards with a missed scan", "by sensor", "by target", "late", "wrong time"]
+    "order", ["shuffled", "downwards", "downwards with a missed scan", "by target", "late", "wrong time"]
 )
 def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tmp_path, caplog, order):
     rows = [row + ",0" for row in _rows_of_scans()]
@@ -205,8 +220,6 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
         rows = rows[::-1]
     elif order == "downwards with a missed scan":
         rows = (rows[:100] + rows[105:])[::-1]
-    elif order == "by sensor":
-        rows = [row[:-1] + "north" for row in rows[::2]] + [row[:-1] + "south" for row in rows[1::2]]
     elif order == "by target":
         rows = [row[:-1] + str(k) for k in range(5) for row in rows[k::5]]
     elif order == "late":
@@ -220,7 +233,7 @@ def test_rows_in_another_order_than_that_of_arrival_are_not_taken_for_a_clock(tm
     elif "wrong" in order:
         times = [*times[:50], *times[51:], 9000]
     assert plots.time_s.tolist() == times
-    told = order in ("by sensor", "by target")
+    told = order == "by target"
     assert ("goes back" in caplog.text) is told
     assert ("where column 'source' changes: rows are sorted by time_s" in caplog.text) is told
 
@@ -236,16 +249,141 @@ def test_times_of_day_go_on_after_midnight(tmp_path, caplog, column, scan_s, beg
     rows = [f"{t % 86_400},{1000 + k},{72 * k % 360}{day[k]}" for k, t in enumerate(times)]
     plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg" + column))
     assert plots.time_s.tolist() == times
-    assert "as if a day ended: time goes on there" in caplog.text
+    assert ("days are those of column 'date'" if column else "as if a day ended: time goes on there") in caplog.text
 
 
-@pytest.mark.parametrize("back_s", [60, 80])
-def test_a_time_that_goes_back_where_another_column_changes_is_told(tmp_path, caplog, back_s):
-    scans_s = [4 * k - back_s * (k >= 20) for k in range(40)]
+@pytest.mark.parametrize("jitter_s", [0.5, 2.0])
+def test_midnight_is_found_where_rows_are_not_strictly_in_order(tmp_path, jitter_s):
+    rng = np.random.default_rng(1)
+    times = np.sort(rng.uniform(86_300, 86_500, 600)).round(3)
+    arrived = times[np.argsort(times + rng.normal(0, jitter_s, 600), kind="stable")]
+    rows = [f"{t % 86_400:.3f},{rng.uniform(1e3, 5e4):.1f},{90 * t % 360:.3f}" for t in arrived]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s == pytest.approx(times)
+
+
+@pytest.mark.parametrize("newest_first", [False, True])
+@pytest.mark.parametrize("count", [4, 8, 40])
+def test_midnight_is_found_with_few_rows_after_it_or_before(tmp_path, count, newest_first):
+    times = [86_400 + 4 * (k - count + 2) for k in range(count)]
+    rows = [f"{t % 86_400},{5000 + t},10" for t in (times[::-1] if newest_first else times)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == times
+
+
+def test_shuffled_rows_about_midnight_are_no_days(tmp_path):
+    times = np.random.default_rng(0).permutation(np.arange(86_320, 86_480) % 86_400)
+    rows = [f"{t},{5000 + t},10" for t in times]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == sorted(times)
+
+
+@pytest.mark.parametrize("gap_s", [90, 1200, 20_000])
+def test_a_gap_at_midnight_is_kept(tmp_path, caplog, gap_s):
+    times = [*range(86_000, 86_400, 4), *range(86_400 + gap_s, 86_800 + gap_s, 4)]
+    rows = [f"{t % 86_400},{5000 + k},10" for k, t in enumerate(times)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == times
+    assert f"goes back from 86396 to {gap_s} s at line 102, as if a day ended: time goes on there" in caplog.text
+
+
+def test_gaps_at_many_midnights_are_kept(tmp_path):
+    times = [86_400 * d + t for d in range(9) for t in range(30_000 if d == 0 else 900, 85_500, 300)]
+    rows = [f"{t % 86_400},{5000 + k},{72 * n}" for k, t in enumerate(times) for n in range(2)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == [t for t in times for _ in range(2)]
+
+
+@pytest.mark.parametrize(
+    ("column", "values"),
+    [
+        ("date", ["2026-07-30", "2026-08-01", "2026-08-02"]),
+        ("began", ["20260730", "20260801", "20260802"]),
+        ("Stamp", ["2026-07-30T10:00:00Z", "2026-08-01T10:00:00Z", "2026-08-02 10:00:00"]),
+        ("day", ["5", "7", "8"]),
+        ("date", ["30/07/2026", "01/08/2026", "02/08/2026"]),
+    ],
+)
+@pytest.mark.parametrize("by_target", [False, True])
+def test_a_column_of_dates_tells_the_days(tmp_path, caplog, column, values, by_target):
+    given = [0, 1, 2] if "/" in values[0] else [0, 2, 3]
+    plots = [(k, d, t) for k in range(2) for d in range(3) for t in range(21_600, 79_200, 900)]
+    if not by_target:
+        plots.sort(key=lambda one: one[1:])
+    rows = [f"{t},{5000 + 1000 * k},{72 * k},{values[d]},{k}" for k, d, t in plots]
+    rows[3] = rows[3].replace(str(plots[3][2]), "9000000")  # a wrong time
+    found = read_plots(write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{column},id"), SKIP)
+    del plots[3]
+    assert found.time_s[:-1].tolist() == sorted(86_400 * given[d] + t for _, d, t in plots)
+    assert (f"days are those of column {column!r}" in caplog.text) is not by_target
+    assert ("where column 'id' changes: rows are sorted by time_s" in caplog.text) is by_target
+
+
+def test_dates_beside_times_that_go_on_are_not_added(tmp_path):
+    times = [4 * k for k in range(40)]
+    rows = [f"{t},{5000 + t},10,2026-07-0{1 + (t >= 60)}" for t in [*times[1:3], times[0], *times[3:]]]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,date"))
+    assert plots.time_s.tolist() == times
+
+
+@pytest.mark.parametrize("column", [",id", ""])
+def test_targets_one_after_the_other_over_midnight_are_of_one_night(tmp_path, caplog, column):
+    times = range(86_320, 86_480, 4)
+    name = ["" if not column else f",{n}" for n in range(4)]
+    rows = [f"{(t + n / 10) % 86_400:.1f},{5000 + n},{40 * n}{name[n]}" for n in range(4) for t in times]
+    path = write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg" + column)
+    if column:
+        assert read_plots(path).time_s == pytest.approx(sorted(t + n / 10 for n in range(4) for t in times))
+        assert "goes on from 76 to 86320.1 s at line 42, the first of 3 such steps, where column 'id'" in caplog.text
+    else:
+        with pytest.raises(PlotFormatError, match=r"goes on from 76 to 86320\.1 s at line 42.* where it began before"):
+            read_plots(path)
+
+
+@pytest.mark.parametrize(("column", "apart_s"), [(True, 600), (True, -600), (True, 0), (False, 600), (False, 0)])
+def test_targets_that_begin_before_midnight_and_after_it_are_of_one_night(tmp_path, column, apart_s):
+    begins_s = [86_400 - 5 * apart_s + 100 + apart_s * j - 300 * (j % 3) - 200 * (j == 0) for j in range(10)]
+    seen = [(begin_s + 4 * k, j) for j, begin_s in enumerate(begins_s) for k in range(200)]
+    rows = [f"{t % 86_400},{5000 + 100 * j},{9 * j}" + column * f",{j}" for t, j in seen]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg" + column * ",id"))
+    assert plots.time_s.tolist() == sorted(t for t, _ in seen)
+
+
+def test_a_long_gap_on_the_second_day_is_a_gap(tmp_path):
+    times = [*range(86_320, 86_480, 4), *range(140_000, 140_400, 4)]
+    rows = [f"{t % 86_400},{5000 + t},10" for t in times]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.time_s.tolist() == times
+
+
+@pytest.mark.parametrize(("begin_s", "name"), [(0, "session"), (20, "file"), (40, "source")])
+def test_scans_that_begin_again_where_another_column_changes_are_asked_about(tmp_path, begin_s, name):
+    scans_s = [*range(0, 80, 4), *range(begin_s, begin_s + 80, 4)]
     rows = [f"{t},{1000 + 10 * k + n},{72 * n},{'ab'[k >= 20]}" for k, t in enumerate(scans_s) for n in range(5)]
-    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,file"))
-    assert plots.time_s.tolist() == sorted(t for t in scans_s for _ in range(5))
-    assert "at line 102, where column 'file' changes: rows are sorted by time_s" in caplog.text
+    path = write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg," + name)
+    with pytest.raises(PlotFormatError, match=f"at line 102, where column '{name}' changes: .* a table each"):
+        read_plots(path)
+
+
+@pytest.mark.parametrize(
+    ("spans_s", "sensors"),
+    [
+        ([(0, 800), (0, 800)], "AB"),
+        ([(0, 8000), (5000, 9000)], "AB"),
+        ([(0, 86_400)] * 4, "AABB"),
+        ([(80_000, 90_000)] * 2, "AB"),
+        ([(80_000, 86_400), (0, 8000)], "AB"),
+    ],
+)
+@pytest.mark.parametrize("name", ["radar", "Sensor_ID"])
+def test_radars_one_after_the_other_in_a_table_are_refused(tmp_path, spans_s, sensors, name):
+    seen = [(t, one) for (begin, end), one in zip(spans_s, sensors, strict=True) for t in range(begin, end, 40)]
+    rows = [f"{t % 86_400},{5000 + k},{k % 360},{one}" for k, (t, one) in enumerate(seen)]
+    path = write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg," + name)
+    with pytest.raises(
+        PlotFormatError, match=f"in order of column '{name}': .* give a table each, with --radars, else"
+    ):
+        read_plots(path)
 
 
 @pytest.mark.parametrize("targets", [2, 3, 4, 7])
@@ -256,7 +394,7 @@ def test_times_that_begin_again_are_asked_about_where_no_column_tells_why(tmp_pa
         PlotFormatError, match=r"goes back from 156 to 0\.5 s at line 42.* where it began before"
     ) as caught:
         read_plots(path)
-    assert "give times that go on; if these are several radars, a table each, with --radars" in str(caught.value)
+    assert "give times that go on; if these are several radars, give a table each, with --radars" in str(caught.value)
     by_time = sorted(rows, key=lambda row: float(row.split(",")[0]))
     plots = read_plots(write(path, *by_time, header="time_s,range_m,azimuth_deg"))
     assert plots.time_s.tolist() == sorted(4 * k + n / 2 for n in range(targets) for k in range(40))
@@ -275,31 +413,38 @@ DAY = [900 * k for k in range(96)]
 @pytest.mark.parametrize(
     ("header", "of_day", "told"),
     [
-        ("radar", ["north", "south", "west"], "where column 'radar' changes"),
-        ("date", ["1", "2", "1", "2"], "where column 'date' is '1' again"),
+        ("head", ["north", "south", "west"], "where column 'head' changes: if a day ended"),
+        ("candidate", ["a", "b"], "where column 'candidate' changes: if a day ended"),
+        ("serial", ["10010001", "10010002"], "where column 'serial' changes: if a day ended"),
+        ("weekday", ["Mon", "Tue"], "where column 'weekday' changes: .*, or name the column 'date'"),
+        ("date", ["1", "2", "1", "2"], "where it began before: if the clock was set"),
         ("began", ["2026-07-01", "2026-07-02"], ""),
         ("day", ["5", "6"], ""),
     ],
 )
-def test_whole_days_that_may_be_of_several_radars_are_asked_about(tmp_path, caplog, header, of_day, told):
+def test_whole_days_that_may_be_of_several_radars_are_asked_about(tmp_path, header, of_day, told):
     rows = [f"{t},{1000 + t + n},{72 * n},{one}" for one in of_day for t in DAY for n in range(5)]
     path = write(tmp_path / "p.csv", *rows, header=f"time_s,range_m,azimuth_deg,{header}")
     if told:
-        with pytest.raises(PlotFormatError, match=f"{told}: if a day ended .* give a table each, with --radars"):
+        with pytest.raises(PlotFormatError, match=f"{told}.* give a table each, with --radars"):
             read_plots(path)
     else:
         assert read_plots(path).time_s[-1] == 86_400 * len(of_day) - 900
-        assert "if these are several radars, give a table each" in caplog.text
 
 
-def test_days_of_one_radar_after_the_other_are_of_one_time(tmp_path, caplog):
+def test_a_column_that_changes_at_one_midnight_of_an_unbroken_night_does_no_harm(tmp_path):
+    times = range(86_320, 86_480, 4)
+    rows = [f"{t % 86_400},{5000 + t},10,{'ab'[t >= 86_400]}" for t in times]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,file"))
+    assert plots.time_s.tolist() == list(times)
+
+
+def test_days_of_one_target_after_the_other_are_of_one_time(tmp_path, caplog):
     times = [900 * k for k in range(40, 270)]
-    rows = [
-        f"{t % 86_400},{1000 * one + t + n},{72 * n},{one}" for one in (8, 9) for t in times for n in range(one - 5)
-    ]
-    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,radar"))
-    assert plots.time_s.tolist() == sorted(t for t in times for _ in range(7))
-    assert "where column 'radar' changes: rows are sorted by time_s" in caplog.text
+    rows = [f"{t % 86_400},{1000 * one + t},{72 * one},{one}" for one in (1, 2) for t in times]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg,id"))
+    assert plots.time_s.tolist() == sorted([*times, *times])
+    assert "where column 'id' changes: rows are sorted by time_s" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -310,6 +455,26 @@ def test_a_column_that_tells_several_radars_apart_is_not_ignored_in_silence(tmp_
     plots = read_plots(write(tmp_path / "p.csv", *rows, header=f"scan,time_s,range_m,azimuth_deg,{column}"))
     assert len(plots) == 40
     assert (f"column {column!r} has 2 values, but all plots are taken as of one radar" in caplog.text) is told
+
+
+@pytest.mark.parametrize(
+    ("values", "count"),
+    [
+        ([[1], [2]], 2),
+        ([[1], [1]], 1),
+        ([{"id": 1}, {"id": 2}], 2),
+        (["a", None], 1),
+        ([1.0, float("nan")], 1),
+        ([None, None], 0),
+        (["a", ""], 1),
+    ],
+)
+def test_values_of_any_kind_tell_several_radars_apart(tmp_path, caplog, values, count):
+    columns = {"scan": [0, 1], "time_s": [0.0, 1.0], "range_m": [1e3, 1e3], "azimuth_deg": [5.0, 5.0], "radar": values}
+    pq.write_table(pa.table(columns), tmp_path / "p.parquet")
+    assert len(read_plots(tmp_path / "p.parquet")) == 2
+    assert (f"column 'radar' has {count} values" in caplog.text) is (count > 1)
+    assert ("several radars" in caplog.text) is (count > 1)
 
 
 def test_many_pieces_that_begin_anywhere_are_sorted_and_told(tmp_path, caplog):

@@ -79,3 +79,4 @@ def test_the_times_of_the_pictures_of_a_file_are_those_of_the_part_that_is_read(
     assert stated_span(video, SourceSettings()) == pytest.approx((0, 1))
     assert stated_span(video, SourceSettings(start_s=0.2, end_s=0.5)) == pytest.approx((0.2, 0.5))
     assert stated_span(str(clip), SourceSettings()) is None
+    assert stated_span(video, SourceSettings(fps=5.0)) == pytest.approx((0, 2))  # the file states 10 frames/s

@@ -15,7 +15,7 @@ from source_clips import level, picture, write_clip
 
 from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import SourceError
-from vidtrack.video.source import open_source
+from vidtrack.video.source import duration_s, open_source
 
 DEFAULTS = SourceSettings()
 
@@ -147,9 +147,16 @@ def test_a_rate_stated_nowhere_is_assumed_with_a_warning_or_given(avi, rate, per
     frames, source = read(avi)
     assert times(frames) == pytest.approx(np.arange(10) / 25)
     assert "--fps" in source.stats.warnings[0]
+    assert duration_s(str(avi)) == pytest.approx(10 / 25)
     frames, source = read(avi, fps=5)
     assert times(frames) == pytest.approx(np.arange(10) / 5)
     assert source.stats.warnings == []
+
+
+def test_who_asks_for_the_length_is_not_warned_once_more(avi, caplog):
+    patched(patched(avi, *RATE, 0), *PERIOD_US, 0)
+    assert duration_s(str(avi)) is not None
+    assert not caplog.text
 
 
 @pytest.mark.parametrize("count", [0, 3, 9999])

@@ -4,36 +4,20 @@ from __future__ import annotations
 
 import difflib
 import logging
-import re
 from dataclasses import replace
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.errors import PlotFormatError
-from vidtrack.radar.checks import CARTESIAN, KNOWN, MEASURED, POLAR, TIME, possible_times
+from vidtrack.radar.checks import CARTESIAN, KNOWN, POLAR, TIME, possible_times
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
-from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, pace_of, turn_within
-from vidtrack.radar.rhythm import (
-    DAY_S,
-    FEW,
-    at_midnight,
-    begins_again,
-    closed_up,
-    longest_step,
-    passes,
-    scan_times,
-    set_back,
-    whole_days,
-)
+from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, are_apart, pace_of, turn_within
+from vidtrack.radar.one_clock import on_one_clock
+from vidtrack.radar.rhythm import closed_up, longest_step, passes, scan_times
 from vidtrack.radar.table import Table, bare
 
 _log = logging.getLogger(__name__)
 
-_OTHERWISE = (
-    "if the rows are only out of order, as of one target after the other, sort them by time_s; if these are several "
-    "radars, give a table each, with --radars"
-)
 EVENLY = 0.1
 """Usual steps; how far a step may be from a multiple of the usual one to count as such."""
 
@@ -50,13 +34,15 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
     similar = difflib.get_close_matches(scan, [bare(name) for name in table.names if name not in KNOWN])
     if scan in table.names or time not in table.columns or similar:
         return table
-    table = _on_one_clock(table)
+    table = on_one_clock(table)
     time_s = possible_times(table.columns[time])
     times, member = np.unique(time_s, return_inverse=True)
     steps = np.diff(times[np.isfinite(times)])
     usual = float(np.median(steps)) if len(steps) else 1.0
     one_by_one = _one_by_one(steps, len(member))
-    turned = _turned(table, time_s, place, 0.0 if one_by_one else _coarse(steps))
+    coarse_s = float(np.quantile(steps, 0.1)) if len(steps) else np.inf  # times that several plots share
+    polar = _polar(table, time_s, place)
+    turned = _turned(table, *polar, 0.0 if one_by_one else coarse_s) if polar else None
     if turned is not None:
         return replace(table, columns=table.columns | {scan: turned})
     told = "plots of the same time are one scan"
@@ -65,7 +51,7 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
             "%s has no column 'scan', and nearly every plot its own time: give the plots of one turn the same scan",
             table.path,
         )
-    elif (swept_s := _swept(table, time_s, place, _coarse(steps))) is not None:
+    elif polar and (swept_s := _swept(table, *polar, coarse_s)) is not None:
         told = "an antenna passes over a sector, the plots of one pass are one scan"
         times, member = np.unique(swept_s, return_inverse=True)
         steps = np.diff(times[np.isfinite(times)])
@@ -79,101 +65,6 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
     return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
 
 
-def _on_one_clock(table: Table) -> Table:
-    """The table with times that go on where its clock was set back or a day ended; other rows are to be sorted by time.
-
-    Raises PlotFormatError where times begin anew and nothing tells whether the clock did, or another sensor's rows.
-    """
-    name = TIME[1]
-    rows = np.flatnonzero(np.isfinite(possible_times(table.columns[name])))
-    time_s = table.columns[name][rows]
-    back = set_back(time_s)
-    if not len(back):
-        return table
-    step_s = np.diff(time_s)
-    usual_s = float(np.median(step_s[step_s > 0]))
-    midnight = at_midnight(step_s[back - 1], usual_s)
-    days, anew = back[midnight], back[~midnight]
-    column = _changing(table, rows[anew if len(anew) else days])
-    first = int(anew[0] if len(anew) else days[0])
-    others = len(anew) or len(days)
-    where = (
-        f"{table.path}: time_s goes back from {time_s[first - 1]:.10g} to {time_s[first]:.10g} s at {table.unit} "
-        f"{table.line[rows[first]]}{f', the first of {others} such steps' if others > 1 else ''}"
-    )
-    offset = np.zeros(len(table.line))
-    for k in days.tolist():
-        offset[rows[k] :] += DAY_S
-    if not len(anew):
-        _refuse_days_of_sensors(table, where, column, rows[[0, *days]], whole_days(time_s, usual_s))
-        _log.warning("%s, as if a day ended: time goes on there; %s", where, _OTHERWISE)
-    elif column is not None:
-        for k in anew.tolist():  # each sensor's or target's days begin anew
-            offset[rows[k] :] -= offset[rows[k]]
-        _log.warning(
-            "%s, where column %r changes: rows are sorted by time_s, as if they were in order of %r; if the clock was "
-            "set, give times that go on; if these are several radars, a table each, with --radars",
-            where, column, column,
-        )  # fmt: skip
-    elif begins_again(time_s, anew):
-        raise PlotFormatError(
-            f"{where}, where it began before: if the clock began anew, give times that go on; if these are several "
-            "radars, a table each, with --radars; if targets one after the other, rows sorted by time_s"
-        )
-    elif len(anew) > FEW:
-        _log.warning(
-            "%s: rows are sorted by time_s, as if they were of one target after the other; if the clock was set, give "
-            "times that go on; if these are several radars, a table each, with --radars", where,
-        )  # fmt: skip
-    else:
-        for k in anew.tolist():
-            offset[rows[k] :] += usual_s - step_s[k - 1]
-        _log.warning("%s, as if the clock was set: time goes on there; %s", where, _OTHERWISE)
-    return replace(table, columns=table.columns | {name: table.columns[name] + offset})
-
-
-def _refuse_days_of_sensors(table: Table, where: str, column: str | None, begin: Ints, whole: bool) -> None:
-    """Raise PlotFormatError if days that begin at these rows (K,) may be of several sensors, by a column that changes.
-
-    whole  all of them are whole days
-    """
-    if column is None:
-        return
-    values = table.cells[column].take(begin).to_pylist()
-    if len(set(values)) < len(values):
-        reason = f"where column {column!r} is {_repeated(values)!r} again"
-    elif whole and not _dated(column, values):
-        reason = f"where column {column!r} changes"
-    else:
-        return
-    raise PlotFormatError(
-        f"{where}, {reason}: if a day ended there, give times that go on, or name the column 'date'; if these are "
-        "several radars, give a table each, with --radars"
-    )
-
-
-def _repeated(values: list[object]) -> object:
-    """The first of the values that was there before."""
-    return next(value for k, value in enumerate(values) if value in values[:k])
-
-
-def _dated(column: str, values: list[object]) -> bool:
-    """Whether a column with these values tells days."""
-    if any(word in column.lower() for word in ("date", "day")):
-        return True
-    return all(re.match(r"\d{4}-?\d\d-?\d\d", str(value)) for value in values)
-
-
-def _changing(table: Table, back: Ints) -> str | None:
-    """The name of another column, as of a sensor or target, that changes where time goes back and hardly elsewhere."""
-    measured = {TIME[1], *MEASURED}
-    for name in table.names:
-        new = None if name in measured else table.changes(name)
-        if new is not None and new[back].all() and new.sum() <= 2 * len(back):
-            return name
-    return None
-
-
 def _one_by_one(steps: Floats, plots: int) -> bool:
     """Whether nearly each of the plots has its own time, with steps (N,) that are not multiples of the usual one."""
     if len(steps) < 2 or len(steps) < ONE_BY_ONE * plots:
@@ -182,26 +73,12 @@ def _one_by_one(steps: Floats, plots: int) -> bool:
     return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
 
 
-def _coarse(steps: Floats) -> float:
-    """The step [s] of times that several plots share, by steps (N,) between different times: nearly the shortest."""
-    return float(np.quantile(steps, 0.1)) if len(steps) else np.inf
+def _turned(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:
+    """The turn of a rotating antenna that each row of the table is of, by plots of times in steps of coarse_s.
 
-
-def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
-    """(N,) the turn of a rotating antenna that each plot is of, by azimuths and times in steps of coarse_s.
-
+    rows  (N,) of the plots
     None: they follow no antenna.
     """
-    found = _polar(table, place)
-    if found is None:
-        return None
-    range_m, azimuth = found
-    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(range_m) & np.isfinite(azimuth))
-    if len(rows) < 2:
-        return None
-    rows = rows[np.argsort(time_s[rows], kind="stable")]
-    polar = (Message(Kind.POLAR, 0, 0, *one) for one in zip(time_s[rows], range_m[rows], azimuth[rows], strict=True))
-    plots = Messages.of(list(polar))
     pace = pace_of(plots, None, coarse_s)
     if not isinstance(pace, Turns):
         short_s = turn_within(plots, coarse_s) if 0 < coarse_s < np.inf else None
@@ -215,7 +92,7 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
     unsure = coarse_s > 0 or pace.period_s > USUAL_S
     if unsure and (np.diff(scan_times(turn, plots.time_s)[2]) < 0).any():
         return None  # the check of order would refuse the table
-    scan = np.zeros(len(time_s))
+    scan = np.zeros(len(table.line))
     scan[rows] = turn - turn.min()
     _log.warning(
         "%s has no column 'scan': azimuths and times follow an antenna, its turns are scans; %d scans, %.6g s apart",
@@ -224,27 +101,32 @@ def _turned(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: 
     return scan
 
 
-def _swept(table: Table, time_s: Floats, place: tuple[float, float], coarse_s: float) -> Floats | None:
-    """(N,) s; the mean time of the pass of an antenna over a sector that each plot is of; None: there are no passes."""
-    found = _polar(table, place)
-    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(found[1])) if found else np.zeros(0, np.int64)
-    if found is None or not len(rows):
-        return None
-    number = passes(time_s[rows], found[1][rows], coarse_s)
+def _swept(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:
+    """The mean time [s] of the pass of an antenna over a sector that each row of the table is of.
+
+    rows  (N,) of the plots
+    None: there are no passes, or each may be a target that passes before a radar that stares.
+    """
+    number = passes(plots.time_s, plots.v, coarse_s) if are_apart(plots) else None
     if number is None:
         return None
-    mean_s = np.full(len(time_s), np.nan)
-    mean_s[rows] = scan_times(number, time_s[rows])[2][number]
+    mean_s = np.full(len(table.line), np.nan)
+    mean_s[rows] = scan_times(number, plots.time_s)[2][number]
     return mean_s
 
 
-def _polar(table: Table, place: tuple[float, float]) -> tuple[Floats, Floats] | None:
-    """Range [m] and azimuth [rad] (N,) of each row from a radar at (x, y) [m]; None without the columns for them."""
-    for names in (POLAR[:2], CARTESIAN[:2]):
-        if set(names) <= table.columns.keys():
-            first, second = (table.columns[name] for name in names)
-            if names == POLAR[:2]:
-                return first, np.radians(second)
-            east, north = first - place[0], second - place[1]
-            return np.hypot(east, north), np.arctan2(east, north)
-    return None
+def _polar(table: Table, time_s: Floats, place: tuple[float, float]) -> tuple[Ints, Messages] | None:
+    """Rows (N,) of plots of a radar at (x, y) [m] in order of time_s, and the plots; None for fewer than two."""
+    if set(POLAR[:2]) <= table.columns.keys():
+        range_m, azimuth = table.columns[POLAR[0]], np.radians(table.columns[POLAR[1]])
+    elif set(CARTESIAN[:2]) <= table.columns.keys():
+        east, north = (table.columns[name] - from_m for name, from_m in zip(CARTESIAN[:2], place, strict=True))
+        range_m, azimuth = np.hypot(east, north), np.arctan2(east, north)
+    else:
+        return None
+    rows = np.flatnonzero(np.isfinite(time_s) & np.isfinite(range_m) & np.isfinite(azimuth))
+    if len(rows) < 2:
+        return None
+    rows = rows[np.argsort(time_s[rows], kind="stable")]
+    plots = (Message(Kind.POLAR, 0, 0, *one) for one in zip(time_s[rows], range_m[rows], azimuth[rows], strict=True))
+    return rows, Messages.of(list(plots))

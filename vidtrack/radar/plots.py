@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import logging
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,16 +13,22 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import PlotFormatError
-from vidtrack.radar.checks import AMPLITUDE, CARTESIAN, DOPPLER, KNOWN, POLAR, TIME, check_numbers, check_order
+from vidtrack.radar.checks import (
+    AMPLITUDE,
+    CARTESIAN,
+    DOPPLER,
+    KNOWN,
+    POLAR,
+    TIME,
+    check_numbers,
+    check_order,
+)
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.numbering import numbered
 from vidtrack.radar.plane import Plane
-from vidtrack.radar.table import Table, bare, nearest, read_table
+from vidtrack.radar.table import Table, bare, names_sensors, nearest, read_table
 
 _log = logging.getLogger(__name__)
-
-SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
-"""Names, without case and punctuation, of a column that tells which radar a plot is of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +78,9 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
     Rows may come in any order. Without a column `scan`, plots of the same time are one scan, or, if nearly each has its
     own time, those of one turn of the antenna, and if rows in order of time go back a few times, the clock was set, or
     a day ended: time goes on. Standard deviations come from columns, else from the settings.
-    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, times
-    that begin anew and may be of several radars, and bad rows. With settings.skip_bad_rows bad rows are left out with a
-    warning.
+    Raises SourceError if the file does not exist; PlotFormatError for missing columns, a file without plots, rows of
+    one radar after the other, times that begin anew and may be of several radars, and bad rows. With
+    settings.skip_bad_rows bad rows are left out with a warning.
     """
     settings = settings or RadarSettings()
     table = numbered(read_table(Path(path), KNOWN), settings.position[:2])
@@ -147,8 +152,8 @@ def _hint_at_misspelt(table: Table) -> None:
 def _hint_at_several(table: Table) -> None:
     """Warn of a column by which the plots are of several radars: they are tracked as if they were of one."""
     for name in table.names:
-        if name not in KNOWN and re.fullmatch(SENSOR, bare(name)):
-            count = len(table.cells[name].unique())
+        if names_sensors(name):
+            count = len(table.values(name))
             if count > 1:
                 _log.warning(
                     "%s: column %r has %d values, but all plots are taken as of one radar; of several radars give a "

@@ -20,8 +20,8 @@ LATE_S = 5.0
 """s; a row of a table that is later in it by more than this is out of order, or its clock was set back."""
 FEW = 3
 """Steps back in a table in order of arrival; with more of them, but for midnights, its rows are in another order."""
-DAY_S, MIDNIGHT_S = 86_400.0, 60.0
-"""s; a step back by a day, less up to the second, or some usual steps, is midnight in times of day."""
+DAY_S, MIDNIGHT_S, MIDNIGHT_STEPS = 86_400.0, 60.0, 3
+"""s; a step by a day, less up to the second, or so many usual steps, is over midnight in times of day."""
 AGREED, KEPT = 3, 10
 """Rows before a clock was set back, and rows after it, that agree about it."""
 ANEW = 0.02
@@ -82,11 +82,16 @@ def set_back(time_s: Floats) -> Ints:
     rows whose times catch up at once.
     """
     back = (np.flatnonzero(np.diff(time_s) < -LATE_S) + 1).tolist()
-    if not back or (len(back) > FEW and len(time_s) < KEPT * len(back)):
+    if not back or not _in_order(len(back), len(time_s)):
         return np.zeros(0, np.int64)
     if sum(np.sign(piece[-1] - piece[0]) for piece in np.split(time_s, back)) <= 0:
         return np.zeros(0, np.int64)
     return np.array([k for k, end in pairwise([*back, len(time_s)]) if _stays_back(time_s, k, end)], np.int64)
+
+
+def _in_order(back: int, rows: int) -> bool:
+    """Whether so many steps back in so many rows leave them in order of arrival, by pieces."""
+    return back <= FEW or rows >= KEPT * back
 
 
 def _stays_back(time_s: Floats, row: int, end: int) -> bool:
@@ -99,22 +104,57 @@ def _stays_back(time_s: Floats, row: int, end: int) -> bool:
 
 def begins_again(time_s: Floats, back: Ints) -> bool:
     """Whether at half or more of the rows (K,) times (N,) go back to about where they began."""
-    if not len(back):
-        return False
     near_s = np.maximum(LATE_S, ANEW * (time_s[back - 1] - time_s[0]))
     return bool((np.abs(time_s[back] - time_s[0]) <= near_s).mean() >= 0.5)
 
 
-def at_midnight(step_s: Floats, usual_s: float) -> Mask:
-    """Which steps back (K,) are from the end of a day to the begin of the next, in times of day."""
-    short_s = step_s + DAY_S
-    return (short_s >= 0) & (short_s <= max(MIDNIGHT_S, FEW * usual_s))
+def one_target_each(time_s: Floats, back: Ints) -> bool:
+    """Whether times (N,) in pieces that begin at the rows (K,) may be of one target each: then none is there twice."""
+    piece = np.searchsorted(back, np.arange(len(time_s)), side="right")
+    return len(np.unique(piece + 1j * time_s)) == len(time_s)
 
 
-def whole_days(time_s: Floats, usual_s: float) -> bool:
+def of_day(time_s: Floats) -> Mask:
+    """Which times (N,) may be times of day."""
+    return np.asarray((time_s >= 0) & (time_s <= DAY_S))
+
+
+def midnights(time_s: Floats) -> Ints:
+    """The day, from 0, of times of day (N,): steps from one end of the day to the other, and back, are counted.
+
+    All are of one day if its rows are in another order than that of arrival.
+    """
+    step_s = np.diff(time_s)
+    over: Mask = (DAY_S - np.abs(step_s) <= _near_midnight(time_s)) & of_day(time_s[1:]) & of_day(time_s[:-1])
+    day = np.concatenate([[0], np.cumsum(np.where(over, -np.sign(step_s), 0))]).astype(np.int64)
+    disorder = int((np.diff(time_s + DAY_S * day) < -LATE_S).sum())
+    return np.asarray(day - day.min()) if _in_order(disorder, len(day)) else np.zeros_like(day)
+
+
+def day_before(time_s: Floats, day: Ints) -> Ints:
+    """The rows (K,) from which times of day (N,) of these days may be of the day before: they go on by over half a day.
+
+    So they do where rows of another target, or of another radar, begin before midnight once more.
+    """
+    far = np.flatnonzero((np.diff(time_s) > DAY_S / 2) & (np.diff(day) == 0) & (day[1:] > 0)) + 1
+    return far[of_day(time_s[far])]
+
+
+def ends_day(time_s: Floats, back: Ints) -> Mask:
+    """At which of the rows (K,) times of day (N,) go back by over half a day: then one ended, with a gap."""
+    return np.asarray((time_s[back] - time_s[back - 1] < -DAY_S / 2) & of_day(time_s[back]) & of_day(time_s[back - 1]))
+
+
+def whole_days(time_s: Floats) -> bool:
     """Whether times (N,) from midnight to midnight are from the first one on, and up to the last one."""
-    near_s = max(MIDNIGHT_S, FEW * usual_s)
+    near_s = _near_midnight(time_s)
     return bool(0 <= time_s[0] <= near_s and time_s[-1] >= DAY_S - near_s)
+
+
+def _near_midnight(time_s: Floats) -> float:
+    """How near to midnight [s] the last of times of day (N,) before it, and the first one after it, are together."""
+    step_s = np.abs(np.diff(time_s))
+    return min(max(MIDNIGHT_S, MIDNIGHT_STEPS * float(np.median(step_s[step_s > 0]))), DAY_S / 2)
 
 
 def passes(time_s: Floats, azimuth: Floats, coarse_s: float) -> Ints | None:

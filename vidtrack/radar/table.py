@@ -5,7 +5,9 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,12 @@ Faults = dict[int, str]
 
 SHOWN = 5
 """Number of faults that a message lists."""
+EMPTY = ("", "none", "null", "nan")
+"""Cells without a value, in lower case."""
+SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
+"""Names, without case and punctuation, of a column that tells which radar a plot is of."""
+DATED = ("date", "day")
+"""Words, one of which is in the name of a column that tells the day of a plot, whatever is in its cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +70,35 @@ class Table:
         except pa.ArrowNotImplementedError:  # cells that cannot be compared
             return np.arange(len(column)) > 0
         return np.concatenate([[False], ~same.to_numpy()])
+
+    def values(self, name: str) -> set[str]:
+        """The different values of a column, as text; empty cells have none."""
+        column = self.cells[name]
+        with suppress(pa.ArrowNotImplementedError):  # cells that cannot be compared
+            column = column.unique()
+        return {text for text in map(str, column.to_pylist()) if text.strip().lower() not in EMPTY}
+
+    def days(self, name: str) -> Ints | None:
+        """(N,) the day that a column tells of each row; None if it tells none, or not of all.
+
+        Columns of dates do, and those whose names have a word of DATED, of numbers or else of names in order of days.
+        """
+        named = any(word in DATED for word in re.split(r"[\W_]+", name.lower()))
+        try:
+            coded = self.cells[name].combine_chunks().dictionary_encode()
+        except pa.ArrowNotImplementedError:  # cells that cannot be compared
+            return None
+        values = coded.dictionary.to_pylist()
+        if coded.null_count or not (named or _day(values[0])):
+            return None
+        number: list[int | None] = [_day(value) for value in values]
+        if None in number and not named:
+            return None
+        if None in number and all(re.fullmatch(r"\d{1,5}", str(value)) for value in values):
+            number = [int(value) for value in values]
+        elif None in number:
+            number = list(range(len(values)))
+        return np.array(number, np.int64)[coded.indices.to_numpy()]
 
     def refuse(self, bad: Mask, name: str, rule: str) -> None:
         """Add a fault for the rows of a mask (N,) whose value in column `name` breaks a rule."""
@@ -141,6 +178,11 @@ def bare(name: str) -> str:
     return "".join(word for word in words if word not in ("m", "s", "deg", "rad", "km", "degrees"))
 
 
+def names_sensors(name: str) -> bool:
+    """Whether a column of this name tells which radar a plot is of."""
+    return re.fullmatch(SENSOR, bare(name)) is not None
+
+
 def _complaint(path: Path, unit: str, faults: Faults) -> str:
     count = len(faults)
     shown = [f"{unit} {line}: {fault}" for line, fault in sorted(faults.items())[:SHOWN]]
@@ -174,6 +216,17 @@ def _refuse_repeated_names(path: Path, names: list[str]) -> None:
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise PlotFormatError(f"{path} has two columns {min(twice)!r}; keep one")
+
+
+def _day(cell: object) -> int | None:
+    """The number of the day of a date, with or without a time after it; None for another cell."""
+    found = re.fullmatch(r"(\d{4}-?\d\d-?\d\d)([T ].*)?", str(cell).strip())
+    if found is None:
+        return None
+    try:
+        return date.fromisoformat(found[1]).toordinal()
+    except ValueError:
+        return None
 
 
 def _numbers(column: pa.ChunkedArray, name: str, line: Ints, faults: Faults) -> Floats:

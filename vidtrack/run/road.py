@@ -163,7 +163,7 @@ def told_if_apart(steps: Iterable[Step], radars: int, within_s: float) -> Iterat
 
 def stated_span(video: str, settings: SourceSettings) -> tuple[float, float] | None:
     """The times of the pictures of a video file, by the length that it states [s]; None where it states none."""
-    length_s = duration_s(video)
+    length_s = duration_s(video, settings)
     if length_s is None:
         return None
     return settings.start_s, length_s if settings.end_s is None else min(length_s, settings.end_s)

@@ -46,6 +46,7 @@ class VideoFile:
         self._is_avi = self._container.format.name == "avi"
         self._packets = self._demuxed()
         self._opening = self._first_packets()
+        self._stretch = 1.0
         self.name = path.stem
         self.fps, self._ticks_per_s = self._rate(settings)
         self.frames = self._stream.frames or self._frames_by_duration()
@@ -189,8 +190,8 @@ class VideoFile:
 
     @property
     def duration_s(self) -> float | None:
-        """Length that the file states [s]."""
-        return self._container.duration / av.time_base if self._container.duration else None
+        """Length that the file states, in the times of its pictures [s]."""
+        return self._stretch * self._container.duration / av.time_base if self._container.duration else None
 
     def _first_packets(self) -> list[av.Packet | None]:
         """Enough packets to measure the rate; they are decoded later."""
@@ -218,7 +219,8 @@ class VideoFile:
         self._stats.header_fps = header or None
         fps = settings.fps or (nominal_rate(header, measured) if is_stated else None) or self._rate_by_main_header()
         if measured is not None and (settings.fps is not None or not is_plausible(measured)):
-            ticks_per_s *= fps / measured
+            self._stretch = measured / fps
+            ticks_per_s /= self._stretch
         return fps, ticks_per_s
 
     def _rate_by_main_header(self) -> float:

@@ -47,11 +47,14 @@ def open_part(path: str, settings: SourceSettings) -> Source:
         raise SourceError(f"cannot read {path}: {error.strerror}") from None
 
 
-def duration_s(path: str) -> float | None:
-    """Length of a video file [s]; None where it does not state one, and for images. Raises as `open_source`."""
+def duration_s(path: str, settings: SourceSettings | None = None) -> float | None:
+    """Length of a video file, in the times that `open_source` gives [s]; its warnings are left to that.
+
+    None where it does not state one, and for images. Raises as `open_source`.
+    """
     if not Path(path).is_file():
         return None
-    video = VideoFile(Path(path), SourceSettings(), SourceStats())
+    video = VideoFile(Path(path), settings or SourceSettings(), SourceStats(told=True))
     try:
         return video.duration_s
     finally:

@@ -188,8 +188,8 @@ def _found(plots: Messages, coarse_s: float) -> float | None:
     """
     if len(plots) < 2 or (plots.target != NO_TARGET).any() or (plots.kind != Kind.POLAR).any():
         return None
-    quick = None if coarse_s and not _are_apart(plots) else _peak(plots, FASTEST_S, USUAL_S, coarse_s)
-    return quick or (_peak(plots, USUAL_S, SLOWEST_S, coarse_s) if _are_apart(plots) else None)
+    quick = None if coarse_s and not are_apart(plots) else _peak(plots, FASTEST_S, USUAL_S, coarse_s)
+    return quick or (_peak(plots, USUAL_S, SLOWEST_S, coarse_s) if are_apart(plots) else None)
 
 
 def turn_within(plots: Messages, coarse_s: float) -> float | None:
@@ -197,14 +197,14 @@ def turn_within(plots: Messages, coarse_s: float) -> float | None:
 
     plots in order of time
     """
-    if len(plots) < 2 or not _are_apart(plots):
+    if len(plots) < 2 or not are_apart(plots):
         return None
     begin = plots.only(np.arange(min(len(plots), LOOKED_AT)))
     span = max(float(np.ptp(begin.time_s)), coarse_s)
     return _highest(begin, np.arange(0.5, MOST_IN_A_STEP, 0.2 * coarse_s / span) / coarse_s, coarse_s)
 
 
-def _are_apart(plots: Messages) -> bool:
+def are_apart(plots: Messages) -> bool:
     """Whether plots that follow each other are mostly too far apart to be of one target."""
     order = np.argsort(plots.time_s, kind="stable")
     step_m = np.abs(np.diff((plots.u * np.exp(1j * plots.v))[order]))
