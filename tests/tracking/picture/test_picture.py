@@ -6,6 +6,7 @@ from scipy.special import logit
 
 import vidtrack as vt
 from vidtrack.tracking.picture.road import Road
+from vidtrack.tracks import TENTATIVE
 
 SIZE = (320.0, 240.0)
 
@@ -77,6 +78,19 @@ def test_no_flake_is_a_measurement_of_a_vehicle(careful, taken):
     tracks = played(picture, [*driven, scan(40, [226.0, 106.0, 8.0, 8.0])])
     vehicle = np.flatnonzero(tracks[-1].id == tracks[0].id[0])
     assert bool(tracks[-1].measurement[vehicle][0] == 0) == taken
+
+
+@pytest.mark.parametrize("life", [vt.LifeCycle(confirm_travel=0.0), vt.LogRatio(confirm_travel=0.0)])
+@pytest.mark.filterwarnings("error")
+def test_no_flake_is_confirmed_where_no_travel_is_asked_for(life):
+    rng = np.random.default_rng(3)
+    tracker = vt.Tracker(picture=vt.Picture(SIZE, road=Road(*SIZE)), life=life)
+    for k in range(100):
+        flakes = [[*rng.uniform((0, 0), SIZE), 8.0, 6.0] for _ in range(20)]
+        again = [[10.0 + k, 5.0, 8.0, 8.0]] if k > 50 else []  # from when the swarm is known, one is seen all the time
+        tracks = tracker.step(vt.box_scan(k / 10, [*flakes, *again]))
+        seen = tracks.status[tracks.measurement == len(flakes)]
+    assert seen.tolist() == [TENTATIVE]
 
 
 def test_a_box_follows_with_its_time_constant():

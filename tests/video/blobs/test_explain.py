@@ -9,6 +9,7 @@ from drawn_tracks import drive, tracks_of
 from vidtrack.arrays import affine
 from vidtrack.config.video import BlobSettings
 from vidtrack.tracking.picture.road import Road
+from vidtrack.tracks import TENTATIVE
 from vidtrack.video.blobs.explain import explain
 from vidtrack.video.foreground import Foreground
 
@@ -97,6 +98,21 @@ def test_pieces_of_a_vehicle_are_one(road):
     assert found(explain(foreground((100, 100, 30, 20), (134, 103, 6, 12)), NONE, road, SETTINGS)) == [
         [100, 100, 40, 20]
     ]
+
+
+@pytest.mark.parametrize("step", [1, 2])
+def test_flakes_of_a_swarm_are_pieces_of_no_vehicle(step):
+    snowy = Road(320, 240)
+    drive(snowy.learn, lambda y: (40.0, 20.0), vehicles=6)
+    whole, falling = [[100, 100, 40, 20]], [[100, 100, 30, 20], [132, 104, 8, 8]]
+    shown = foreground(*(tuple(side // step for side in box) for box in falling), step=step)
+    assert found(explain(shown, NONE, snowy, SETTINGS)) == whole
+    t = float(snowy.swarm._time_s)
+    for k in range(50):
+        boxes = [[15.0 * i, 200.0, 9.0, 6.0] for i in range(10)]
+        snowy.learn(tracks_of(t + k / 10, boxes, status=TENTATIVE, age_s=0.0))
+    assert 9 < snowy.flake < 16
+    assert found(explain(shown, NONE, snowy, SETTINGS)) == falling
 
 
 def test_before_a_size_is_known_only_like_parts_of_an_open_shape_are_told_apart():

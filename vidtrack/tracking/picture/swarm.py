@@ -49,7 +49,7 @@ class Swarm:
         rare, flat = pair[:-2] < 2 * _FEW_PER_S, pair[2:] > _STEEP * pair[:-2]
         ends = rare | (flat & (pair[:-2] < _FALLEN * pair[most]))
         ends[most + _WIDEST :] = True
-        end = most + int(ends[most:].argmax())
+        end = most + int(ends[most:].argmax()) + 1  # what is seen a little larger than the others is of it as well
         return float(_LEAST_PX * 2 ** (end / _STEPS)) if rate[:end].sum() > _SWARM_PER_S else 0.0
 
     def learn(self, tracks: Tracks) -> None:
