@@ -154,7 +154,7 @@ class Reader:
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
             return Rows(track, t, seen, merged, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
-            column |= _stand(road, track, column, merged)
+            column |= _stand(road, track, column, merged, recording.rim_px)
         edge = edges(column, recording.size)
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
@@ -300,8 +300,8 @@ def _go_on(track: Ints, t: Floats, rough: Mask, alone: Mask, v: Floats, xy: Floa
             xy[i, 1] = latest[k, 2] + (t[i] - latest[k, 0]) * latest[k, 4]
 
 
-def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask) -> dict[str, Floats]:
-    """The columns of the road, computed from those of the picture."""
+def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask, rim_px: float) -> dict[str, Floats]:
+    """The columns of the road, computed from those of the picture, whose boxes have a rim."""
     sigma = np.column_stack([column[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
     corr = np.ones((len(track), 4, 4))
     pairs = {"xy": (0, 1), "vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
@@ -311,8 +311,7 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
     box = np.column_stack([column[name] for name in BOX])
     edge = np.column_stack([column[name] for name in EDGE_COLUMNS]) if EDGE_COLUMNS[0] in column else None
-    rim = 0.0 if edge is None else _rim(box, edge)
-    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim)
+    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim_px)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],
@@ -328,10 +327,3 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
         "length_sigma_m": stand.length_sigma,
         "width_m": stand.width,
     }
-
-
-def _rim(box: Floats, edge: Floats) -> float:
-    """px; by how much boxes (N, 4) reach beyond what was seen (N, 4), on the left and on the right; in half pixels."""
-    beyond = np.column_stack([edge[:, 0] - box[:, 0], box[:, 0] + box[:, 2] - edge[:, 2]]) - [-0.5, 0.5]
-    known = beyond[np.isfinite(beyond).all(axis=1)]
-    return max(0.0, round(2 * float(np.median(known))) / 2) if len(known) else 0.0
