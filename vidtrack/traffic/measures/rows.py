@@ -53,7 +53,8 @@ class Rows:
     sigma    (N,) standard deviation of its own position error, in the unit of xy
     margin   (N,) how far it must pass a gate by, in the unit of xy
     v        (N, 2) its velocity, in the unit of xy per second
-    speed_sigma, speed_shared   (N,) m/s; standard deviations of the speed on the road, own and by the calibration
+    speed    (N,) m/s on the road; known also where the heading, and so v, is not
+    speed_sigma, speed_shared   (N,) m/s; its standard deviations, own and by the calibration
     length, length_sigma, width   (N,) m
     ahead    (N, 2) unit vectors along the vehicles on the road
     spread   (N, 3) m2; variances of its own position error, in x and in y, and their covariance
@@ -70,6 +71,7 @@ class Rows:
     sigma: Floats
     margin: Floats
     v: Floats
+    speed: Floats
     speed_sigma: Floats
     speed_shared: Floats
     length: Floats
@@ -93,9 +95,9 @@ class Rows:
 
 
 def off_road(count: int) -> tuple[Floats, ...]:
-    """The last eight columns of rows (count,) of which nothing is known on the road: NaN."""
+    """The last nine columns of rows (count,) of which nothing is known on the road: NaN."""
     nothing = np.full((count, 4), np.nan)
-    return *(nothing[:, 0] for _ in range(5)), nothing[:, :2], nothing[:, :3], nothing
+    return *(nothing[:, 0] for _ in range(6)), nothing[:, :2], nothing[:, :3], nothing
 
 
 _MARGIN = 0.15
@@ -216,12 +218,12 @@ def _on_road(
     ahead = np.column_stack([np.sin(heading), np.cos(heading)])
     length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
     margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
-    sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
+    speeds = speed, column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
     sides = length, column["length_sigma_m"], column["width_m"]
     spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
     state = xy, sigma, margin, speed[:, None] * ahead
     hidden = partly_hidden(t, np.column_stack([column[name] for name in BOX]), merged)
-    return Rows(track, t, seen, merged, hidden, *state, *sigmas, *sides, ahead, spread, edge)
+    return Rows(track, t, seen, merged, hidden, *state, *speeds, *sides, ahead, spread, edge)
 
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
