@@ -80,7 +80,8 @@ def _whole_lines(path: Path) -> int:
         return begin + file.read(_LONGEST_LINE).rfind(b"\n") + 1
 
 
-def columns_of(folder: Path) -> set[str]:
+def column_names(folder: Path) -> set[str]:
+    """Names of the columns of a run's table of tracks. Raises FormatError."""
     path = folder / "tracks.parquet"
     try:
         if path.is_file():

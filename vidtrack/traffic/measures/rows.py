@@ -18,7 +18,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
-from vidtrack.traffic.measures.blocks import blocks, columns_of, numbers, whole_pictures
+from vidtrack.traffic.measures.blocks import blocks, column_names, numbers, whole_pictures
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
 
@@ -228,7 +228,7 @@ def _on_road(
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     """The columns to read. Raises ConfigError for a table without them."""
-    names = columns_of(folder)
+    names = column_names(folder)
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
