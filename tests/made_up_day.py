@@ -171,6 +171,7 @@ def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("nort
         "tracks": len(begin),
         "joins": 0,
         "impossible_movements": [],
+        "calibration": [],
         "scale": None,
         "straightness": None,
         "sections": [],
