@@ -139,7 +139,8 @@ class Reader:
             wanted, road = _needed(recording.folder, ground), None
             if ground is not None and "x_m" not in wanted:
                 road = roads.setdefault(recording.session, Footprints(ground, recording.size))
-            with closing(ReadAhead(whole_pictures(blocks(recording.folder, wanted)), depth=1)) as tables:
+            pictures = whole_pictures(blocks(recording.folder, wanted), recording.folder)
+            with closing(ReadAhead(pictures, depth=1)) as tables:
                 for table in tables:
                     yield self._rows(table, recording, ground, road)
 
