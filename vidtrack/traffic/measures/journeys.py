@@ -102,9 +102,10 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
 
 
 def _of_another(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
-    """(P,) entries and exits of trips that may not be, while the track was not yet, or no more, seen alone.
+    """(P,) entries and exits of trips that may not be, while the track was not yet, or no more, seen alone: in a shared blob, or
+    while it coasts.
 
-    Another vehicle of the blob has passed there.
+    Another vehicle of the blob has passed there, or nobody: where a track coasts, it is only expected.
     """
     entry, exit_ = _ends(passed, *gates.ways(passed.gate, passed.side))
     number, leg, t = np.arange(len(passed)), np.append(gates.leg[passed.gate], -1), np.append(passed.t, np.nan)
