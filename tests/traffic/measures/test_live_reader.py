@@ -54,4 +54,5 @@ def test_blocks_end_between_pictures(tmp_path):
         assert pa.concat_tables(parts).equals(table)
         ends = [(part["time_s"][0].as_py(), part["time_s"][-1].as_py()) for part in parts]
         assert all(before < begin for (_, before), (begin, _) in itertools.pairwise(ends))
+    assert len(list(whole_pictures([table], run))) == 1  # the last picture is no block of its own
     assert list(whole_pictures([], run)) == list(whole_pictures([table.slice(0, 0)], run)) == []

@@ -25,17 +25,18 @@ _LONGEST_LINE = 1 << 16
 def whole_pictures(tables: Iterable[pa.Table], folder: Path) -> Iterator[pa.Table]:
     """The rows of a run's tables, cut between pictures: what a picture shows belongs together.
 
+    The last picture of a table goes with the table after it, and is no block of its own where none follows.
     Raises FormatError for rows that are not in order of time, or have none.
     """
     rest: pa.Table | None = None
     for table in tables:
-        whole = table if rest is None else pa.concat_tables([rest, table])
-        if not len(whole):
+        if not len(table):
             continue
+        whole = table if rest is None else pa.concat_tables([rest, table])
         t = numbers(whole, "time_s")
         if not (np.isfinite(t[0]) and (np.diff(t) >= 0).all()):
             raise FormatError(_out_of_order(folder, t))
-        last = int(np.searchsorted(t, t[-1]))
+        last = 0 if rest is None else int(np.searchsorted(t, t[len(rest) - 1]))
         rest = whole.slice(last)
         if last:
             yield whole.slice(0, last)
