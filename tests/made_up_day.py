@@ -171,6 +171,7 @@ def write_day(folder, counts, coverage=None, speeds=None, queues=(), legs=("nort
         "tracks": len(begin),
         "joins": 0,
         "impossible_movements": [],
+        "calibration": [],
         "scale": None,
         "straightness": None,
         "sections": [],
@@ -221,6 +222,6 @@ def write_run(folder, begin_s):
         },
     }
     folder.mkdir()
-    pq.write_table(pa.table(columns), folder / "tracks.parquet")
+    pq.write_table(pa.table(columns).sort_by("time_s"), folder / "tracks.parquet")
     summary = {"frames": len(t), "media_s": t[-1], "fps": FPS, "width": 1280, "height": 720}
     (folder / "summary.json").write_text(json.dumps(summary | {"settings": {"source": {"start_s": None}}}))

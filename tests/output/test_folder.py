@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -135,7 +136,7 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
     for index, x in enumerate([80, 95, 115]):
         step = make_step(index, [(1, "c", x, 50), (2, "t", 5, 5)])
         counter.step(step.index, step.tracks)
-        summary.step(step)
+        summary.step(replace(step, scan=replace(step.scan, rim=3.0)))
     summary.interrupted = False
     summary.close()
     late = json.loads((tmp_path / "summary.json").read_text())
@@ -144,6 +145,7 @@ def test_the_summary_of_a_running_run_says_interrupted_and_of_a_finished_one_not
     assert late["frames"] == 3
     assert late["media_s"] == 0.08
     assert late["watched"] == [[0.0, 0.08]]
+    assert late["rim_px"] == 3.0
     assert late["counts"] == {"gate": {"left": 0, "right": 1}}
     assert late["stages"] == {"detect": 0.006, "track": 0.003}
     assert late["fps"] == 25.0

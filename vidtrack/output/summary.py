@@ -89,6 +89,7 @@ class Summary:
         self._start = time.monotonic()
         self._frames = 0
         self._media_s = 0.0
+        self._rim_px = 0.0
         self._tracks = 0
         self._alive: set[int] = set()
         self._stage_s: dict[str, float] = {}
@@ -105,6 +106,7 @@ class Summary:
         self._alive = confirmed
         self._frames += 1
         self._media_s = step.time_s
+        self._rim_px = step.scan.rim
         for stage, seconds in step.stage_s.items():
             self._stage_s[stage] = self._stage_s.get(stage, 0.0) + seconds
         self._camera.step(step)
@@ -121,14 +123,14 @@ class Summary:
         """What changes from step to step, times in seconds.
 
         `seconds`: duration of the run; `media_s`: time of the last frame; `watched`: first and last frame of each span
-        without a pause.
+        without a pause; `rim_px`: by how much boxes reach beyond vehicles on each side, in pixels of the source.
         """
         return {
             "source": self._source,
             **self._reading(),
             self._unit: self._frames,
             "media_s": round(self._media_s, 6),
-            **({"watched": self._watched.spans} if self._unit == "frames" else {}),
+            **({"watched": self._watched.spans, "rim_px": self._rim_px} if self._unit == "frames" else {}),
             "tracks": self._tracks,
             "counts": {} if self._counts is None else self._counts(),
             "camera": self._camera.as_dict(),

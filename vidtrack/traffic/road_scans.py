@@ -10,7 +10,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.scan import Scan
 from vidtrack.tracks import Tracks
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints
+from vidtrack.traffic.footprint import Footprints, within
 
 UNKNOWN_PX_S = 1e3
 """px/s; standard deviation of the velocity of a blob without a track."""
@@ -84,7 +84,7 @@ class RoadScans:
         P[:, :2, 2:] = P[:, 2:, :2] = 0.0
         P[:, :2, :2] = blobs.R[rows]
         name[known] = tracks.id[owner[known]]
-        box = np.hstack([blobs.z[rows] + blobs.box[rows, :2] + blobs.rim, blobs.box[rows, 2:] - 2 * blobs.rim])
+        box = within(np.hstack([blobs.z[rows] + blobs.box[rows, :2], blobs.box[rows, 2:]]), blobs.rim)
         stand = self._footprints.place(name, np.full(len(rows), blobs.t), blobs.z[rows], u, P, box)
         good = np.isfinite(stand.xy).all(axis=1) & np.isfinite(stand.xy_own).all(axis=(1, 2))
         xy, own, shared = stand.xy[good], stand.xy_own[good], stand.xy_shared[good]

@@ -100,6 +100,14 @@ def out_of_order(folder):
     return run
 
 
+def with_frames_out_of_order(folder):
+    run = write_run(folder, way(1, range(5)))
+    table = pq.read_table(run / "tracks.parquet")
+    frames = table["frame"].take(np.arange(5)[::-1])
+    pq.write_table(table.set_column(table.column_names.index("frame"), "frame", frames), run / "tracks.parquet")
+    return run
+
+
 def no_run(folder):
     folder.mkdir()
     return folder
@@ -115,7 +123,8 @@ def no_run(folder):
         (without_table, 3, "vidtrack repair"),
         (with_a_damaged_table, 3, "not a readable Parquet file"),
         (with_a_damaged_summary, 3, "is damaged"),
-        (out_of_order, 3, "not in order of frame"),
+        (out_of_order, 3, "not in order of time"),
+        (with_frames_out_of_order, 3, "not in order of frame"),
         (no_run, 3, "it has no summary.json"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import csv
 import html
+import json
 import re
 from pathlib import Path
 
@@ -75,6 +76,16 @@ def test_the_page_says_what_contradicts_the_calibration(tmp_path, made):
     told = page.index("The calibration is contradicted, so speeds, lengths and places may be wrong:")
     for reason in (pairs[0], "vehicles come out 1.26 times as large", sections[0]):
         assert told < page.index(reason) < page.index("Turning movements")
+
+
+def test_the_page_says_where_an_earlier_version_did_not_tell_of_the_calibration(tmp_path, made):
+    doubt = "does not tell whether the points of the calibration agree: measure it again"
+    assert doubt not in words(made[1])
+    folder = write_day(tmp_path / "day", [[3], [5]])
+    told = json.loads((folder / "measures.json").read_text())
+    del told["calibration"]
+    (folder / "measures.json").write_text(json.dumps(told))
+    assert doubt in words(report(folder))
 
 
 def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made):

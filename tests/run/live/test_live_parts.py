@@ -13,7 +13,9 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from drawn_runs import CALIBRATED, site
 from synthetic_steps import make_step
 
 from vidtrack.config.load import load
@@ -28,8 +30,9 @@ from vidtrack.run.live.counting import RoadReadings, counter_of, counting_of
 from vidtrack.run.live.part import Part
 from vidtrack.run.live.parts import Parts
 from vidtrack.run.sinks import Subject, line_counter
+from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.measure import measured
-from vidtrack.traffic.measures.rows import Rows, off_road
+from vidtrack.traffic.measures.rows import ROAD_COLUMNS, LiveReader, Rows, off_road
 from vidtrack.traffic.metres import used_site
 from vidtrack.traffic.site import read_site
 
@@ -164,7 +167,9 @@ def on_road(track, t, length=4.0, hidden=False):
         np.array(track), t * one, one > 0, one < 0, hidden * one > 0, *4 * [np.nan * one], *off_road(len(one))
     )
     v = np.column_stack([10 * one, 0 * one])
-    return replace(nothing, v=v, speed_sigma=one, speed_shared=one, length=length * one, length_sigma=0.1 * one)
+    return replace(
+        nothing, v=v, speed=10 * one, speed_sigma=one, speed_shared=one, length=length * one, length_sigma=0.1 * one
+    )
 
 
 def test_who_is_partly_hidden_adds_nothing_to_a_length():
@@ -172,6 +177,15 @@ def test_who_is_partly_hidden_adds_nothing_to_a_length():
     for t, length, hidden in ((0.0, 4.0, False), (0.1, 4.2, False), (0.2, 9.0, True)):
         readings.add(on_road([1], t, length, hidden))
     assert readings.of(1)[0] == pytest.approx(4.1)
+
+
+def test_a_speed_is_known_without_a_heading():
+    ground = calibrated(site(CALIBRATED))
+    columns = {name: [1.0] for name in ROAD_COLUMNS} | {"track_id": [1], "status": ["confirmed"]}
+    table = pa.table(columns | {"speed_kmh": [36.0], "heading_deg": [np.nan], "length_m": [np.nan]})
+    readings = RoadReadings()
+    readings.add(LiveReader(ground).read(table))
+    assert readings.of(1)[1:] == pytest.approx((10.0, 1 / 3.6, 1 / 3.6))
 
 
 def test_what_is_known_of_a_vehicle_lasts_until_its_crossing_is_decided(tmp_path, clock):

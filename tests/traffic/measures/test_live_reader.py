@@ -50,8 +50,9 @@ def test_blocks_end_between_pictures(tmp_path):
     run, _ = written(tmp_path)
     table = pq.read_table(run / "tracks.parquet", columns=["time_s", "track_id", "status"])
     for size in (1, 2, 7, 1000):
-        parts = list(whole_pictures(table.slice(first, size) for first in range(0, len(table), size)))
+        parts = list(whole_pictures((table.slice(first, size) for first in range(0, len(table), size)), run))
         assert pa.concat_tables(parts).equals(table)
         ends = [(part["time_s"][0].as_py(), part["time_s"][-1].as_py()) for part in parts]
         assert all(before < begin for (_, before), (begin, _) in itertools.pairwise(ends))
-    assert list(whole_pictures([])) == list(whole_pictures([table.slice(0, 0)])) == []
+    assert len(list(whole_pictures([table], run))) == 1  # the last picture is no block of its own
+    assert list(whole_pictures([], run)) == list(whole_pictures([table.slice(0, 0)], run)) == []

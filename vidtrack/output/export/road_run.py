@@ -169,7 +169,7 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
     whole = WholeTracks(_of_size(drawn, summary))
     look = _FirstLook()
     edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= _column_names(folder) else ()
-    for table in whole_pictures(_batches(folder, (*_NEEDED[:6], "length_m", "length_sigma_m", *BOX, *edges))):
+    for table in whole_pictures(_batches(folder, (*_NEEDED[:6], "length_m", "length_sigma_m", *BOX, *edges)), folder):
         whole.add(table)
         look.add(table)
     if not look.positions:

@@ -103,6 +103,7 @@ def rendered(page: Page, drawn: Mapping[str, bytes], missing: Mapping[str, str])
         found=found,
         report=report,
         against=against(report) if found.metres else [],
+        unchecked=found.metres and "calibration" not in report,
         clock=found.clock,
         date=found.clock.date(float(found.edges[0])),
         pictures={name: f"data:image/png;base64,{b64encode(content).decode()}" for name, content in drawn.items()},

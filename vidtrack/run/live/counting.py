@@ -44,7 +44,7 @@ class RoadReadings:
     def add(self, rows: Rows) -> None:
         """Take rows of tracks on the road, in order of time."""
         ids, track = np.unique(rows.track, return_inverse=True)
-        speeds = np.column_stack([np.linalg.norm(rows.v, axis=1), rows.speed_sigma, rows.speed_shared])
+        speeds = np.column_stack([rows.speed, rows.speed_sigma, rows.speed_shared])
         sums = length_sums(track, length_terms(rows.length, rows.length_sigma, rows.hidden), len(ids))
         last, fast = np.zeros((2, len(ids)), int)
         last[track] = np.arange(len(track))

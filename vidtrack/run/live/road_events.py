@@ -106,6 +106,7 @@ def prepare() -> None:
             one,
             one,
             v,
+            10 * one,
             one / 9,
             one / 9,
             *sides,

@@ -22,19 +22,35 @@ _LONGEST_LINE = 1 << 16
 """Bytes; no line of a table is as long."""
 
 
-def whole_pictures(tables: Iterable[pa.Table]) -> Iterator[pa.Table]:
-    """The rows of tables in order of time, cut between pictures: what a picture shows belongs together."""
+def whole_pictures(tables: Iterable[pa.Table], folder: Path) -> Iterator[pa.Table]:
+    """The rows of a run's tables, cut between pictures: what a picture shows belongs together.
+
+    The last picture of a table goes with the table after it, and is no block of its own where none follows.
+    Raises FormatError for rows that are not in order of time, or have none.
+    """
     rest: pa.Table | None = None
     for table in tables:
-        whole = table if rest is None else pa.concat_tables([rest, table])
-        if not len(whole):
+        if not len(table):
             continue
-        last = np.searchsorted(numbers(whole, "time_s"), whole["time_s"][-1].as_py())
+        whole = table if rest is None else pa.concat_tables([rest, table])
+        t = numbers(whole, "time_s")
+        if not (np.isfinite(t[0]) and (np.diff(t) >= 0).all()):
+            raise FormatError(_out_of_order(folder, t))
+        last = 0 if rest is None else int(np.searchsorted(t, t[len(rest) - 1]))
         rest = whole.slice(last)
         if last:
             yield whole.slice(0, last)
     if rest is not None:
         yield rest
+
+
+def _out_of_order(folder: Path, t: Floats) -> str:
+    """What is wrong with rows at times t (N,) and what to do."""
+    path = folder / "tracks.parquet"
+    path = path if path.is_file() else folder / "tracks.csv"
+    if np.isfinite(t).all():
+        return f"{path} is damaged: its rows are not in order of time; sort them by time_s"
+    return f"{path} is damaged: a row has no time_s; fill it in, or leave the row out"
 
 
 def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
@@ -80,7 +96,8 @@ def _whole_lines(path: Path) -> int:
         return begin + file.read(_LONGEST_LINE).rfind(b"\n") + 1
 
 
-def columns_of(folder: Path) -> set[str]:
+def column_names(folder: Path) -> set[str]:
+    """Names of the columns of a run's table of tracks. Raises FormatError."""
     path = folder / "tracks.parquet"
     try:
         if path.is_file():

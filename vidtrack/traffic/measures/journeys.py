@@ -104,7 +104,7 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
 def _of_another(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:
     """(P,) entries and exits of trips that may not be, while the track was not yet, or no more, seen alone.
 
-    Another vehicle of the blob has passed there.
+    In a shared blob another vehicle has passed there; where the track coasts, perhaps nobody.
     """
     entry, exit_ = _ends(passed, *gates.ways(passed.gate, passed.side))
     number, leg, t = np.arange(len(passed)), np.append(gates.leg[passed.gate], -1), np.append(passed.t, np.nan)

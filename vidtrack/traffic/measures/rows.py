@@ -18,7 +18,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut
 from vidtrack.traffic.lines import foot_of
-from vidtrack.traffic.measures.blocks import blocks, columns_of, numbers, whole_pictures
+from vidtrack.traffic.measures.blocks import blocks, column_names, numbers, whole_pictures
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
 
@@ -53,7 +53,8 @@ class Rows:
     sigma    (N,) standard deviation of its own position error, in the unit of xy
     margin   (N,) how far it must pass a gate by, in the unit of xy
     v        (N, 2) its velocity, in the unit of xy per second
-    speed_sigma, speed_shared   (N,) m/s; standard deviations of the speed on the road, own and by the calibration
+    speed    (N,) m/s on the road; known also where the heading, and so v, is not
+    speed_sigma, speed_shared   (N,) m/s; its standard deviations, own and by the calibration
     length, length_sigma, width   (N,) m
     ahead    (N, 2) unit vectors along the vehicles on the road
     spread   (N, 3) m2; variances of its own position error, in x and in y, and their covariance
@@ -70,6 +71,7 @@ class Rows:
     sigma: Floats
     margin: Floats
     v: Floats
+    speed: Floats
     speed_sigma: Floats
     speed_shared: Floats
     length: Floats
@@ -93,9 +95,9 @@ class Rows:
 
 
 def off_road(count: int) -> tuple[Floats, ...]:
-    """The last eight columns of rows (count,) of which nothing is known on the road: NaN."""
+    """The last nine columns of rows (count,) of which nothing is known on the road: NaN."""
     nothing = np.full((count, 4), np.nan)
-    return *(nothing[:, 0] for _ in range(5)), nothing[:, :2], nothing[:, :3], nothing
+    return *(nothing[:, 0] for _ in range(6)), nothing[:, :2], nothing[:, :3], nothing
 
 
 _MARGIN = 0.15
@@ -137,7 +139,8 @@ class Reader:
             wanted, road = _needed(recording.folder, ground), None
             if ground is not None and "x_m" not in wanted:
                 road = roads.setdefault(recording.session, Footprints(ground, recording.size))
-            with closing(ReadAhead(whole_pictures(blocks(recording.folder, wanted)), depth=1)) as tables:
+            pictures = whole_pictures(blocks(recording.folder, wanted), recording.folder)
+            with closing(ReadAhead(pictures, depth=1)) as tables:
                 for table in tables:
                     yield self._rows(table, recording, ground, road)
 
@@ -154,7 +157,7 @@ class Reader:
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
             return Rows(track, t, seen, merged, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
-            column |= _stand(road, track, column, merged)
+            column |= _stand(road, track, column, merged, recording.rim_px)
         edge = edges(column, recording.size)
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
@@ -216,17 +219,17 @@ def _on_road(
     ahead = np.column_stack([np.sin(heading), np.cos(heading)])
     length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
     margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
-    sigmas = column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
+    speeds = speed, column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
     sides = length, column["length_sigma_m"], column["width_m"]
     spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
     state = xy, sigma, margin, speed[:, None] * ahead
     hidden = partly_hidden(t, np.column_stack([column[name] for name in BOX]), merged)
-    return Rows(track, t, seen, merged, hidden, *state, *sigmas, *sides, ahead, spread, edge)
+    return Rows(track, t, seen, merged, hidden, *state, *speeds, *sides, ahead, spread, edge)
 
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
     """The columns to read. Raises ConfigError for a table without them."""
-    names = columns_of(folder)
+    names = column_names(folder)
     _demand(folder, names, (*_ALWAYS, *_PICTURE), "is not a run over video")
     if ground is None:
         return *_ALWAYS, *_PICTURE
@@ -300,8 +303,8 @@ def _go_on(track: Ints, t: Floats, rough: Mask, alone: Mask, v: Floats, xy: Floa
             xy[i, 1] = latest[k, 2] + (t[i] - latest[k, 0]) * latest[k, 4]
 
 
-def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask) -> dict[str, Floats]:
-    """The columns of the road, computed from those of the picture."""
+def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask, rim_px: float) -> dict[str, Floats]:
+    """The columns of the road, computed from those of the picture, whose boxes have a rim."""
     sigma = np.column_stack([column[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
     corr = np.ones((len(track), 4, 4))
     pairs = {"xy": (0, 1), "vxy": (2, 3), "x_vx": (0, 2), "x_vy": (0, 3), "y_vx": (1, 2), "y_vy": (1, 3)}
@@ -311,8 +314,7 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
     box = np.column_stack([column[name] for name in BOX])
     edge = np.column_stack([column[name] for name in EDGE_COLUMNS]) if EDGE_COLUMNS[0] in column else None
-    rim = 0.0 if edge is None else _rim(box, edge)
-    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim)
+    stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim_px)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {
         "x_m": stand.xy[:, 0],
@@ -328,10 +330,3 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
         "length_sigma_m": stand.length_sigma,
         "width_m": stand.width,
     }
-
-
-def _rim(box: Floats, edge: Floats) -> float:
-    """px; by how much boxes (N, 4) reach beyond what was seen (N, 4), on the left and on the right; in half pixels."""
-    beyond = np.column_stack([edge[:, 0] - box[:, 0], box[:, 0] + box[:, 2] - edge[:, 2]]) - [-0.5, 0.5]
-    known = beyond[np.isfinite(beyond).all(axis=1)]
-    return max(0.0, round(2 * float(np.median(known))) / 2) if len(known) else 0.0

@@ -39,6 +39,7 @@ class Recording:
     begin_s, end_s   of what was watched, in the site's time
     session     recordings with the same number are parts of one live run: their tracks have the same numbers
     breaks      begin and end of each time between without a picture, in its `time_s`
+    rim_px      by how much its boxes reach beyond vehicles on each side; 0: in runs of earlier versions, not known
     """
 
     folder: Path
@@ -48,6 +49,7 @@ class Recording:
     end_s: float
     session: int
     breaks: tuple[tuple[float, float], ...] = ()
+    rim_px: float = 0.0
 
     @property
     def spans(self) -> list[list[float]]:
@@ -90,6 +92,7 @@ class _Found:
     begin_s: float
     end_s: float
     breaks: tuple[tuple[float, float], ...]
+    rim_px: float
 
 
 def open_day(runs: Sequence[str], start: datetime | None) -> Day:
@@ -123,7 +126,7 @@ def open_day(runs: Sequence[str], start: datetime | None) -> Day:
         else:
             offset = recordings[-1].end_s - one.begin_s if recordings else 0.0
         begin, end = offset + one.begin_s, offset + one.end_s
-        recordings.append(Recording(one.folder, one.size, offset, begin, end, session, one.breaks))
+        recordings.append(Recording(one.folder, one.size, offset, begin, end, session, one.breaks, one.rim_px))
     recordings.sort(key=lambda one: one.end_s)
     return Day(tuple(_apart(recordings)), utc)
 
@@ -217,6 +220,7 @@ def _found(run: str) -> _Found:
         size = int(summary["width"]), int(summary["height"])
         source = summary["settings"]["source"]
         spans = [(float(first), float(last)) for first, last in summary.get("watched", [])]  # earlier versions: none
+        rim = float(summary.get("rim_px", 0.0))
     except OSError:
         raise SourceError(f"{folder} has no summary.json, so nobody knows when it watched") from None
     except (KeyError, TypeError, ValueError):
@@ -231,7 +235,7 @@ def _found(run: str) -> _Found:
     if began:  # a part of a live run begins somewhere in it
         begin = spans[0][0] if spans else end - (frames - 1) / fps
     breaks = tuple((before[1] + 1 / fps, after[0]) for before, after in pairwise(spans))
-    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks)
+    return _Found(folder, size, zero, bool(began), min(begin, end), end + 1 / fps, breaks, rim)
 
 
 def ended(folder: Path) -> bool:
