@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import logging
+import os
 import signal
 
 import pytest
@@ -33,13 +34,36 @@ LONG = tuple(
 )  # fmt: skip
 """Files that no worker should begin when the others are nearly done"""
 
+LONGEST = tuple(
+    f"tests/{name}"
+    for name in (
+        "papers/test_registry.py::test_every_experiment_writes_a_picture_and_a_table_and_says_what_came_out[004-fig7]",
+        "simulate/roads/test_roads_clip.py::test_visibility_is_the_share_of_pixels_left_by_what_is_nearer",
+        "simulate/roads/test_roads_files.py::test_crossings_agree_with_brute_force_in_the_picture[motorway]",
+        "doctor/test_doctor_advice.py::test_following_the_advice_helps",
+        "tracking/unresolved/test_unresolved.py::test_branches_go_on_from_a_saved_state",
+        "papers/test_p003.py::test_mean_errors_of_flights",
+        "traffic/calibration/test_straight_road.py::test_errors_have_the_covariance_that_is_given",
+        "traffic/calibration/test_calibrate.py::test_errors_have_the_covariance_that_is_given",
+        "traffic/calibration/test_calibrate.py::test_good_pairs_are_rarely_blamed",
+        "traffic/test_footprint.py::test_shared_errors_have_the_covariance_that_is_given",
+        "radar/test_radar_choices.py::test_each_track_has_a_threshold_of_its_own",
+        "test_frame_rate.py::test_ten_and_thirty_frames_a_second_tell_the_same",
+    )
+)
+"""Tests of many seeds or whole clips, which VIDTRACK_LONG=1 runs too"""
+
 
 def _is_clocked(nodeid):
     return nodeid.startswith(CLOCKED) and not nodeid.startswith(UNCLOCKED)
 
 
 def pytest_collection_modifyitems(items):
-    """What takes longest comes first."""
+    """What takes longest comes first, or is left out."""
+    if not os.environ.get("VIDTRACK_LONG"):
+        for item in items:
+            if item.nodeid.startswith(LONGEST):
+                item.add_marker(pytest.mark.skip(reason="takes long: VIDTRACK_LONG=1 runs it"))
     items.sort(key=lambda item: (not _is_clocked(item.nodeid), not item.nodeid.startswith(LONG)))
 
 
