@@ -36,9 +36,7 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
         return table
     table = on_one_clock(table)
     time_s = possible_times(table.columns[time])
-    times, member = np.unique(time_s, return_inverse=True)
-    steps = np.diff(times[np.isfinite(times)])
-    usual = float(np.median(steps)) if len(steps) else 1.0
+    times, member, steps = _distinct(time_s)
     one_by_one = _one_by_one(steps, len(member))
     coarse_s = float(np.quantile(steps, 0.1)) if len(steps) else np.inf  # times that several plots share
     polar = _polar(table, time_s, place)
@@ -53,9 +51,8 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
         )
     elif polar and (swept_s := _swept(table, *polar, coarse_s)) is not None:
         told = "an antenna passes over a sector, the plots of one pass are one scan"
-        times, member = np.unique(swept_s, return_inverse=True)
-        steps = np.diff(times[np.isfinite(times)])
-        usual = float(np.median(steps))
+        times, member, steps = _distinct(swept_s)
+    usual = float(np.median(steps)) if len(steps) else 1.0
     passed = np.where(steps > longest_step(steps), 1, np.maximum(1, np.round(steps / usual)))
     number = np.concatenate([[0], np.cumsum(passed)])
     number = np.concatenate([number, np.full(len(times) - len(number), np.nan)])
@@ -63,6 +60,12 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
         "%s has no column 'scan': %s; %d scans, %.6g s apart", table.path, told, len(steps) + 1, usual
     )  # fmt: skip
     return replace(table, columns=table.columns | {scan: np.where(np.isfinite(number), number, 0.0)[member]})
+
+
+def _distinct(time_s: Floats) -> tuple[Floats, Ints, Floats]:
+    """The different times (K,), the one of each row (N,) among them, and the steps between those that are known."""
+    times, member = np.unique(time_s, return_inverse=True)
+    return times, member, np.diff(times[np.isfinite(times)])
 
 
 def _one_by_one(steps: Floats, plots: int) -> bool:

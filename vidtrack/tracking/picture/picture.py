@@ -183,8 +183,8 @@ class Picture:
         """The problem with the likelihood of sizes and looks; no flake is a measurement of a vehicle."""
         if view is None:
             return problem
-        if self.road and self.road.flake:
-            flake, vehicle = longer(view.blobs) <= self.road.flake, longer(view.predicted) > self.road.flake
+        if self.road and (largest := self.road.flake):
+            flake, vehicle = longer(view.blobs) <= largest, longer(view.predicted) > largest
             pairs = problem.pairs
             problem = problem.having(pairs.only(~(flake[pairs.measurement] & vehicle[pairs.row])))
         if self.shape is not None:
