@@ -104,7 +104,7 @@ class BlobSettings(Group):
     divide: bool = True
     """regions too large for one vehicle are divided among the vehicles predicted there"""
     pieces: bool = True
-    """small regions outside predicted boxes are joined with their neighbours up to the typical size of a vehicle"""
+    """small regions, predicted or not, are joined with near ones up to the typical size of a vehicle"""
     join_overlap: float = Field(0.7, gt=0, le=1)
     """share of a blob's box inside one predicted vehicle's box that makes it a fragment of that vehicle"""
     join_gap: float = Field(0.05, ge=0, le=1)

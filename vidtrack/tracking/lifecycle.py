@@ -58,7 +58,7 @@ class LifeCycle:
     hidden_s        s; the same for a track inside a blob that it shares, where nothing could be seen of it
     coast_scans     or after this many scans without evidence in a row; None: by time only
     idle_s          s; a track that has stood still for so long and never travelled `idle_travel` ends; None: it stays
-    idle_travel     object sizes; one that came in over the border of the picture has travelled
+    idle_travel     object sizes; for one that came in over the border of the picture half of it is enough
     """
 
     confirm_hits: int = 3

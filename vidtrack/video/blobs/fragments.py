@@ -13,7 +13,7 @@ _SPREAD = 1.2  # predicted boxes are taken this much larger about their centres 
 _LIKE = 0.3  # share of the typical area that makes a piece a vehicle
 _LIKE_BOX, _LIKE_FILL, _APART = 0.2, 0.6, 0.75  # before a typical size is known: share of the union's box, share of its
 # own box that is filled, and the share of the union's box that two vehicles' boxes leave unfilled together
-_SMALL = 0.35  # share of the typical area of a piece that nobody predicted
+_SMALL = 0.35  # share of the typical area of a piece that needs no prediction
 _WHOLE = 1.2  # typical areas of what pieces make together at most
 _LESSER = 0.6  # of two linked pieces the smaller is less than this share of the larger, before sizes are known
 _NEAR = 0.35  # typical sizes between such pieces at most
@@ -77,11 +77,11 @@ def together(
     flake the longer side up to which regions are flakes or drops, which are pieces of nothing;
     pieces, overlap, gap: `blobs.pieces`, `join_overlap`, `join_gap`.
 
-    Two regions are pieces of one vehicle if they are close together inside one predicted box; or if no box predicts
-    them, one is small and near the other, and both together are no larger than a vehicle; or if they are linked and
-    together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that are
-    each like a vehicle are never pieces. The nearest pieces are joined first; a third region between two vehicles joins
-    the nearer one, not both.
+    Two regions are pieces of one vehicle if they are close together inside one predicted box; or if one is small and
+    near the other, and both together are no larger than a vehicle; or if they are linked, not in two predicted boxes,
+    and together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that
+    are each like a vehicle are never pieces. The nearest pieces are joined first; a third region between two vehicles
+    joins the nearer one, not both.
     """
     vehicle = np.empty(len(box), np.int64)
     for i in range(len(box)):
