@@ -146,17 +146,18 @@ def resample(
     weight (K, N), x (T, N, n); log_weight (K, N) of resampled rows becomes -ln N.
     """
     number = weight.shape[1]
-    chosen = np.empty(number, np.int64)
+    chosen, all_of_them = np.empty(number, np.int64), np.arange(number)
     for k in range(len(weight)):
         squares = 0.0
         for i in range(number):
             squares += weight[k, i] ** 2
         if squares * threshold * number > 1.0:
             choose(kind, weight[k], chosen, stream[k])
-            log_weight[k] = -np.log(number)
+            for i in range(number):
+                log_weight[k, i] = -np.log(number)
             copy(x[parent[k]], chosen, new[k])
         else:
-            new[k] = x[parent[k]]
+            copy(x[parent[k]], all_of_them, new[k])
 
 
 @kernel
