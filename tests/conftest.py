@@ -11,6 +11,7 @@ from hypothesis import settings
 
 from vidtrack.cli import main
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the threads of several workers wait for each other
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell switches it off for what it starts in the background

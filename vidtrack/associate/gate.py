@@ -207,9 +207,7 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 
 
 @lru_cache
-def _gated(
-    m: int, angles: tuple[int, ...]
-) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
+def _gated(m: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
     """The kernel that finds the pairs inside the gate; m and angles are compile-time constants.
 
     It returns row, measurement, d2, nis, log_s, log_l and start of the pairs. The measurements of a row ascend.
