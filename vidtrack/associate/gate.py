@@ -254,7 +254,7 @@ def _gated(m: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, F
                         for a in range(m):  # S = L L' and L^-1 v, row by row
                             v[a] = z[j, a] - zhat[t, a]
                             if wraps[a]:
-                                v[a] -= TURN * np.round(v[a] / TURN)
+                                v[a] -= TURN * np.rint(v[a] / TURN)
                             variance = cov[t, a, a] + R[j, a, a]
                             if mode == EUCLIDEAN:
                                 distance += v[a] * v[a]

@@ -93,7 +93,7 @@ def weigh(m: int, angles: tuple[int, ...] = ()) -> Kernel:
                     for a in range(m):  # v whitened: L v = z - h(x)
                         total = z[j, a] - seen[t, i, a]
                         if wraps[a]:
-                            total -= TURN * np.round(total / TURN)
+                            total -= TURN * np.rint(total / TURN)
                         for c in range(a):
                             total -= L[a, c] * v[c]
                         v[a] = total / L[a, a]
