@@ -1,15 +1,21 @@
 """What all tests share."""
 
+import gc
 import logging
 import os
 import signal
+import sys
 
 import pytest
 from hypothesis import settings
 
+from vidtrack.cli import main
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the threads of several workers wait for each other
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell switches it off for what it starts in the background
+gc.disable()  # until all tests are collected: the search for garbage among them took half of that time
 
 CLOCKED = ("tests/run/live/", "tests/serve/")
 UNCLOCKED = tuple(
@@ -67,6 +73,12 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: (not _is_clocked(item.nodeid), not item.nodeid.startswith(LONG)))
 
 
+def pytest_collection_finish():
+    """What is collected stays to the end: the search for garbage begins, and leaves it out."""
+    gc.freeze()
+    gc.enable()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """Workers take whole files; those that watch a camera or a page by the clock never run beside each other."""
@@ -87,3 +99,21 @@ def own_log():
     logger = logging.getLogger("vidtrack")
     logger.handlers = []
     logger.setLevel(logging.NOTSET)
+
+
+@pytest.fixture
+def vidtrack(tmp_path, monkeypatch, capfd):
+    """Calls a command in this process, in an empty folder; gives its exit code, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["vidtrack", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        out, err = capfd.readouterr()
+        assert "Traceback" not in out + err
+        return ended.value.code or 0, out, err
+
+    yield call
+    signal.signal(signal.SIGTERM, before)

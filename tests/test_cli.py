@@ -14,28 +14,10 @@ import pyarrow.parquet as pq
 import pytest
 from command_line import ENVIRONMENT, SAMPLES, first_frames, loop_video, start
 
-from vidtrack.cli import COMMANDS, main
+from vidtrack.cli import COMMANDS
 from vidtrack.run.run import Run
 
 CROSSING = SAMPLES / "crossing.avi"
-
-
-@pytest.fixture
-def vidtrack(tmp_path, monkeypatch, capfd):
-    """Calls a command in this process, in an empty folder; gives its exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGTERM)
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["vidtrack", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        out, err = capfd.readouterr()
-        assert "Traceback" not in out + err
-        return ended.value.code or 0, out, err
-
-    yield call
-    signal.signal(signal.SIGTERM, before)
 
 
 def rows_of(folder):

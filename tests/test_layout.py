@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -46,11 +47,20 @@ FLOORS = (
 
 
 def modules():
-    """(dotted name without `vidtrack.`, syntax tree) of every file but the package's front door."""
+    """(dotted name without `vidtrack.`, path) of every file but the package's front door."""
     for path in sorted(PACKAGE.rglob("*.py")):
         parts = path.relative_to(PACKAGE).with_suffix("").parts
         if parts != ("__init__",):
-            yield ".".join(part for part in parts if part != "__init__"), ast.parse(path.read_text(encoding="utf-8"))
+            yield ".".join(part for part in parts if part != "__init__"), path
+
+
+MODULES = dict(modules())
+
+
+@cache
+def tree_of(name):
+    """The syntax tree of a module."""
+    return ast.parse(MODULES[name].read_text(encoding="utf-8"))
 
 
 def imported(tree):
@@ -73,8 +83,9 @@ def imported(tree):
                 yield module if module.removeprefix("vidtrack.") in MODULES else node.module
 
 
-MODULES = dict(modules())
-IMPORTS = {name: set(imported(tree)) for name, tree in MODULES.items()}
+@cache
+def imports_of(name):
+    return set(imported(tree_of(name)))
 
 
 def floor(name):
@@ -87,17 +98,17 @@ def own(names):
 
 
 def users_of(library):
-    return {name for name, found in IMPORTS.items() if any(f == library or f.startswith(f"{library}.") for f in found)}
+    """The modules that import a library, or a part of it."""
+    return {name for name in MODULES if any(f"{found}.".startswith(f"{library}.") for found in imports_of(name))}
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_imports_point_downwards(name):
-    upwards = {other for other in own(IMPORTS[name]) if floor(other) < floor(name)}
+def test_imports_point_downwards():
+    upwards = {(name, other) for name in MODULES for other in own(imports_of(name)) if floor(other) < floor(name)}
     assert not upwards
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    waiting = {name: own(found) - {name} for name, found in IMPORTS.items()}
+    waiting = {name: own(imports_of(name)) - {name} for name in MODULES}
     while free := [name for name, needs in waiting.items() if not needs & set(waiting)]:
         for name in free:
             del waiting[name]
@@ -123,8 +134,8 @@ def test_nothing_is_pickled_and_nobody_prints():
     assert not users_of("pickle")
     printing = [
         name
-        for name, tree in MODULES.items()
-        for node in ast.walk(tree)
+        for name in MODULES
+        for node in ast.walk(tree_of(name))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
     ]
     assert not printing

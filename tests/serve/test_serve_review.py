@@ -298,16 +298,15 @@ def test_the_command_serves_and_ends(measures):
     assert "0 corrections in measures/corrections.csv" in err
 
 
-def test_validate_tells_the_precision_of_the_sample(measures):
+def test_validate_tells_the_precision_of_the_sample(measures, vidtrack):
     order = random_order(events := read_counted(measures).events).tolist()
     verdicts = dict(zip(order, ["right", "double", "right"], strict=False))
     CorrectionsFile(measures).replace(
         [Correction(verdict, *(getattr(events[k], name) for name in ("time_s", "gate", "direction", "run", "track_id")))
          for k, verdict in verdicts.items()]
     )  # fmt: skip
-    process = start("validate", "measures", "--json", "-", cwd=measures.parent)
-    out, err = process.communicate(timeout=HANG_S)
-    assert process.returncode == 0, err
+    code, out, err = vidtrack("validate", "measures", "--json", "-")
+    assert code == 0, err
     pooled = json.loads(out)["pooled"]
     assert (pooled["counted"], pooled["looked_at"], pooled["corrected"], pooled["sample"]) == (4, 3, 3, 3)
     assert pooled["precision"]["value"] == pytest.approx(2 / 3)
@@ -315,7 +314,6 @@ def test_validate_tells_the_precision_of_the_sample(measures):
         (("run",), "holds no crossings.csv or counts.csv"),
         (("measures", "--start", "0"), "for a count by hand"),
     ):
-        process = start("validate", *arguments, cwd=measures.parent)
-        _, err = process.communicate(timeout=HANG_S)
+        _, _, err = vidtrack("validate", *arguments)
         assert words in err
         assert err.count("\n") == 1

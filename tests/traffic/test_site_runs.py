@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from command_line import start
 from pinhole import HEIGHT, POINTS, WIDTH, Pinhole
 from synthetic_steps import make_step
 
@@ -56,19 +55,13 @@ def road(tmp_path):
     return tmp_path
 
 
-def vidtrack(*arguments, cwd):
-    process = start(*arguments, cwd=cwd)
-    out, err = process.communicate(timeout=300)
-    return process.returncode, out, err
-
-
 def rows_of(path):
     with open(path, newline="") as file:
         return list(csv.DictReader(file))
 
 
-def test_a_run_at_a_site_writes_metres_and_speeds(road):
-    code, _, err = vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)
+def test_a_run_at_a_site_writes_metres_and_speeds(road, vidtrack):
+    code, _, err = vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q")
     assert code == 0, err
     rows = rows_of(road / "out" / "tracks.csv")
     assert list(rows[0]) == [column.name for column in (*VIDEO, *ROAD)]
@@ -88,10 +81,10 @@ def test_a_run_at_a_site_writes_metres_and_speeds(road):
     assert pq.read_table(road / "out" / "tracks.parquet").equals(table)
 
 
-def test_a_run_at_a_site_can_be_exported(road):
-    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)[0] == 0
+def test_a_run_at_a_site_can_be_exported(road, vidtrack):
+    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q")[0] == 0
     (road / "site.toml").unlink()  # the run has a copy
-    code, out, err = vidtrack("export", "out", "--as", "sumo", "-o", "fcd", cwd=road)
+    code, out, err = vidtrack("export", "out", "--as", "sumo", "-o", "fcd")
     assert (code, out) == (0, "fcd\n")
     assert err.startswith("site road; 1 track; ")
     steps = ElementTree.parse(road / "fcd" / "fcd.xml").getroot()
@@ -103,18 +96,18 @@ def test_a_run_at_a_site_can_be_exported(road):
         assert np.hypot(*(np.array([float(car.get("x")), float(car.get("y"))]) - front)) < 1.0
 
 
-def test_a_run_without_metres_is_not_exported(road):
-    assert vidtrack("track", "det.txt", "-o", "out", "-q", cwd=road)[0] == 0
-    code, out, err = vidtrack("export", "out", "--as", "sumo", cwd=road)
+def test_a_run_without_metres_is_not_exported(road, vidtrack):
+    assert vidtrack("track", "det.txt", "-o", "out", "-q")[0] == 0
+    code, out, err = vidtrack("export", "out", "--as", "sumo")
     assert (code, out) == (2, "")
     assert "has no positions in metres" in err
     assert err.count("\n") == 1
 
 
-def test_a_picture_of_another_shape_is_refused_and_half_the_size_is_not(road):
+def test_a_picture_of_another_shape_is_refused_and_half_the_size_is_not(road, vidtrack):
     text = (road / "site.toml").read_text()
     (road / "square.toml").write_text(text.replace("width = 1280", "width = 1290"))
-    code, _, err = vidtrack("track", "det.txt", "--site", "square.toml", "-o", "out", "-q", cwd=road)
+    code, _, err = vidtrack("track", "det.txt", "--site", "square.toml", "-o", "out", "-q")
     assert code == 2
     assert "not the same shape" in err
     assert "Traceback" not in err
@@ -129,9 +122,9 @@ def test_a_site_without_a_calibration_gives_no_metres(road):
     assert footprints_of(None, WIDTH, HEIGHT) is None
 
 
-def test_radar_has_no_site(tmp_path):
+def test_radar_has_no_site(tmp_path, vidtrack):
     (tmp_path / "plots.csv").write_text("scan,time_s,x_m,y_m\n0,0,1,1\n")
-    code, _, err = vidtrack("radar", "plots.csv", "--set", "output.site=site.toml", cwd=tmp_path)
+    code, _, err = vidtrack("radar", "plots.csv", "--set", "output.site=site.toml")
     assert code == 2
     assert "setting output.site has no effect on radar plots" in err
 
@@ -157,14 +150,14 @@ def test_a_part_of_a_live_run_has_the_same_columns(road):
 GATE = "[gates.near]\nline = [[1, 360], [1279, 360]]\n"
 
 
-def test_a_run_is_measured_at_the_site_as_it_was(road):
+def test_a_run_is_measured_at_the_site_as_it_was(road, vidtrack):
     """The site's file moved its gate away since."""
     drawn = (road / "site.toml").read_text()
     (road / "site.toml").write_text(drawn + GATE)
-    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q", cwd=road)[0] == 0
+    assert vidtrack("track", "det.txt", "--site", "site.toml", "-o", "out", "-q")[0] == 0
     assert (road / "out" / "site.toml").read_text() == drawn + GATE
     (road / "site.toml").write_text(drawn + GATE.replace("360", "3"))
-    code, out, err = vidtrack("measure", "out", cwd=road)
+    code, out, err = vidtrack("measure", "out")
     assert (code, out) == (0, "runs/out-measures\n")
     assert "1 crossings" in err
 
@@ -186,8 +179,8 @@ def test_without_a_site_that_all_runs_have_one_must_be_given(tmp_path):
         site_of([a, str(tmp_path)])
 
 
-def test_calibrate_draws_and_reports(road):
-    code, out, err = vidtrack("calibrate", "site.toml", "-o", "check", "--json", "report.json", cwd=road)
+def test_calibrate_draws_and_reports(road, vidtrack):
+    code, out, err = vidtrack("calibrate", "site.toml", "-o", "check", "--json", "report.json")
     assert code == 0, err
     assert "8.00 m above the road" in out.replace("\n", " ")
     report = json.loads((road / "report.json").read_text())
@@ -201,21 +194,21 @@ def test_calibrate_draws_and_reports(road):
     assert (picture[y - 1 : y + 2, x - 1 : x + 2] != 90).any()  # the line x = 0 goes through here
 
 
-def test_calibrate_takes_a_picture_of_another_size(road):
+def test_calibrate_takes_a_picture_of_another_size(road, vidtrack):
     cv2.imwrite(str(road / "still.png"), np.full((HEIGHT // 2, WIDTH // 2, 3), 30, np.uint8))
-    code, _, err = vidtrack("calibrate", "site.toml", "--picture", "still.png", "-o", "check", "-q", cwd=road)
+    code, _, err = vidtrack("calibrate", "site.toml", "--picture", "still.png", "-o", "check", "-q")
     assert code == 0, err
     assert cv2.imread(str(road / "check" / "calibration.png")).shape == (HEIGHT // 2, WIDTH // 2, 3)
 
 
-def test_calibrate_says_which_pair_is_wrong(road):
+def test_calibrate_says_which_pair_is_wrong(road, vidtrack):
     picture = CAMERA.picture(POINTS)
     picture[3] += 30
     (road / "site.toml").write_text(site_text(picture))
-    code, out, _ = vidtrack("calibrate", "site.toml", "--json", "-", cwd=road)
+    code, out, _ = vidtrack("calibrate", "site.toml", "--json", "-")
     assert code == 1
     assert json.loads(out)["wrong"] == [4]
-    code, out, err = vidtrack("calibrate", "site.toml", "-q", cwd=road)
+    code, out, err = vidtrack("calibrate", "site.toml", "-q")
     assert (code, out) == (1, "")
     assert err.startswith("vidtrack: site.toml: pair 4 of the calibration")
     assert err.count("\n") == 1
@@ -229,17 +222,17 @@ def test_calibrate_says_which_pair_is_wrong(road):
         ("[site", "is not valid TOML"),
     ],
 )
-def test_calibrate_refuses_in_one_line(tmp_path, text, words):
+def test_calibrate_refuses_in_one_line(tmp_path, text, words, vidtrack):
     (tmp_path / "site.toml").write_text(text)
-    code, out, err = vidtrack("calibrate", "site.toml", cwd=tmp_path)
+    code, out, err = vidtrack("calibrate", "site.toml")
     assert code == 2
     assert words in err
     assert not out
     assert err.count("\n") == 1
 
 
-def test_calibrate_needs_a_file(tmp_path):
-    code, _, err = vidtrack("calibrate", "none.toml", cwd=tmp_path)
+def test_calibrate_needs_a_file(tmp_path, vidtrack):
+    code, _, err = vidtrack("calibrate", "none.toml")
     assert code == 2
     assert "cannot read site none.toml" in err
 

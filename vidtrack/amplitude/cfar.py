@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import gammaln
 
+from vidtrack.arrays.median import ranked
 from vidtrack.arrays.types import Floats
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
@@ -92,7 +93,9 @@ def _reference_levels(power: Floats, cells: int, guard: int, rank: int) -> Float
             right = min(cells, max(0, n - 1 - i - guard))
             left = max(min(left, cells // 2), cells - right)
             right = cells - left
-            around[:left] = power[row, i - guard - left : i - guard]
-            around[left:] = power[row, i + guard + 1 : i + guard + 1 + right]
-            levels[row, i] = np.sort(around)[rank - 1] if rank else around.mean()
+            for k in range(left):
+                around[k] = power[row, i - guard - left + k]
+            for k in range(right):
+                around[left + k] = power[row, i + guard + 1 + k]
+            levels[row, i] = ranked(around, rank - 1) if rank else around.mean()
     return levels

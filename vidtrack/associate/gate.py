@@ -137,8 +137,8 @@ class Gate:
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
-        gated = _gated(zhat.shape[1], mode, angles)
-        row, measurement, d2, nis, log_s, log_l, start = gated(zhat, cov, own, limit, scan.z, scan.R, runs)
+        gated = _gated(zhat.shape[1], angles)
+        row, measurement, d2, nis, log_s, log_l, start = gated(mode, zhat, cov, own, limit, scan.z, scan.R, runs)
         cost = d2 if mode == EUCLIDEAN else d2 + log_s
         return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
 
@@ -207,10 +207,8 @@ def _reach(cov: Floats, R: Floats, limit: Floats, mode: int) -> Floats:
 
 
 @lru_cache
-def _gated(
-    m: int, mode: int, angles: tuple[int, ...]
-) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
-    """The kernel that finds the pairs inside the gate; m, mode and angles are compile-time constants.
+def _gated(m: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]]:
+    """The kernel that finds the pairs inside the gate; m and angles are compile-time constants.
 
     It returns row, measurement, d2, nis, log_s, log_l and start of the pairs. The measurements of a row ascend.
     """
@@ -218,7 +216,7 @@ def _gated(
     turns = 1 if any(a in angles for a in range(2)) else 0
 
     def gated(
-        zhat: Floats, cov: Floats, own: Ints, limit: Floats, z: Floats, R: Floats, run: Ints
+        mode: int, zhat: Floats, cov: Floats, own: Ints, limit: Floats, z: Floats, R: Floats, run: Ints
     ) -> tuple[Ints, Ints, Floats, Floats, Floats, Floats, Ints]:
         rows = len(zhat)
         reach = _reach(cov, R, limit, mode)
@@ -256,7 +254,7 @@ def _gated(
                         for a in range(m):  # S = L L' and L^-1 v, row by row
                             v[a] = z[j, a] - zhat[t, a]
                             if wraps[a]:
-                                v[a] -= TURN * np.round(v[a] / TURN)
+                                v[a] -= TURN * np.rint(v[a] / TURN)
                             variance = cov[t, a, a] + R[j, a, a]
                             if mode == EUCLIDEAN:
                                 distance += v[a] * v[a]
@@ -295,7 +293,7 @@ def _gated(
             log_l[p] = -0.5 * (nis[p] + log_s[p] + m * np.log(TURN))
         return row, measurement, d2, nis, log_s, log_l, start
 
-    return specialised(gated, m, mode, *angles)
+    return specialised(gated, m, *angles)
 
 
 @inlined

@@ -118,7 +118,7 @@ def _within(z: Floats, seen: Floats, limit: Floats, wraps: Mask) -> bool:
     for a in range(len(z)):
         error = z[a] - seen[a]
         if wraps[a]:
-            error -= TURN * np.round(error / TURN)
+            error -= TURN * np.rint(error / TURN)
         if not abs(error) < limit[a]:
             return False
     return True

@@ -164,7 +164,7 @@ def mixture_update(m: int, n: int, angles: tuple[int, ...] = (), *, positions: b
                 for a in range(m):
                     v[a] = z[j, a] - zhat[t, a]
                     if wraps[a]:
-                        v[a] -= TURN * np.round(v[a] / TURN)
+                        v[a] -= TURN * np.rint(v[a] / TURN)
                 for i in range(n):
                     total = 0.0
                     for a in range(m):

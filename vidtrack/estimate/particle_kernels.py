@@ -93,7 +93,7 @@ def weigh(m: int, angles: tuple[int, ...] = ()) -> Kernel:
                     for a in range(m):  # v whitened: L v = z - h(x)
                         total = z[j, a] - seen[t, i, a]
                         if wraps[a]:
-                            total -= TURN * np.round(total / TURN)
+                            total -= TURN * np.rint(total / TURN)
                         for c in range(a):
                             total -= L[a, c] * v[c]
                         v[a] = total / L[a, a]
@@ -146,17 +146,18 @@ def resample(
     weight (K, N), x (T, N, n); log_weight (K, N) of resampled rows becomes -ln N.
     """
     number = weight.shape[1]
-    chosen = np.empty(number, np.int64)
+    chosen, all_of_them = np.empty(number, np.int64), np.arange(number)
     for k in range(len(weight)):
         squares = 0.0
         for i in range(number):
             squares += weight[k, i] ** 2
         if squares * threshold * number > 1.0:
             choose(kind, weight[k], chosen, stream[k])
-            log_weight[k] = -np.log(number)
+            for i in range(number):
+                log_weight[k, i] = -np.log(number)
             copy(x[parent[k]], chosen, new[k])
         else:
-            new[k] = x[parent[k]]
+            copy(x[parent[k]], all_of_them, new[k])
 
 
 @kernel

@@ -137,18 +137,23 @@ def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: flo
     return index
 
 
-@kernel
 def doubles(start: Ints, box: Floats, score: Floats) -> Mask:
     """(N,) boxes (N, 4) that show an object once more: a better one of the same frame, itself no double, is the SAME.
 
     Boxes start[k]..start[k + 1] are those of frame k; of equal scores (N,) the first is better.
     """
+    frame = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    return _doubles(start, np.lexsort((-score, frame)), box)
+
+
+@kernel
+def _doubles(start: Ints, order: Ints, box: Floats) -> Mask:
+    """As `doubles`; order (N,) has the boxes of each frame with the best first."""
     double = np.zeros(len(box), np.bool_)
     for k in range(len(start) - 1):
-        order = start[k] + np.argsort(-score[start[k] : start[k + 1]], kind="mergesort")
-        for n in range(len(order)):
+        for n in range(start[k], start[k + 1]):
             a = box[order[n]]
-            for better in order[:n]:
+            for better in order[start[k] : n]:
                 b = box[better]
                 both = common(a, b)
                 if double[better] or both <= 0:

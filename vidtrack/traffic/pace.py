@@ -62,8 +62,11 @@ def _follow(slot: Ints, t: Floats, place: Floats, by_px: Floats, state: Floats, 
         x, P = now[_X:_P], now[_P:].reshape(4, 4)
         F = np.eye(4)
         F[0, 2] = F[1, 3] = dt
-        x[:] = F @ x
-        P[:] = F @ P @ F.T
+        moved, grown = F @ x, F @ P @ F.T
+        for a in range(4):
+            x[a] = moved[a]
+            for b in range(4):
+                P[a, b] = grown[a, b]
         for axis in range(2):
             P[axis, axis] += _JOLT * dt**3 / 3
             P[axis, axis + 2] += _JOLT * dt**2 / 2
@@ -81,8 +84,10 @@ def _follow(slot: Ints, t: Floats, place: Floats, by_px: Floats, state: Floats, 
                 x += gain @ off
                 P -= gain @ P[:2, :].copy()
                 now[_FITTED] = t[i]
-        v[i] = x[2:]
-        cov[i] = P[2:, 2:]
+        for a in range(2):
+            v[i, a] = x[2 + a]
+            for b in range(2):
+                cov[i, a, b] = P[2 + a, 2 + b]
 
 
 @kernel
@@ -90,7 +95,9 @@ def _begin(now: Floats, t: float, place: Floats, by_px: Floats) -> None:
     """Write the state of a track that is seen for the first time."""
     now[:] = 0.0
     now[_T] = now[_FITTED] = t
-    now[_X : _X + 2] = place
-    P = now[_P:].reshape(4, 4)
-    P[:2, :2] = _EDGE_PX**2 * by_px @ by_px.T
+    P, R = now[_P:].reshape(4, 4), _EDGE_PX**2 * by_px @ by_px.T
+    for a in range(2):
+        now[_X + a] = place[a]
+        for b in range(2):
+            P[a, b] = R[a, b]
     P[2, 2] = P[3, 3] = _FIRST_M_S**2

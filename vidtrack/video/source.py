@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import glob
+from collections import deque
 from collections.abc import Iterator
 from contextlib import closing
 from itertools import chain
@@ -17,10 +18,11 @@ from vidtrack.video.frame import Frame
 from vidtrack.video.pictures import ImageSequence, images_in, images_like
 from vidtrack.video.planes import matched, to_frame
 from vidtrack.video.readahead import ReadAhead
-from vidtrack.video.span import Span
+from vidtrack.video.span import ROUNDING_S, Span
 from vidtrack.video.stats import SourceStats
 
 _DEPTH = 4  # frames read ahead: enough to even out key frames, 50 MB at 4K
+_KEPT_BYTES = 100_000_000  # of an opening; ten seconds of 640x360 at 25 frames/s are 86 MB
 
 
 def open_source(path: str, settings: SourceSettings) -> Source:
@@ -112,12 +114,13 @@ class Source:
         self.height, self.width = first.shape
         self.frames = None if pictures.frames is None else len(self._span.frames(self.fps, pictures.frames))
         self._ahead = ReadAhead(self._alike(self._in_span(chain([first], frames)), first), _DEPTH)
+        self._opened: deque[Frame] = deque()  # frames of the opening, kept for the reading
 
     def __iter__(self) -> Source:
         return self
 
     def __next__(self) -> Frame:
-        frame = next(self._ahead)
+        frame = self._opened.popleft() if self._opened else next(self._ahead)
         self.stats.frames_read += 1
         return frame
 
@@ -130,18 +133,36 @@ class Source:
         self.close()
 
     def opening(self, seconds: float, end_s: float | None, every_s: float = 0.0) -> Iterator[Frame]:
-        """The frames of its first seconds, at most to end_s, from a second reading; their numbers are 0.
+        """The frames of its first seconds, at most to end_s, before it is iterated.
 
-        Some of those less than `every_s` apart may be missing.
+        They are kept until then if they are few or small. Others are read twice: their numbers are 0, and some of those
+        less than `every_s` apart may be missing.
         """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
+        if end_s <= self._span.end_s and self._bytes(end_s - begin_s) <= _KEPT_BYTES:
+            yield from self._kept(end_s)
+            return
         with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
             for picture in again.between(begin_s, end_s, every_s):
                 yield matched(to_frame(0, *picture), self._first)
 
+    def _bytes(self, seconds: float) -> float:
+        """The size of so many seconds in memory."""
+        planes = (self._first.y, self._first.u, self._first.v)
+        return seconds * self.fps * sum(plane.size for plane in planes if plane is not None)
+
+    def _kept(self, end_s: float) -> Iterator[Frame]:
+        """The frames to end_s, each kept for the reading; so is the one after them, since it is read by then."""
+        for frame in self._ahead:
+            self._opened.append(frame)
+            if frame.time_s > end_s + ROUNDING_S:
+                break
+            yield frame
+
     def close(self) -> None:
         """Stop reading; may be called at any time and again."""
+        self._opened.clear()
         self._ahead.close()
         self._pictures.close()
 

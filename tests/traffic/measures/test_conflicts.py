@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drawn_runs import CALIBRATED, SITE, along, site, write_run
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from vidtrack.simulate import simulate_road
@@ -183,7 +183,8 @@ def curved(rng, count, fps):
 
 
 @settings(max_examples=8, deadline=None)
-@given(st.integers(0, 1000), st.integers(30, 400))
+@example(seed=239, block=30)  # a time of 4.87 s, between rows that are further apart
+@given(seed=st.integers(0, 1000), block=st.integers(30, 400))
 def test_post_encroachment_times_are_those_of_brute_force(seed, block):
     fps = 10.0
     track, t, xy, v = curved(np.random.default_rng(seed), 5, fps)
@@ -206,8 +207,10 @@ def test_post_encroachment_times_are_those_of_brute_force(seed, block):
                 assert sampled - 2 / fps - 1e-9 <= pet <= sampled + 1e-9
             elif 0 < sampled < 5:  # a short time may not differ from 0 by what it is off
                 assert np.isnan(pet) or sampled - 2 / fps - 1e-9 <= pet <= sampled + 1e-9
-            else:  # in one place at one time: an error, and no encroachment
+            elif sampled == 0:  # in one place at one time: an error, and no encroachment
                 assert np.isnan(pet)
+            else:  # rows may miss by what they are apart that two meet within 5 s
+                assert np.isnan(pet) or pet > 5 - 2 / fps
 
 
 def bend(track, start_s, turn_rad, speed=6.0, radius=7.0):

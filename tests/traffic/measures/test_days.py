@@ -7,7 +7,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from command_line import start
 from drawn_runs import CALIBRATED, FPS, SITE, site, straight, write_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -210,15 +209,14 @@ def test_a_run_that_is_given_twice_is_not_counted_twice(tmp_path):
     assert day.tables["trips"].num_rows == 2
 
 
-def test_the_folder_above_the_parts_stands_for_them(tmp_path):
+def test_the_folder_above_the_parts_stands_for_them(tmp_path, vidtrack):
     whole = write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], began=BEGAN)
     (tmp_path / "cam").mkdir()
     for part, name in zip(parts_of(whole, 30), ("2026-06-01T05-00-00Z", "2026-06-01T05-00-30Z"), strict=True):
         Path(part).rename(tmp_path / "cam" / name)
     (tmp_path / "site.toml").write_text(TOML.format(name="a", gate="g"))
-    process = start("measure", "cam", "--site", "site.toml", "-o", "out", "--json", "-", cwd=tmp_path)
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == 0, err
+    code, out, err = vidtrack("measure", "cam", "--site", "site.toml", "-o", "out", "--json", "-")
+    assert code == 0, err
     report = json.loads(out)
     assert [Path(run["folder"]).parent.name for run in report["runs"]] == ["cam", "cam"]
     assert (report["watched_s"], report["crossings"]) == (60, 1)
@@ -329,13 +327,12 @@ TOML = '[site]\nname = "{name}"\nwidth = 640\nheight = 480\n[gates."{gate}"]\nli
     ],
     ids=["a tag", "a formula", "no gates", "another picture"],
 )
-def test_the_command_refuses_in_one_line_and_keeps_the_run(tmp_path, text, words):
+def test_the_command_refuses_in_one_line_and_keeps_the_run(tmp_path, text, words, vidtrack):
     run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
     before = {path.name: path.read_bytes() for path in run.iterdir()}
     (tmp_path / "site.toml").write_text(text)
-    process = start("measure", "run", "--site", "site.toml", "-o", "out", cwd=tmp_path)
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == 2
+    code, out, err = vidtrack("measure", "run", "--site", "site.toml", "-o", "out")
+    assert code == 2
     assert words in err
     assert err.count("\n") == 1
     assert not out
@@ -343,12 +340,11 @@ def test_the_command_refuses_in_one_line_and_keeps_the_run(tmp_path, text, words
     assert {path.name: path.read_bytes() for path in run.iterdir()} == before
 
 
-def test_the_command_writes_each_table_twice(tmp_path):
+def test_the_command_writes_each_table_twice(tmp_path, vidtrack):
     write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)])
     (tmp_path / "site.toml").write_text(TOML.format(name="a", gate="g"))
-    process = start("measure", "run", "--site", "site.toml", "-o", "out", "--json", "report.json", cwd=tmp_path)
-    out, err = process.communicate(timeout=120)
-    assert process.returncode == 0, err
+    code, out, err = vidtrack("measure", "run", "--site", "site.toml", "-o", "out", "--json", "report.json")
+    assert code == 0, err
     assert out == "out\n"
     assert "1 crossings" in err
     assert "no conflicts without a calibration" in err

@@ -17,6 +17,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.run.video import build_detector, look_ahead, track
 from vidtrack.video.background import create
 from vidtrack.video.frame import Frame
+from vidtrack.video.pictures import ImageSequence
 from vidtrack.video.source import open_source
 
 SHAPE, MARGIN, FPS = (120, 160), 20, 10
@@ -114,6 +115,24 @@ def test_the_opening_is_the_frames_of_the_span_and_tells_no_warning_twice(tmp_pa
     assert [frame.time_s for frame in ahead] == pytest.approx([frame.time_s for frame in whole if frame.time_s < 0.43])
     assert all(np.array_equal(a.y, b.y) for a, b in zip(ahead, whole, strict=False))
     assert sum("carries no time" in record.message for record in caplog.records) == 1
+
+
+@pytest.mark.parametrize(("end_s", "room", "again"), [(None, 10**6, 0), (None, 10**4, 1), (0.2, 10**6, 1)])
+def test_an_opening_is_read_twice_only_if_it_is_large_or_longer_than_the_source(
+    tmp_path, monkeypatch, end_s, room, again
+):
+    for k in range(12):
+        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), np.full((48, 64), 10 * k, np.uint8))
+    begun, between = [], ImageSequence.between
+    monkeypatch.setattr(ImageSequence, "between", lambda self, *span: begun.append(span) or between(self, *span))
+    monkeypatch.setattr("vidtrack.video.source._KEPT_BYTES", room)
+    with open_source(str(tmp_path), SourceSettings(fps=10, end_s=end_s)) as source:
+        ahead = [frame.y[0, 0] for frame in source.opening(0.5, None)]
+        whole = [(frame.index, frame.y[0, 0]) for frame in source]
+    assert ahead == [0, 10, 20, 30, 40, 50]
+    assert whole == [(k, 10 * k) for k in range(12 if end_s is None else 3)]
+    assert source.stats.frames_read == len(whole)
+    assert len(begun) == again
 
 
 def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):

@@ -51,7 +51,7 @@ class Frame:
         u = np.stack([np.cos(HEADING), np.sin(HEADING)], axis=-1) @ T.T
         x = np.stack([np.zeros(2), u[:, 0], np.zeros(2), u[:, 1]], axis=-1)
         Q = MODEL.process_noise(1.0, x, np.zeros((2, 4, 4)), np.full(2, 100), np.ones(2))
-        return cls(PREDICTED @ T.T, Q[:, ::2, ::2], MEASURED @ T.T, u)
+        return cls(PREDICTED @ T.T, Q[:, ::2, ::2].copy(), MEASURED @ T.T, u)
 
     def d2(self, distance: Distance) -> Floats:
         """(2, 2) squared distances of targets (rows) to measurements, by the tracker's gate."""

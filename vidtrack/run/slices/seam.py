@@ -82,7 +82,7 @@ def _matched(pairs: Sequence[tuple[Step, Step]], plane: Floats | None, left: Int
         rows = np.searchsorted(left, one.tracks.id[i]), np.searchsorted(right, other.tracks.id[j])
         both[rows] += 1
         agree[rows] += box_iou(one.tracks.box[i], box[j]) >= AGREE
-    row, column = np.nonzero((agree > 0) & (agree >= AGREE * both))
+    row, column = (part.copy() for part in np.nonzero((agree > 0) & (agree >= AGREE * both)))  # each by itself
     none = np.zeros(len(left))
     taken = assign(starts(row, len(left)), column, -agree[row, column].astype(float), none, len(right))
     kept = np.flatnonzero(taken >= 0)

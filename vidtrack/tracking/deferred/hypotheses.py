@@ -127,7 +127,9 @@ def _normalised(first: Ints, log_p: Floats) -> Floats:
     out = np.empty(len(log_p))
     for c in range(len(first) - 1):
         a, b = first[c], first[c + 1]
-        out[a:b] = log_p[a:b] - log_sum(log_p[a:b])
+        total = log_sum(log_p[a:b])
+        for h in range(a, b):
+            out[h] = log_p[h] - total
     return out
 
 

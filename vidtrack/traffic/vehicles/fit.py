@@ -83,18 +83,22 @@ def fit(
         a, b = first[i], first[i + 1]
         size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
         speed[asked_of[i] : asked_of[i + 1]] = np.nan
-        path[a:b] = start[a:b]
+        for k in range(a, b):
+            path[k, 0], path[k, 1] = start[k, 0], start[k, 1]
         driven = np.hypot(start[b - 1, 0] - start[a, 0], start[b - 1, 1] - start[a, 1]) if b > a else 0.0
         if b - a < _LEAST_KNOTS or not driven > _LEAST_PATH_M:
             continue
-        size[i] = MEAN
+        for s in range(SIZE):
+            size[i, s] = MEAN[s]
         n = 2 * (b - a)
         misfit = strange = 0.0
         for coarse in _COARSE:
             _headings(path[a:b], heading)
             misfit, strange = _normal(t[a:b], edge[a:b], rows[a:b], path[a:b], heading, size[i], G, up, coarse,
                                       band[:n], right[:n], whole, rest)  # fmt: skip
-            coupling[:n] = right[:n, :SIZE]
+            for k in range(n):
+                for s in range(SIZE):
+                    coupling[k, s] = right[k, s]
             _factor(band[:n])
             _solve(band[:n], right[:n])
             _eliminate(coupling[:n], right[:n], whole, rest)
@@ -110,7 +114,10 @@ def fit(
                     moved = max(moved, abs(change))
             if coarse == 1.0 and moved < _STILL_M:
                 break
-        cov[i] = np.linalg.inv(whole)
+        inverse = np.linalg.inv(whole)
+        for s in range(SIZE):
+            for u in range(SIZE):
+                cov[i, s, u] = inverse[s, u]
         quality[i] = max(misfit, _LEAST_MISFIT)
         if strange > _FAR_SHARE:
             size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
