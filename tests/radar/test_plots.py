@@ -455,6 +455,7 @@ DAY = [900 * k for k in range(96)]
         ("head", ["north", "south", "west"], "where column 'head' changes: if a day ended"),
         ("candidate", ["a", "b"], "where column 'candidate' changes: if a day ended"),
         ("serial", ["10010001", "10010002"], "where column 'serial' changes: if a day ended"),
+        ("serial", ["10010101", "10010102"], "where column 'serial' changes: if a day ended"),
         ("weekday", ["Mon", "Tue"], "where column 'weekday' changes: .*, or name the column 'date'"),
         ("date", ["1", "2", "1", "2"], "where it began before: if the clock was set"),
         ("began", ["2026-07-01", "2026-07-02"], ""),
