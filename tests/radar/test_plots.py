@@ -138,6 +138,45 @@ def test_a_pass_over_a_sector_is_one_scan_where_rounded_times_part_it(tmp_path, 
     assert "passes over a sector, the plots of one pass are one scan; 57 scans, 4 s apart" in caplog.text
 
 
+@pytest.mark.parametrize("step_s", [0.0, 0.5])
+@pytest.mark.parametrize("targets", [3, 10])
+def test_passes_of_an_antenna_back_and_forth_are_scans(tmp_path, caplog, targets, step_s):
+    rng = np.random.default_rng(0)
+    part = rng.uniform(0.02, 0.98, targets)
+    seen = sorted((4 * (k + (a if k % 2 else 1 - a)), k, n) for k in range(80) for n, a in enumerate(part))
+    seen = [one for one in seen if rng.random() < 0.9]
+    rows = [
+        f"{np.floor(t / step_s) * step_s if step_s else t:.4f},{5e3 + 4e3 * n + k:.0f},{90 * part[n] - 30:.2f}"
+        for t, k, n in seen
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    number = np.array([k for _, k, _ in seen])
+    assert (plots.scan - plots.scan[0] == number - number[0]).mean() > 0.98
+    assert "azimuths and times follow an antenna, its passes back and forth are scans" in caplog.text
+
+
+@pytest.mark.parametrize("step_s", [0.0, 0.5, 1.0])
+def test_turns_to_the_left_are_scans(tmp_path, caplog, step_s):
+    rng = np.random.default_rng(0)
+    turn, part = np.divmod(np.sort(rng.uniform(0, 40, 400)), 1)
+    times = 4 * (turn + part)
+    told = np.floor(times / step_s) * step_s if step_s else times
+    rows = [f"{t:.4f},{rng.uniform(5e3, 5e4):.1f},{360 - 360 * a:.3f}" for t, a in zip(told, part, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert (plots.scan == turn).mean() > 0.99
+    assert "its turns are scans; 40 scans, 4" in caplog.text
+
+
+@pytest.mark.parametrize("turn_s", [2.5, 4.0])
+def test_turns_of_a_dense_radar_are_scans_where_times_are_in_whole_seconds(tmp_path, turn_s):
+    rng = np.random.default_rng(0)
+    turn, part = np.divmod(np.sort(rng.uniform(0, 20, 12_000)), 1)
+    times = np.floor(turn_s * (turn + part)).astype(int)
+    rows = [f"{t},{rng.uniform(5e3, 5e4):.2f},{360 * a:.3f}" for t, a in zip(times, part, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert (plots.scan == turn).mean() > 0.99
+
+
 @pytest.mark.parametrize("header", ["time_s,range_m,azimuth_deg", "time_s,x_m,y_m"])
 @pytest.mark.parametrize("at_random", [False, True])
 def test_vehicles_that_pass_a_radar_that_stares_one_after_the_other_are_no_antenna(tmp_path, caplog, header, at_random):
@@ -416,6 +455,7 @@ DAY = [900 * k for k in range(96)]
         ("head", ["north", "south", "west"], "where column 'head' changes: if a day ended"),
         ("candidate", ["a", "b"], "where column 'candidate' changes: if a day ended"),
         ("serial", ["10010001", "10010002"], "where column 'serial' changes: if a day ended"),
+        ("serial", ["10010101", "10010102"], "where column 'serial' changes: if a day ended"),
         ("weekday", ["Mon", "Tue"], "where column 'weekday' changes: .*, or name the column 'date'"),
         ("date", ["1", "2", "1", "2"], "where it began before: if the clock was set"),
         ("began", ["2026-07-01", "2026-07-02"], ""),

@@ -74,3 +74,11 @@ def _circular(angle: Floats, shrink: Floats) -> tuple[Floats, Floats, Floats, Fl
     """Sine and cosine of the measured angles, and the means of sin 2a and cos 2a of the true angles."""
     twice = shrink**4
     return np.sin(angle), np.cos(angle), twice * np.sin(2 * angle), twice * np.cos(2 * angle)
+
+
+def sector(angle: Floats) -> tuple[float, float]:
+    """Where the smallest sector with all angles (N,) begins, and its width: the circle without the widest gap [rad]."""
+    turn = np.sort(angle)
+    gap = np.diff(turn, append=turn[0] + 2 * np.pi)
+    widest = int(gap.argmax())
+    return float(turn[(widest + 1) % len(turn)]), float(2 * np.pi - gap[widest])

@@ -5,11 +5,14 @@ from __future__ import annotations
 import difflib
 import logging
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
+from vidtrack.radar.both_ways import both_ways
 from vidtrack.radar.checks import CARTESIAN, KNOWN, POLAR, TIME, possible_times
+from vidtrack.radar.coordinates import sector
 from vidtrack.radar.feeds.messages import Kind, Message, Messages
 from vidtrack.radar.feeds.pace import ONE_BY_ONE, USUAL_S, Turns, are_apart, pace_of, turn_within
 from vidtrack.radar.one_clock import on_one_clock
@@ -20,6 +23,11 @@ _log = logging.getLogger(__name__)
 
 EVENLY = 0.1
 """Usual steps; how far a step may be from a multiple of the usual one to count as such."""
+
+NARROW = 1e-9
+"""rad; least width of a sector."""
+CELLS, DIRECTIONS = 32, 8
+"""Parts of a sector, and the number in which plots must be: a few directions in turn fit many antennas."""
 
 
 def numbered(table: Table, place: tuple[float, float]) -> Table:
@@ -37,10 +45,10 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
     table = on_one_clock(table)
     time_s = possible_times(table.columns[time])
     times, member, steps = _distinct(time_s)
-    one_by_one = _one_by_one(steps, len(member))
     coarse_s = float(np.quantile(steps, 0.1)) if len(steps) else np.inf  # times that several plots share
+    one_by_one = _one_by_one(steps, len(member), coarse_s)
     polar = _polar(table, time_s, place)
-    turned = _turned(table, *polar, 0.0 if one_by_one else coarse_s) if polar else None
+    turned = _turned(table, *polar, coarse_s, one_by_one) if polar else None
     if turned is not None:
         return replace(table, columns=table.columns | {scan: turned})
     told = "plots of the same time are one scan"
@@ -68,40 +76,87 @@ def _distinct(time_s: Floats) -> tuple[Floats, Ints, Floats]:
     return times, member, np.diff(times[np.isfinite(times)])
 
 
-def _one_by_one(steps: Floats, plots: int) -> bool:
-    """Whether nearly each of the plots has its own time, with steps (N,) that are not multiples of the usual one."""
+def _one_by_one(steps: Floats, plots: int, coarse_s: float) -> bool:
+    """Whether nearly each of the plots has its own time, with steps (N,) that are no multiples of the usual one, nor of
+    coarse_s.
+    """
     if len(steps) < 2 or len(steps) < ONE_BY_ONE * plots:
         return False
-    passed = steps / np.median(steps)
-    return bool((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean() > 0.5)
+    passed = steps / np.array([[np.median(steps)], [coarse_s]])
+    return bool(((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean(axis=1) > 0.5).all())
 
 
-def _turned(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:
-    """The turn of a rotating antenna that each row of the table is of, by plots of times in steps of coarse_s.
+class _Antenna(NamedTuple):
+    """Plots (N,) in the scans of an antenna.
 
-    rows  (N,) of the plots
+    number  (N,) of the scan of each
+    scan_s  s; duration of a scan
+    told    what is a scan
+    unsure  whether chance may make scans whose times are in another order
+    """
+
+    number: Ints
+    scan_s: float
+    told: str
+    unsure: bool
+
+    @classmethod
+    def turning(cls, plots: Messages, turns: Turns, coarse_s: float) -> _Antenna:
+        """One that turns to the right, by plots of times in steps of coarse_s."""
+        number = np.floor(turns.progress(plots)).astype(np.int64)
+        return cls(number, turns.period_s, "turns", coarse_s > 0 or turns.period_s > USUAL_S)
+
+
+def _turned(table: Table, rows: Ints, plots: Messages, coarse_s: float, one_by_one: bool) -> Floats | None:
+    """The turn of a rotating antenna, or its pass over a sector, that each row of the table is of.
+
+    rows        (N,) of the plots
+    coarse_s    step of their times
+    one_by_one  whether nearly each has its own time, which is not rounded
     None: they follow no antenna.
     """
-    pace = pace_of(plots, None, coarse_s)
-    if not isinstance(pace, Turns):
-        short_s = turn_within(plots, coarse_s) if 0 < coarse_s < np.inf else None
-        if short_s is not None:
-            _log.warning(
-                "%s: azimuths follow an antenna with turns of %.3g s, but times are in steps of %.3g s, too coarse to "
-                "tell its turns: give a column 'scan', or finer times", table.path, short_s, coarse_s,
-            )  # fmt: skip
+    antenna = _antenna(plots, coarse_s, one_by_one)
+    if isinstance(antenna, float):
+        _log.warning(
+            "%s: azimuths follow an antenna with turns of %.3g s, but times are in steps of %.3g s, too coarse to "
+            "tell its turns: give a column 'scan', or finer times", table.path, antenna, coarse_s,
+        )  # fmt: skip
+    if not isinstance(antenna, _Antenna):
         return None
-    turn = closed_up(np.floor(pace.progress(plots)).astype(np.int64), plots.time_s)
-    unsure = coarse_s > 0 or pace.period_s > USUAL_S
-    if unsure and (np.diff(scan_times(turn, plots.time_s)[2]) < 0).any():
+    number = closed_up(antenna.number, plots.time_s)
+    if antenna.unsure and (np.diff(scan_times(number, plots.time_s)[2]) < 0).any():
         return None  # the check of order would refuse the table
     scan = np.zeros(len(table.line))
-    scan[rows] = turn - turn.min()
+    scan[rows] = number - number.min()
     _log.warning(
-        "%s has no column 'scan': azimuths and times follow an antenna, its turns are scans; %d scans, %.6g s apart",
-        table.path, scan.max() + 1, pace.period_s,
+        "%s has no column 'scan': azimuths and times follow an antenna, its %s are scans; %d scans, %.6g s apart",
+        table.path, antenna.told, scan.max() + 1, antenna.scan_s,
     )  # fmt: skip
     return scan
+
+
+def _antenna(plots: Messages, coarse_s: float, one_by_one: bool) -> _Antenna | float | None:
+    """The scans of an antenna that turns to the right, sweeps back and forth, or turns to the left, as in a mirror.
+
+    The duration of a turn [s] that times in steps of coarse_s are too coarse to tell; None: plots follow no antenna.
+    """
+    step_s = 0.0 if one_by_one else coarse_s
+    if isinstance(turns := pace_of(plots, None, step_s), Turns):
+        return _Antenna.turning(plots, turns, step_s)
+    if not are_apart(plots):
+        return None
+    if (swept := both_ways(plots.time_s, plots.v, coarse_s)) is not None:
+        return _Antenna(*swept, "passes back and forth", unsure=False)
+    if step_s > 0 and (short_s := turn_within(plots, coarse_s)):
+        return short_s
+    begin, width = sector(plots.v % (2 * np.pi))
+    part = (plots.v - begin) % (2 * np.pi) / max(width, NARROW)
+    if len(np.unique(np.floor(CELLS * part))) < DIRECTIONS:
+        return None
+    mirrored = replace(plots, v=-plots.v)
+    if isinstance(turns := pace_of(mirrored, None, coarse_s), Turns):
+        return _Antenna.turning(mirrored, turns, coarse_s)
+    return turn_within(mirrored, coarse_s) if step_s > 0 else None
 
 
 def _swept(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:
@@ -110,7 +165,8 @@ def _swept(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats
     rows  (N,) of the plots
     None: there are no passes, or each may be a target that passes before a radar that stares.
     """
-    number = passes(plots.time_s, plots.v, coarse_s) if are_apart(plots) else None
+    senses = (passes(plots.time_s, side * plots.v, coarse_s) for side in (1, -1)) if are_apart(plots) else ()
+    number = next((one for one in senses if one is not None), None)
     if number is None:
         return None
     mean_s = np.full(len(table.line), np.nan)

@@ -12,6 +12,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.estimate.sensor import POSITION, Sensor
+from vidtrack.radar.coordinates import sector
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.rhythm import Rhythm, rhythm
 from vidtrack.radar.sensors import PositionRangeRate, RangeAzimuth, RangeAzimuthElevation
@@ -160,7 +161,7 @@ def extent(found: Measurements) -> tuple[Floats, Floats]:
     margin = _margin(found) / 2
     low, high = found.z.min(axis=0) - margin, found.z.max(axis=0) + margin
     for angle in found.sensor.angles:
-        first, width = _sector(found.z[:, angle])
+        first, width = sector(found.z[:, angle])
         side = min(width + 2 * margin[angle], 2 * np.pi)
         low[angle], high[angle] = first + (width - side) / 2, first + (width + side) / 2
     if isinstance(found.sensor, RangeAzimuth | RangeAzimuthElevation):
@@ -180,11 +181,3 @@ def _margin(found: Measurements) -> Floats:
         margin[1 : found.dim] = np.minimum(step / np.median(found.z[:, 0]), np.pi)
     margin[found.dim :] = 4 * found.speed
     return margin + np.sqrt(12 * np.diagonal(found.R, axis1=1, axis2=2).mean(axis=0))
-
-
-def _sector(angle: Floats) -> tuple[float, float]:
-    """Where the smallest sector with all angles (N,) begins, and its width: the circle without the widest gap."""
-    turn = np.sort(angle)
-    gap = np.diff(turn, append=turn[0] + 2 * np.pi)
-    widest = int(gap.argmax())
-    return float(turn[(widest + 1) % len(turn)]), float(2 * np.pi - gap[widest])

@@ -37,6 +37,8 @@ SENSOR = "(radar|sensor|station)(id|name|no|nr|number)?"
 """Names, without case and punctuation, of a column that tells which radar a plot is of."""
 DATED = ("date", "day")
 """Words, one of which is in the name of a column that tells the day of a plot, whatever is in its cells."""
+CENTURIES = range(1900, 2100)
+"""Years of dates that are written as plain numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +221,12 @@ def _refuse_repeated_names(path: Path, names: list[str]) -> None:
 
 
 def _day(cell: object) -> int | None:
-    """The number of the day of a date, with or without a time after it; None for another cell."""
+    """The number of the day of a date, with or without a time after it; None for another cell.
+
+    Eight digits are a date in the years of CENTURIES only: serial numbers have them, too.
+    """
     found = re.fullmatch(r"(\d{4}-?\d\d-?\d\d)([T ].*)?", str(cell).strip())
-    if found is None:
+    if found is None or (found[0].isdigit() and int(found[0][:4]) not in CENTURIES):
         return None
     try:
         return date.fromisoformat(found[1]).toordinal()

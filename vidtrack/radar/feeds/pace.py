@@ -199,7 +199,7 @@ def turn_within(plots: Messages, coarse_s: float) -> float | None:
     """
     if len(plots) < 2 or not are_apart(plots):
         return None
-    begin = plots.only(np.arange(min(len(plots), LOOKED_AT)))
+    begin = _spread(plots, max(LOOKED_AT, int(np.searchsorted(plots.time_s, plots.time_s[0] + 3 * USUAL_S))))
     span = max(float(np.ptp(begin.time_s)), coarse_s)
     return _highest(begin, np.arange(0.5, MOST_IN_A_STEP, 0.2 * coarse_s / span) / coarse_s, coarse_s)
 
@@ -220,12 +220,18 @@ def _peak(plots: Messages, fastest_s: float, slowest_s: float, coarse_s: float) 
     antenna turns in a step; faster turns than one in two steps look like slower ones.
     """
     begin = plots.only(plots.time_s <= plots.time_s.min() + 3 * slowest_s)
-    begin = begin.only(np.arange(min(len(begin), LOOKED_AT)))
+    begin = _spread(begin, len(begin))
     span = max(float(np.ptp(begin.time_s)), FASTEST_S)
     fastest_s, slowest_s = max(fastest_s, 2 * coarse_s), min(slowest_s, max(span / ONCE_ROUND, USUAL_S))
     if fastest_s >= slowest_s:
         return None
     return _highest(begin, np.arange(1 / slowest_s, 1 / fastest_s, min(1 / slowest_s, 0.2 / span)), coarse_s)
+
+
+def _spread(plots: Messages, count: int) -> Messages:
+    """Up to LOOKED_AT of so many first plots, evenly: of a dense radar the first ones are of a turn or two."""
+    count = min(count, len(plots))
+    return plots.only(np.linspace(0, count - 1, min(count, LOOKED_AT)).astype(np.int64))
 
 
 def _highest(plots: Messages, rate: Floats, coarse_s: float) -> float | None:
