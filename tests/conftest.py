@@ -15,7 +15,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the threads 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell switches it off for what it starts in the background
-gc.disable()  # until all tests are collected: the search for garbage among them took half of that time
+if "PYTEST_XDIST_WORKER" in os.environ:  # until all tests are collected: the search for garbage took half of that time
+    gc.disable()
 
 CLOCKED = ("tests/run/live/", "tests/serve/")
 UNCLOCKED = tuple(

@@ -177,6 +177,40 @@ def test_turns_of_a_dense_radar_are_scans_where_times_are_in_whole_seconds(tmp_p
     assert (plots.scan == turn).mean() > 0.99
 
 
+def test_turns_of_a_harbour_radar_are_scans_though_its_times_are_rounded_and_its_boats_near(tmp_path, caplog):
+    rng = np.random.default_rng(0)
+    part = np.array([0.02, 0.05, 0.17, 0.21, 0.38, 0.44, 0.59, 0.70, 0.83, 0.93])
+    near = rng.uniform(100, 600, 10)
+    seen = sorted((round(4 * (k + a), 1), k, n) for k in range(30) for n, a in enumerate(part))
+    rows = [f"{t:.1f},{near[n] + 4 * k:.1f},{360 * part[n]:.2f}" for t, k, n in seen]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    number = np.array([k for _, k, _ in seen])
+    assert (np.diff(plots.scan) == np.diff(number)).mean() > 0.98
+    assert "its turns are scans; 30 scans, 4" in caplog.text or "its turns are scans; 31 scans, 4" in caplog.text
+
+
+def test_turns_of_an_antenna_whose_rate_drifts_are_scans(tmp_path):
+    rng = np.random.default_rng(0)
+    turn, part = np.divmod(np.sort(rng.uniform(0, 60, 6000)), 1)
+    times = 1.25 * (turn + part) * (1 + 0.08 * (turn + part) / 60)
+    rows = [f"{t:.4f},{rng.uniform(5e3, 5e4):.2f},{360 * a:.3f}" for t, a in zip(times, part, strict=True)]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert (plots.scan == turn).mean() > 0.98
+
+
+@pytest.mark.parametrize("first_m", [4e3, 60.0])
+def test_targets_that_swing_before_a_radar_that_stares_are_no_antenna(tmp_path, caplog, first_m):
+    """Two of them, as seen from a boat that yaws."""
+    rows = [
+        f"{t},{first_m * (1 + n) + 5 * t},{45 + 3 * n + 20 * np.sin(2 * np.pi * t / 8):.3f}"
+        for t in range(200)
+        for n in range(2)
+    ]
+    plots = read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert plots.scan.tolist() == [t for t in range(200) for _ in range(2)]
+    assert "antenna" not in caplog.text
+
+
 @pytest.mark.parametrize("header", ["time_s,range_m,azimuth_deg", "time_s,x_m,y_m"])
 @pytest.mark.parametrize("at_random", [False, True])
 def test_vehicles_that_pass_a_radar_that_stares_one_after_the_other_are_no_antenna(tmp_path, caplog, header, at_random):

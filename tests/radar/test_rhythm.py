@@ -44,6 +44,8 @@ def test_days_are_whole_from_midnight_to_midnight(first_s, last_s, expected):
         ([86_401, 2], [0, 0]),  # no times of day
         ([20, 86_390, 75, 80], [0, 0, 0, 0]),  # one wrong time, of which only the step to it is within a minute
         ([86_390, 2, 86_300, 86_301], [0, 0, 0, 0]),
+        ([86_399, 1, 43_200, 2, 3], [0, 1, 1, 1, 1]),  # one wrong time beside a midnight
+        ([86_397, 100, 86_399, 2, 3], [0, 0, 0, 1, 1]),
         ([80_000, 83_000, 500], [0, 0, 1]),  # within three usual steps
     ],
 )

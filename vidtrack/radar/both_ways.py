@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.radar.coordinates import sector
-from vidtrack.radar.feeds.pace import FASTEST_S, LOOKED_AT, UNLIKELY, USUAL_S
+from vidtrack.radar.feeds.pace import FASTEST_S, LOOKED_AT, TARGETS_M_S, UNLIKELY, USUAL_S
 from vidtrack.radar.rhythm import PASSES, SWEEPS
 
 LOOKED_AT_S = 6 * USUAL_S
@@ -32,12 +32,14 @@ class Wave(NamedTuple):
         return np.asarray(np.exp(2j * np.pi * time_s / self.period_s))
 
 
-def both_ways(time_s: Floats, azimuth: Floats, coarse_s: float) -> tuple[Ints, float] | None:
+def both_ways(time_s: Floats, range_m: Floats, azimuth: Floats, coarse_s: float) -> tuple[Ints, float] | None:
     """The pass of an antenna that sweeps back and forth that each of the plots (N,) is of, and its duration [s].
 
     time_s    (N,) s, in order, in steps of coarse_s, of which a pass lasts two
+    range_m   (N,) m
     azimuth   (N,) rad
-    None if azimuths do not swing, or do not go to one side in a pass and back in the next.
+    None if azimuths do not swing, or do not go to one side in a pass and back in the next, or if it is targets that do:
+    those of a radar that stares are seen all the time.
     """
     begin, width = sector(azimuth % (2 * np.pi))
     aside = np.angle(np.exp(1j * (azimuth - begin - width / 2)))
@@ -45,7 +47,9 @@ def both_ways(time_s: Floats, azimuth: Floats, coarse_s: float) -> tuple[Ints, f
     if wave is None:
         return None
     number = np.floor(_passed(wave, time_s, aside)).astype(np.int64)
-    return (number, wave.period_s / 2) if _turns_back(time_s, aside, number) else None
+    if not _turns_back(time_s, aside, number) or _seen_all_the_time(time_s, range_m, number):
+        return None
+    return number, wave.period_s / 2
 
 
 def _wave(time_s: Floats, aside: Floats, coarse_s: float) -> Wave | None:
@@ -99,3 +103,14 @@ def _turns_back(time_s: Floats, aside: Floats, number: Ints) -> bool:
         return False
     share = float(rises[odd].mean()), float(rises[~odd].mean())
     return max(share) >= SWEEPS and min(share) <= 1 - SWEEPS
+
+
+def _seen_all_the_time(time_s: Floats, range_m: Floats, number: Ints) -> bool:
+    """Whether most plots have one of nearly their range at the next time of the same pass."""
+    times, first = np.unique(time_s[:LOOKED_AT], return_index=True)
+    seen = np.split(range_m[:LOOKED_AT], first[1:])
+    speed = [
+        np.abs(seen[k][:, None] - seen[k + 1]).min(axis=1) / (times[k + 1] - times[k])
+        for k in np.flatnonzero(number[first[1:]] == number[first[:-1]]).tolist()
+    ]
+    return bool(speed) and bool(np.median(np.concatenate(speed)) < TARGETS_M_S)

@@ -77,7 +77,10 @@ def _circular(angle: Floats, shrink: Floats) -> tuple[Floats, Floats, Floats, Fl
 
 
 def sector(angle: Floats) -> tuple[float, float]:
-    """Where the smallest sector with all angles (N,) begins, and its width: the circle without the widest gap [rad]."""
+    """Where the smallest sector with all angles (N,) begins, and its width: the circle without the widest gap [rad].
+
+    Angles are within one turn of each other, as in 0..2 pi or -pi..pi.
+    """
     turn = np.sort(angle)
     gap = np.diff(turn, append=turn[0] + 2 * np.pi)
     widest = int(gap.argmax())

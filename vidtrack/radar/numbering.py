@@ -46,9 +46,9 @@ def numbered(table: Table, place: tuple[float, float]) -> Table:
     time_s = possible_times(table.columns[time])
     times, member, steps = _distinct(time_s)
     coarse_s = float(np.quantile(steps, 0.1)) if len(steps) else np.inf  # times that several plots share
-    one_by_one = _one_by_one(steps, len(member), coarse_s)
+    one_by_one = _one_by_one(steps, len(member))
     polar = _polar(table, time_s, place)
-    turned = _turned(table, *polar, coarse_s, one_by_one) if polar else None
+    turned = _turned(table, *polar, steps, coarse_s, one_by_one) if polar else None
     if turned is not None:
         return replace(table, columns=table.columns | {scan: turned})
     told = "plots of the same time are one scan"
@@ -76,14 +76,15 @@ def _distinct(time_s: Floats) -> tuple[Floats, Ints, Floats]:
     return times, member, np.diff(times[np.isfinite(times)])
 
 
-def _one_by_one(steps: Floats, plots: int, coarse_s: float) -> bool:
-    """Whether nearly each of the plots has its own time, with steps (N,) that are no multiples of the usual one, nor of
-    coarse_s.
-    """
-    if len(steps) < 2 or len(steps) < ONE_BY_ONE * plots:
-        return False
-    passed = steps / np.array([[np.median(steps)], [coarse_s]])
-    return bool(((np.abs(passed - np.maximum(1, np.round(passed))) > EVENLY).mean(axis=1) > 0.5).all())
+def _one_by_one(steps: Floats, plots: int) -> bool:
+    """Whether nearly each of the plots has its own time, with steps (N,) that are not multiples of the usual one."""
+    return len(steps) >= max(2, ONE_BY_ONE * plots) and not _are_multiples(steps, float(np.median(steps)))
+
+
+def _are_multiples(steps: Floats, of_s: float) -> bool:
+    """Whether half or more of the steps (N,) are nearly multiples of a time [s]."""
+    passed = steps / of_s
+    return bool((np.abs(passed - np.maximum(1, np.round(passed))) <= EVENLY).mean() >= 0.5)
 
 
 class _Antenna(NamedTuple):
@@ -102,24 +103,33 @@ class _Antenna(NamedTuple):
 
     @classmethod
     def turning(cls, plots: Messages, turns: Turns, coarse_s: float) -> _Antenna:
-        """One that turns to the right, by plots of times in steps of coarse_s."""
+        """One that turns, by plots of times in steps of coarse_s."""
         number = np.floor(turns.progress(plots)).astype(np.int64)
         return cls(number, turns.period_s, "turns", coarse_s > 0 or turns.period_s > USUAL_S)
 
 
-def _turned(table: Table, rows: Ints, plots: Messages, coarse_s: float, one_by_one: bool) -> Floats | None:
-    """The turn of a rotating antenna, or its pass over a sector, that each row of the table is of.
+class _TooCoarse(NamedTuple):
+    """An antenna whose turns take turn_s [s], which steps of times are too coarse to tell."""
+
+    turn_s: float
+
+
+def _turned(
+    table: Table, rows: Ints, plots: Messages, steps: Floats, coarse_s: float, one_by_one: bool
+) -> Floats | None:
+    """The turn of a rotating antenna, or its pass back or forth, that each row of the table is of.
 
     rows        (N,) of the plots
-    coarse_s    step of their times
-    one_by_one  whether nearly each has its own time, which is not rounded
+    steps       (K,) of their times, of which several are coarse_s long
+    one_by_one  whether nearly each has its own time; these are exact where no antenna shows more targets than one
     None: they follow no antenna.
     """
-    antenna = _antenna(plots, coarse_s, one_by_one)
-    if isinstance(antenna, float):
+    rounded = not one_by_one or (_are_multiples(steps, coarse_s) and are_apart(plots))
+    antenna = _antenna(plots, coarse_s, rounded)
+    if isinstance(antenna, _TooCoarse):
         _log.warning(
             "%s: azimuths follow an antenna with turns of %.3g s, but times are in steps of %.3g s, too coarse to "
-            "tell its turns: give a column 'scan', or finer times", table.path, antenna, coarse_s,
+            "tell its turns: give a column 'scan', or finer times", table.path, antenna.turn_s, coarse_s,
         )  # fmt: skip
     if not isinstance(antenna, _Antenna):
         return None
@@ -135,20 +145,21 @@ def _turned(table: Table, rows: Ints, plots: Messages, coarse_s: float, one_by_o
     return scan
 
 
-def _antenna(plots: Messages, coarse_s: float, one_by_one: bool) -> _Antenna | float | None:
+def _antenna(plots: Messages, coarse_s: float, rounded: bool) -> _Antenna | _TooCoarse | None:
     """The scans of an antenna that turns to the right, sweeps back and forth, or turns to the left, as in a mirror.
 
-    The duration of a turn [s] that times in steps of coarse_s are too coarse to tell; None: plots follow no antenna.
+    coarse_s  step of the times, which may be rounded to it
+    None: plots follow no antenna.
     """
-    step_s = 0.0 if one_by_one else coarse_s
+    step_s = coarse_s if rounded else 0.0
     if isinstance(turns := pace_of(plots, None, step_s), Turns):
         return _Antenna.turning(plots, turns, step_s)
     if not are_apart(plots):
         return None
-    if (swept := both_ways(plots.time_s, plots.v, coarse_s)) is not None:
+    if (swept := both_ways(plots.time_s, plots.u, plots.v, coarse_s)) is not None:
         return _Antenna(*swept, "passes back and forth", unsure=False)
-    if step_s > 0 and (short_s := turn_within(plots, coarse_s)):
-        return short_s
+    if rounded and (short_s := turn_within(plots, coarse_s)):
+        return _TooCoarse(short_s)
     begin, width = sector(plots.v % (2 * np.pi))
     part = (plots.v - begin) % (2 * np.pi) / max(width, NARROW)
     if len(np.unique(np.floor(CELLS * part))) < DIRECTIONS:
@@ -156,7 +167,7 @@ def _antenna(plots: Messages, coarse_s: float, one_by_one: bool) -> _Antenna | f
     mirrored = replace(plots, v=-plots.v)
     if isinstance(turns := pace_of(mirrored, None, coarse_s), Turns):
         return _Antenna.turning(mirrored, turns, coarse_s)
-    return turn_within(mirrored, coarse_s) if step_s > 0 else None
+    return _TooCoarse(short_s) if rounded and (short_s := turn_within(mirrored, coarse_s)) else None
 
 
 def _swept(table: Table, rows: Ints, plots: Messages, coarse_s: float) -> Floats | None:

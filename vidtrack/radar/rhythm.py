@@ -122,13 +122,14 @@ def of_day(time_s: Floats) -> Mask:
 def midnights(time_s: Floats) -> Ints:
     """The day, from 0, of times of day (N,): steps from one end of the day to the other, and back, are counted.
 
-    Not those to a lone time at the other end, and from it, of which one is too long: that time is wrong. All are of
-    one day if its rows are in another order than that of arrival.
+    Not those to a lone time at the other end, and back from it: that time is wrong. All are of one day if its rows are
+    in another order than that of arrival.
     """
     step_s = np.diff(time_s)
     over: Mask = (DAY_S - np.abs(step_s) <= _near_midnight(time_s)) & of_day(time_s[1:]) & of_day(time_s[:-1])
-    there_and_back = (np.abs(step_s) > DAY_S / 2) & (np.abs(np.diff(step_s, append=0.0)) > DAY_S)
-    lone = np.flatnonzero(there_and_back[:-1] & (over[:-1] != over[1:]))  # the step to one wrong time, then from it
+    far = np.pad(np.abs(step_s) > _near_midnight(time_s), 1)  # the steps, between two that are not
+    back = np.abs(step_s[:-1] + step_s[1:]) < DAY_S / 2
+    lone = np.flatnonzero(~far[:-3] & far[1:-2] & far[2:-1] & ~far[3:] & back & (over[:-1] != over[1:]))
     over[lone], over[lone + 1] = False, False
     day = np.concatenate([[0], np.cumsum(np.where(over, -np.sign(step_s), 0))]).astype(np.int64)
     disorder = int((np.diff(time_s + DAY_S * day) < -LATE_S).sum())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -40,6 +40,16 @@ class Frame:
     def shape(self) -> tuple[int, int]:
         """(H, W)."""
         return self.y.shape[0], self.y.shape[1]
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the planes; those that are views keep more in memory."""
+        return sum(plane.nbytes for plane in (self.y, self.u, self.v) if plane is not None)
+
+    def copy(self) -> Frame:
+        """The frame with planes of its own, which keep no decoder's memory."""
+        u, v = (None if plane is None else plane.copy() for plane in (self.u, self.v))
+        return replace(self, y=self.y.copy(), u=u, v=v)
 
     def bgr(self) -> Image:
         """(H, W, 3) picture in OpenCV's channel order."""

@@ -149,14 +149,18 @@ class Source:
 
     def _bytes(self, seconds: float) -> float:
         """The size of so many seconds in memory."""
-        planes = (self._first.y, self._first.u, self._first.v)
-        return seconds * self.fps * sum(plane.size for plane in planes if plane is not None)
+        return seconds * self.fps * self._first.nbytes
 
     def _kept(self, end_s: float) -> Iterator[Frame]:
-        """The frames to end_s, each kept for the reading; so is the one after them, since it is read by then."""
-        for frame in self._ahead:
+        """The frames to end_s, each kept for the reading; so is the one after them, since it is read by then.
+
+        There are fewer where pictures come so much faster than the stated rate that they would be too large.
+        """
+        held = 0
+        for frame in map(Frame.copy, self._ahead):
             self._opened.append(frame)
-            if frame.time_s > end_s + ROUNDING_S:
+            held += frame.nbytes
+            if frame.time_s > end_s + ROUNDING_S or held > _KEPT_BYTES:
                 break
             yield frame
 

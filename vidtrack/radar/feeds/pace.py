@@ -220,7 +220,7 @@ def _peak(plots: Messages, fastest_s: float, slowest_s: float, coarse_s: float) 
     antenna turns in a step; faster turns than one in two steps look like slower ones.
     """
     begin = plots.only(plots.time_s <= plots.time_s.min() + 3 * slowest_s)
-    begin = _spread(begin, len(begin))
+    begin = _spread(begin, len(begin) if coarse_s else LOOKED_AT)  # the rate of an antenna drifts
     span = max(float(np.ptp(begin.time_s)), FASTEST_S)
     fastest_s, slowest_s = max(fastest_s, 2 * coarse_s), min(slowest_s, max(span / ONCE_ROUND, USUAL_S))
     if fastest_s >= slowest_s:
