@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from vidtrack.arrays.types import Ints
-from vidtrack.compiled import CACHE
+from vidtrack.compiled import CACHE, PACKAGE
 from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
@@ -58,7 +58,9 @@ def warm_beside() -> None:
     """Start `warm` in a process of its own, for the first run on a machine with a second core; it ends with ours."""
     if CACHE and (cpu_count() or 1) > 1:
         helper = subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import warm; warm()"], stderr=subprocess.DEVNULL
+            [sys.executable, "-c", f"from {__name__} import warm; warm()"],
+            cwd=PACKAGE.parent,  # Python looks there first: another vidtrack, as a clone, would have kernels of its own
+            stderr=subprocess.DEVNULL,
         )
         register(helper.kill)
 
