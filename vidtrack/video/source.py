@@ -140,16 +140,13 @@ class Source:
         """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
-        if end_s <= self._span.end_s and self._bytes(end_s - begin_s) <= _KEPT_BYTES:
+        size = (end_s - begin_s) * self.fps * self._first.nbytes
+        if end_s <= self._span.end_s and size <= _KEPT_BYTES:
             yield from self._kept(end_s)
             return
         with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
             for picture in again.between(begin_s, end_s, every_s):
                 yield matched(to_frame(0, *picture), self._first)
-
-    def _bytes(self, seconds: float) -> float:
-        """The size of so many seconds in memory."""
-        return seconds * self.fps * self._first.nbytes
 
     def _kept(self, end_s: float) -> Iterator[Frame]:
         """The frames to end_s, each kept for the reading; so is the one after them, since it is read by then.

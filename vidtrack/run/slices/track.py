@@ -55,13 +55,13 @@ def track_slice(
         parse_lines(settings.output.lines, *size, refuse=True)  # else only the stitched run would refuse them
         tracker = build_blob_tracker(settings.tracker, size, smooth=bool(settings.output.smooth))
         both = _Both(detector, tracker)
-        if before is not None:
-            restore(both, read_state(before / STATE))
         kept, count = KeptSteps(folder), 0
         frames = (frame for frame in source if cut.holds(frame.time_s))
         try:
             if before is None:
                 look_ahead(source, detector, settings)
+            else:
+                restore(both, read_state(before / STATE))
             for step in video_steps(frames, detector, tracker, settings):
                 count += 1
                 if step.time_s >= cut.kept_from_s:
