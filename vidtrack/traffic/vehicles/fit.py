@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.vehicles.cuboid import box_edges
 
 SIZE = 4
@@ -77,8 +77,7 @@ def fit(
     for i in range(len(first) - 1):
         most = max(most, first[i + 1] - first[i])
     band, right = np.empty((2 * most, _BAND + 1)), np.empty((2 * most, SIZE + 1))
-    coupling, heading = np.empty((2 * most, SIZE)), np.empty((most, 2))
-    whole, rest = np.empty((SIZE, SIZE)), np.empty(SIZE)
+    heading, whole, rest = np.empty((most, 2)), np.empty((SIZE, SIZE)), np.empty(SIZE)
     for i in range(len(first) - 1):
         a, b = first[i], first[i + 1]
         size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
@@ -96,22 +95,11 @@ def fit(
             _headings(path[a:b], heading)
             misfit, strange = _normal(t[a:b], edge[a:b], rows[a:b], path[a:b], heading, size[i], G, up, coarse,
                                       band[:n], right[:n], whole, rest)  # fmt: skip
-            for k in range(n):
-                for s in range(SIZE):
-                    coupling[k, s] = right[k, s]
-            _factor(band[:n])
-            _solve(band[:n], right[:n])
-            _eliminate(coupling[:n], right[:n], whole, rest)
+            _factor(band[:n], right[:n])
+            _eliminate(right[:n], whole, rest)
             step = np.maximum(np.linalg.solve(whole, rest), _LEAST - size[i])
             size[i] += step
-            moved = np.abs(step).max()
-            for k in range(b - a):
-                for axis in range(2):
-                    change = right[2 * k + axis, SIZE]
-                    for s in range(SIZE):
-                        change -= right[2 * k + axis, s] * step[s]
-                    path[a + k, axis] += change
-                    moved = max(moved, abs(change))
+            moved = max(np.abs(step).max(), _move(band[:n], right[:n], step, path[a:b]))
             if coarse == 1.0 and moved < _STILL_M:
                 break
         inverse = np.linalg.inv(whole)
@@ -122,8 +110,9 @@ def fit(
         if strange > _FAR_SHARE:
             size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
             continue
-        if b - a < _SPEED_KNOTS:
+        if b - a < _SPEED_KNOTS or asked_of[i] == asked_of[i + 1]:
             continue
+        _solve_back(band[:n], right[:n])
         for w in range(asked_of[i], asked_of[i + 1]):
             _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], size[i], cov[i], quality[i], speed[w])
             speed[w, 4] += a
@@ -157,7 +146,8 @@ def _normal(
     """
     band[:], right[:], whole[:], rest[:] = 0.0, 0.0, 0.0, 0.0
     state, ahead, model, by_state = np.empty(5), np.empty(2), np.empty(4), np.zeros((4, 5))
-    by = np.empty(SIZE + 3)  # derivatives of a residual: by x, by y, by the size; then the residual
+    # derivatives of each side's residual: by x, by y, by the size; then the residual. And the same, weighted
+    by, weighted = np.empty((4, SIZE + 3)), np.empty((4, SIZE + 2))
     total, strange, count = 0.0, 0, 0
     for s in range(SIZE):
         whole[s, s] = 1 / SIGMA[s] ** 2
@@ -171,28 +161,27 @@ def _normal(
             sign = -1.0 if side < 2 else 1.0
             residual = edge[k, side] - model[side] - sign * size[3]
             if np.isnan(residual):
+                by[side], weighted[side] = 0.0, 0.0
                 continue
             variance = (noise + (_SHAPE_M[side] * scale) ** 2) * coarse**2
-            far = residual**2 / variance
-            weight = (_FREEDOM + 1) / ((_FREEDOM + far) * variance)
-            total += weight * residual**2
-            strange += far > _FAR**2
+            square = residual * residual
+            weight = (_FREEDOM + 1) / (_FREEDOM * variance + square)
+            total += weight * square
+            strange += square > _FAR**2 * variance
             count += 1
             for i in range(5):
-                by[i] = by_state[side, i]
-            by[5], by[6] = sign, residual
-            x, y = weight * by[0], weight * by[1]
-            band[row, 0] += x * by[0]
-            band[row + 1, 1] += y * by[0]
-            band[row + 1, 0] += y * by[1]
-            for s in range(SIZE + 1):
-                right[row, s] += x * by[2 + s]
-                right[row + 1, s] += y * by[2 + s]
-            for s in range(SIZE):
-                weighted = weight * by[2 + s]
-                for r in range(s, SIZE):
-                    whole[s, r] += weighted * by[2 + r]
-                rest[s] += weighted * by[6]
+                by[side, i], weighted[side, i] = by_state[side, i], weight * by_state[side, i]
+            by[side, 5], by[side, 6], weighted[side, 5] = sign, residual, weight * sign
+        band[row, 0] += _dot(weighted, 0, by, 0)
+        band[row + 1, 1] += _dot(weighted, 1, by, 0)
+        band[row + 1, 0] += _dot(weighted, 1, by, 1)
+        for s in range(SIZE + 1):
+            right[row, s] += _dot(weighted, 0, by, 2 + s)
+            right[row + 1, s] += _dot(weighted, 1, by, 2 + s)
+        for s in range(SIZE):
+            for r in range(s, SIZE):
+                whole[s, r] += _dot(weighted, 2 + s, by, 2 + r)
+            rest[s] += _dot(weighted, 2 + s, by, 6)
     for s in range(SIZE):
         for r in range(s):
             whole[s, r] = whole[r, s]
@@ -208,6 +197,12 @@ def _normal(
     return total / max(count, 1), strange / max(count, 1)
 
 
+@inlined
+def _dot(a: Floats, i: int, b: Floats, j: int) -> float:
+    """Product of two columns (4,)."""
+    return a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j] + a[3, i] * b[3, j]
+
+
 @kernel
 def _bending(t: Floats, k: int, c: Floats) -> None:
     """Write the factors (3,) of the places k - 1, k, k + 1 in the change of velocity there, in standard deviations."""
@@ -217,36 +212,68 @@ def _bending(t: Floats, k: int, c: Floats) -> None:
 
 
 @kernel
-def _factor(band: Floats) -> None:
+def _factor(band: Floats, right: Floats) -> None:
     """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place.
 
-    Of the diagonal it has the inverses, since all that is done with it is to divide by it.
+    Of the diagonal it has the inverses, since all that is done with it is to divide by it. The right sides
+    (n, SIZE + 1) are solved with the factor on the way, not yet with its transpose.
     """
     for i in range(len(band)):
-        for d in range(_BAND, -1, -1):
-            if d > i:
-                continue
+        reach = min(i, _BAND)
+        for d in range(reach, 0, -1):
             value = band[i, d]
-            for m in range(_BAND, d, -1):  # zero where m > i
+            for m in range(reach, d, -1):
                 value -= band[i, m] * band[i - d, m - d]
-            band[i, d] = value * band[i - d, 0] if d > 0 else 1 / np.sqrt(max(value, 1e-12))
+            band[i, d] = value * band[i - d, 0]
+        value = band[i, 0]
+        for d in range(1, reach + 1):
+            value -= band[i, d] ** 2
+            for c in range(SIZE + 1):
+                right[i, c] -= band[i, d] * right[i - d, c]
+        band[i, 0] = 1 / np.sqrt(max(value, 1e-12))
+        for c in range(SIZE + 1):
+            right[i, c] *= band[i, 0]
 
 
 @kernel
-def _solve(band: Floats, right: Floats) -> None:
-    """Solve for the right sides (n, SIZE + 1), in place, with the factor."""
+def _eliminate(right: Floats, whole: Floats, rest: Floats) -> None:
+    """Take the path out of the size's equations (Schur complement), with the right sides as `_factor` leaves them."""
+    for k in range(len(right)):
+        for s in range(SIZE):
+            for r in range(s + 1):
+                whole[s, r] -= right[k, s] * right[k, r]
+            rest[s] -= right[k, s] * right[k, SIZE]
+    for s in range(SIZE):
+        for r in range(s):
+            whole[r, s] = whole[s, r]
+
+
+@kernel
+def _move(band: Floats, right: Floats, step: Floats, path: Floats) -> float:
+    """Move the path (K, 2) as far as it goes with a step of the size (SIZE,); returns how far at most."""
+    n, most = len(band), 0.0
+    for r in range(n - 1, -1, -1):
+        change = right[r, SIZE]
+        for s in range(SIZE):
+            change -= right[r, s] * step[s]
+        for d in range(1, min(n - 1 - r, _BAND) + 1):
+            change -= band[r + d, d] * right[r + d, SIZE]
+        change *= band[r, 0]
+        right[r, SIZE] = change
+        path[r // 2, r % 2] += change
+        most = max(most, abs(change))
+    return most
+
+
+@kernel
+def _solve_back(band: Floats, right: Floats) -> None:
+    """Solve for the coupling to the size, the first SIZE right sides, with the transpose of the factor, too."""
     n = len(band)
-    for i in range(n):
-        for d in range(1, min(i, _BAND) + 1):
-            for c in range(SIZE + 1):
-                right[i, c] -= band[i, d] * right[i - d, c]
-        for c in range(SIZE + 1):
-            right[i, c] *= band[i, 0]
     for i in range(n - 1, -1, -1):
         for d in range(1, min(n - 1 - i, _BAND) + 1):
-            for c in range(SIZE + 1):
+            for c in range(SIZE):
                 right[i, c] -= band[i + d, d] * right[i + d, c]
-        for c in range(SIZE + 1):
+        for c in range(SIZE):
             right[i, c] *= band[i, 0]
 
 
@@ -267,7 +294,10 @@ def _solve_one(band: Floats, right: Floats) -> None:
 @kernel
 def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
     """Solve for one right side a (n,) of the path, together with the size, in place: the path's share."""
-    by_size = _of_size(right, a, 0, len(a))
+    by_size = np.zeros(SIZE)
+    for r in range(len(a)):
+        for s in range(SIZE):
+            by_size[s] -= a[r] * right[r, s]
     _solve_one(band, a)
     size = cov @ by_size
     for r in range(len(a)):
@@ -276,39 +306,25 @@ def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
 
 
 @kernel
-def _variance(band: Floats, right: Floats, cov: Floats, a: Floats, begin: int, end: int) -> float:
-    """Variance of a' path, for noise and walk as they are stated above; a (n,) is 0 but from begin to end, and lost."""
-    by_size = _of_size(right, a, begin, end)
-    total = 0.0
+def _variances(band: Floats, right: Floats, cov: Floats, a: Floats, begin: int) -> Floats:
+    """(2 _NEAR,) variances of a' path, for noise and walk as they are stated above; a (n, 2 _NEAR) is 0 before row
+    `begin`, and lost."""
+    by_size, total = np.zeros((SIZE, 2 * _NEAR)), np.zeros(2 * _NEAR)
     for r in range(begin, len(a)):
+        for s in range(SIZE):
+            for m in range(2 * _NEAR):
+                by_size[s, m] -= a[r, m] * right[r, s]
         for d in range(1, min(r - begin, _BAND) + 1):
-            a[r] -= band[r, d] * a[r - d]
-        a[r] *= band[r, 0]
-        total += a[r] ** 2
+            for m in range(2 * _NEAR):
+                a[r, m] -= band[r, d] * a[r - d, m]
+        for m in range(2 * _NEAR):
+            a[r, m] *= band[r, 0]
+            total[m] += a[r, m] ** 2
     for s in range(SIZE):
         for q in range(SIZE):
-            total += by_size[s] * cov[s, q] * by_size[q]
+            for m in range(2 * _NEAR):
+                total[m] += by_size[s, m] * cov[s, q] * by_size[q, m]
     return total
-
-
-@kernel
-def _of_size(right: Floats, a: Floats, begin: int, end: int) -> Floats:
-    """(SIZE,) by how much a' path changes with the size; a (n,) is 0 but from begin to end."""
-    by_size = np.zeros(SIZE)
-    for r in range(begin, end):
-        for s in range(SIZE):
-            by_size[s] -= a[r] * right[r, s]
-    return by_size
-
-
-@kernel
-def _eliminate(coupling: Floats, solved: Floats, whole: Floats, rest: Floats) -> None:
-    """Take the path out of the size's equations (Schur complement): coupling (2 K, SIZE), solved (2 K, SIZE + 1)."""
-    for k in range(len(coupling)):
-        for s in range(SIZE):
-            for r in range(SIZE):
-                whole[s, r] -= coupling[k, s] * solved[k, r]
-            rest[s] -= coupling[k, s] * solved[k, SIZE]
 
 
 @kernel
@@ -337,7 +353,7 @@ def _speed(
         for axis in range(2):
             r = 2 * k + axis
             walked += (c[0] * a[r - 2] + c[1] * a[r] + c[2] * a[r + 2]) ** 2
-    variance = (variance - walked) * misfit + walked * _walk(t, path, i, ex, ey, band, right, cov, a)
+    variance = (variance - walked) * misfit + walked * _walk(t, path, i, ex, ey, band, right, cov)
     variance += (_DRIFT * v) ** 2 + (_ROUNDING_M * _turning(t, path, i, j)) ** 2
     if size[0] < _WALKER_M:
         variance += _GAIT_M_S**2
@@ -345,26 +361,25 @@ def _speed(
 
 
 @kernel
-def _walk(
-    t: Floats, path: Floats, i: int, ex: float, ey: float, band: Floats, right: Floats, cov: Floats, a: Floats,
-) -> float:  # fmt: skip
+def _walk(t: Floats, path: Floats, i: int, ex: float, ey: float, band: Floats, right: Floats, cov: Floats) -> float:
     """Variance of the velocity's walk along (ex, ey) near the step from i, in units of _JOLT, by the bends of the path.
 
     Of the square of each bend 1 - leverage is left by the fit, and so much of a degree of freedom it is worth. Where
     edges are drawn along by something else for some tenths of a second, the path follows them, and bends.
-    a (2 K,) is room to work in
     """
     c, squares, freedom = np.empty(3), _WALK * _WALK_BENDS, _WALK_BENDS
-    for k in range(max(i + 1 - _NEAR, 1), min(i + _NEAR, len(t) - 2) + 1):
+    a, first, end = np.zeros((len(band), 2 * _NEAR)), max(i + 1 - _NEAR, 1), min(i + _NEAR, len(t) - 2) + 1
+    for k in range(first, end):
         _bending(t, k, c)
-        a[:] = 0.0
         bend = 0.0
         for m in range(3):
             at = k - 1 + m
             bend += c[m] * (path[at, 0] * ex + path[at, 1] * ey)
-            a[2 * at], a[2 * at + 1] = c[m] * ex, c[m] * ey
+            a[2 * at, k - first], a[2 * at + 1, k - first] = c[m] * ex, c[m] * ey
         squares += bend**2
-        freedom += max(1 - _variance(band, right, cov, a, 2 * k - 2, 2 * k + 4), 0.0)
+    leverage = _variances(band, right, cov, a, 2 * first - 2)
+    for m in range(end - first):
+        freedom += max(1 - leverage[m], 0.0)
     return squares / freedom
 
 
