@@ -38,9 +38,16 @@ def replaced(value: np.ndarray, rows: Ints, other: np.ndarray, at: Ints) -> np.n
     return copy
 
 
-def room(rows: int, needed: int) -> int:
-    """Rows to make room for in a table that has too few for those needed: a quarter more, since a day's are large."""
-    return max(needed, 5 * rows // 4)
+def make_room(table: np.ndarray, rows: int, fill: float) -> None:
+    """Lengthen a table (T, ...) to so many rows or more, if it is shorter; the new ones hold `fill`.
+
+    In place, by a quarter at least: a day's tables are large, and there need not be two of them. The table owns its
+    memory, which may move: no other array may show a part of it.
+    """
+    before = len(table)
+    if rows > before:
+        table.resize((max(rows, 5 * before // 4), *table.shape[1:]), refcheck=False)
+        table[before:] = fill
 
 
 @kernel

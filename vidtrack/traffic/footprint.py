@@ -280,9 +280,22 @@ def within(box: Floats, rim: Floats | float) -> Floats:
 
 def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
     """(N, 4) left, top, right and lower edges [px]; NaN where the border of a picture (width, height) may cut them."""
-    near = _NEAR * size[0]
-    inside = np.hstack([edge[:, :2] > near, edge[:, 2:] < np.array(size) - near])
-    return np.asarray(np.where(inside, edge, np.nan))
+    inside = edge.copy()
+    _cut_off(inside, _NEAR * size[0], size[0] - _NEAR * size[0], size[1] - _NEAR * size[0])
+    return inside
+
+
+@kernel
+def _cut_off(edge: Floats, near: float, right: float, bottom: float) -> None:
+    """Forget left and top edges up to `near`, and right and lower ones from `right` and `bottom` on."""
+    for i in range(len(edge)):
+        for side in range(2):
+            if not edge[i, side] > near:
+                edge[i, side] = np.nan
+        if not edge[i, 2] < right:
+            edge[i, 2] = np.nan
+        if not edge[i, 3] < bottom:
+            edge[i, 3] = np.nan
 
 
 def partly_hidden(t: Floats, box: Floats, merged: Mask) -> Mask:
@@ -294,20 +307,25 @@ def partly_hidden(t: Floats, box: Floats, merged: Mask) -> Mask:
     box (N, 4) left, top, width, height [px]
     """
     hidden = merged.copy()
-    _hide(t, box[:, :2] - _APART_PX / 2, box[:, :2] + box[:, 2:] + _APART_PX / 2, hidden)
+    _hide(t, box, hidden)
     return hidden
 
 
 @kernel
-def _hide(t: Floats, low: Floats, high: Floats, hidden: Mask) -> None:
-    """Mark rows whose boxes, from low to high (N, 2), touch one of the same time with a lower edge farther down."""
+def _hide(t: Floats, box: Floats, hidden: Mask) -> None:
+    """Mark rows whose boxes (N, 4) touch one of the same time with a lower edge farther down."""
     for i in range(len(t)):
+        left, top, right, bottom = box[i, 0], box[i, 1], box[i, 0] + box[i, 2], box[i, 1] + box[i, 3]
         j = i - 1
         while j >= 0 and t[j] == t[i]:
-            beside = low[i, 0] < high[j, 0] and low[j, 0] < high[i, 0]
-            if beside and low[i, 1] < high[j, 1] and low[j, 1] < high[i, 1]:
-                hidden[i] |= high[j, 1] > high[i, 1]
-                hidden[j] |= high[i, 1] > high[j, 1]
+            if (
+                left < box[j, 0] + box[j, 2] + _APART_PX
+                and box[j, 0] < right + _APART_PX
+                and top < box[j, 1] + box[j, 3] + _APART_PX
+                and box[j, 1] < bottom + _APART_PX
+            ):
+                hidden[i] |= box[j, 1] + box[j, 3] > bottom
+                hidden[j] |= bottom > box[j, 1] + box[j, 3]
             j -= 1
 
 

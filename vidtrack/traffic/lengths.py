@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import inlined, kernel
 
 UNKNOWN = "unknown"
 """The class of a vehicle of which none is sure."""
@@ -14,6 +15,7 @@ _LEAST_SIGMA_M = 0.01
 """m; to which lengths are known at best"""
 
 
+@kernel
 def length_terms(length: Floats, sigma: Floats, hidden: Mask) -> Floats:
     """(N, 4) what rows add to the mean length of their track: 1 / sigma^2, times length, times length^2, and 1.
 
@@ -21,14 +23,29 @@ def length_terms(length: Floats, sigma: Floats, hidden: Mask) -> Floats:
 
     length, sigma  (N,) m
     """
-    weight = 1 / np.maximum(sigma, _LEAST_SIGMA_M) ** 2
-    terms = np.column_stack([weight, weight * length, weight * length**2, np.ones(len(length))])
-    return np.where((np.isfinite(terms[:, 2]) & ~hidden)[:, None], terms, 0.0)
+    terms = np.zeros((len(length), 4))
+    for i in range(len(length)):
+        _add_term(terms, i, length[i], sigma[i], hidden[i])
+    return terms
 
 
-def length_sums(track: Ints, terms: Floats, tracks: int) -> Floats:
-    """(T, 4) sums of `length_terms` (N, 4) over the rows of each track (N,)."""
-    return np.column_stack([np.bincount(track, term, tracks) for term in terms.T])
+@kernel
+def add_lengths(sums: Floats, track: Ints, length: Floats, sigma: Floats, hidden: Mask) -> None:
+    """Add `length_terms` of rows to the sums (T, 4) of their tracks (N,)."""
+    for i in range(len(track)):
+        _add_term(sums, track[i], length[i], sigma[i], hidden[i])
+
+
+@inlined
+def _add_term(sums: Floats, k: int, length: float, sigma: float, hidden: bool) -> None:
+    """Add what a row says to the sums in row k of a table (T, 4)."""
+    weight = 1 / max(sigma * sigma, _LEAST_SIGMA_M**2)
+    by_square = weight * length * length
+    if not (hidden or np.isnan(sigma) or np.isnan(length)) and np.isfinite(by_square):
+        sums[k, 0] += weight
+        sums[k, 1] += weight * length
+        sums[k, 2] += by_square
+        sums[k, 3] += 1.0
 
 
 def mean_length(sums: Floats) -> tuple[Floats, Floats]:

@@ -13,6 +13,7 @@ from vidtrack.traffic.measures.gates import gates_of
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting
 from vidtrack.traffic.measures.rows import Rows, off_road
+from vidtrack.traffic.measures.stretches import Stretches
 
 
 def crossings(run, place=None):
@@ -133,6 +134,23 @@ def test_to_and_fro_within_two_seconds_is_not_passed():
     assert lasting(track[:2], gate[:2], np.array([1, 1]), t[:2]).tolist() == [True, True]
 
 
+def in_pixels(number, t, xy, margin=8.0):
+    """Rows (N,) without a calibration, of tracks that the picture shows."""
+    yes, count = np.ones(len(t), bool), len(t)
+    state = xy, np.full(count, np.nan), np.full(count, margin), np.zeros((count, 2))
+    return Rows(number, t, yes, ~yes, ~yes, *state, *off_road(count))
+
+
+def test_what_is_left_of_tracks_stays_as_it_is_when_more_rows_come():
+    stretches = Stretches(metres=False)
+    stretches.add(in_pixels(np.zeros(2, int), np.array([1.0, 2.0]), np.array([[3.0, 4.0], [5.0, 6.0]])))
+    lives = stretches.lives()
+    stretches.add(in_pixels(np.arange(5000), np.full(5000, 9.0), np.full((5000, 2), 7.0)))
+    assert (lives.track.tolist(), lives.until.tolist()) == ([0], [np.inf])
+    assert (lives.head.t.tolist(), lives.head.xy.tolist()) == ([1.0], [[3.0, 4.0]])
+    assert (lives.tail.t.tolist(), lives.tail.xy.tolist()) == ([2.0], [[5.0, 6.0]])
+
+
 POINT = st.tuples(st.floats(0, 640), st.floats(0, 480))
 
 
@@ -144,12 +162,8 @@ def test_passings_are_those_of_brute_force(paths, size):
     rows = sorted((k, track) for track, path in enumerate(paths) for k in range(len(path)))
     xy = np.array([paths[track][k] for k, track in rows])
     count, margin = len(rows), 8.0
-    unknown = np.full(count, np.nan)
-    yes = np.ones(count, bool)
     t = np.array([1000.0 * k for k, _ in rows])  # nobody is back within 2 s
-    number = np.array([track for _, track in rows])
-    state = xy, unknown, np.full(count, margin), np.zeros((count, 2))
-    whole = Rows(number, t, yes, ~yes, ~yes, *state, *off_road(count))
+    whole = in_pixels(np.array([track for _, track in rows]), t, xy, margin)
     passing = Passing(gates, 50.0)
     for first in range(0, count, size):  # blocks of any size give the same
         passing.add(whole.only(np.arange(first, min(first + size, count))))

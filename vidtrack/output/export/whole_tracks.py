@@ -8,7 +8,7 @@ import pyarrow as pa
 from vidtrack.arrays.types import Ints
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.footprint import partly_hidden
-from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
+from vidtrack.traffic.lengths import add_lengths, mean_length
 from vidtrack.traffic.measures.blocks import numbers
 from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS, edges, states
 from vidtrack.traffic.site import Site
@@ -34,10 +34,9 @@ class WholeTracks:
         track, t = table["track_id"].to_numpy(), column["time_s"]
         box = np.column_stack([column[name] for name in BOX])
         hidden = partly_hidden(t, box, states(table)[1])
-        terms = length_terms(column["length_m"], column["length_sigma_m"], hidden)
-        sums = length_sums(track, terms, max(len(self._sums), int(track.max(initial=-1)) + 1))
-        sums[: len(self._sums)] += self._sums
-        self._sums = sums
+        more = max(0, int(track.max(initial=-1)) + 1 - len(self._sums))
+        self._sums = np.vstack([self._sums, np.zeros((more, 4))])
+        add_lengths(self._sums, track, column["length_m"], column["length_sigma_m"], hidden)
         if EDGE_COLUMNS[0] in column:
             xy = np.column_stack([column["x_m"], column["y_m"]])
             self._vehicles.add(track, t, xy, edges(column, self._size))

@@ -15,7 +15,7 @@ from vidtrack.output.intervals.book import CountBook, Passage, totals
 from vidtrack.output.intervals.day import Plan
 from vidtrack.output.sink import Step
 from vidtrack.run.sinks import Subject
-from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
+from vidtrack.traffic.lengths import add_lengths, mean_length
 from vidtrack.traffic.lines import Crossing, Line, LineCounter, parse_line, parse_lines
 from vidtrack.traffic.measures.rows import Rows
 from vidtrack.traffic.metres import UsedSite
@@ -45,7 +45,8 @@ class RoadReadings:
         """Take rows of tracks on the road, in order of time."""
         ids, track = np.unique(rows.track, return_inverse=True)
         speeds = np.column_stack([rows.speed, rows.speed_sigma, rows.speed_shared])
-        sums = length_sums(track, length_terms(rows.length, rows.length_sigma, rows.hidden), len(ids))
+        sums = np.zeros((len(ids), 4))
+        add_lengths(sums, track, rows.length, rows.length_sigma, rows.hidden)
         last, fast = np.zeros((2, len(ids)), int)
         last[track] = np.arange(len(track))
         known = np.flatnonzero(np.isfinite(speeds[:, 0]))

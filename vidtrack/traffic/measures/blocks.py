@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.csv
 import pyarrow.parquet as pq
 
@@ -110,7 +109,6 @@ def column_names(folder: Path) -> set[str]:
 
 def numbers(table: pa.Table, name: str) -> Floats:
     """(N,) a column; NaN where it is empty."""
-    return np.concatenate(
-        [np.asarray(pc.cast(chunk, pa.float64()).to_numpy(zero_copy_only=False)) for chunk in table[name].chunks]
-        or [np.empty(0)]
-    )
+    column = table[name]
+    column = column if column.type == pa.float64() else column.cast(pa.float64())
+    return np.concatenate([chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks] or [np.empty(0)])

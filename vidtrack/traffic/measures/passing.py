@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from vidtrack.arrays.rows import room
+from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.gates import Gates
@@ -133,22 +133,23 @@ class Passing:
         """Look at some rows."""
         if len(rows) == 0:
             return
-        tracks = int(rows.track.max()) + 1
-        if tracks > len(self._state):
-            more = room(len(self._state), tracks)
-            self._state, self._far = _longer(self._state, more, np.nan), _longer(self._far, more, 0.0)
-            self._last, self._way = _longer(self._last, more, -1), _longer(self._way, more, np.nan)
+        self._make_room(int(rows.track.max()) + 1)
         row = 0
         while row < len(rows):
-            if self._count + len(self._frame) > len(self._whole):
-                more = room(len(self._whole), len(self._whole) + 64 * len(self._frame))
-                self._real, self._whole = _longer(self._real, more, 0.0), _longer(self._whole, more, 0)
+            make_room(self._real, self._count + 64 * len(self._frame), 0.0)
+            make_room(self._whole, self._count + 64 * len(self._frame), 0)
             row, self._count = _look(
                 row, self._count, rows.t, rows.xy, rows.sigma, rows.v, rows.speed_sigma, rows.speed_shared,
                 rows.track, rows.margin, rows.seen, rows.merged,
                 self._segment, self._begin, self._first, self._frame, self._reach,
                 self._state, self._way, self._far, self._last, self._real, self._whole,
             )  # fmt: skip
+
+    def _make_room(self, tracks: int) -> None:
+        make_room(self._state, tracks, np.nan)
+        make_room(self._far, tracks, 0.0)
+        make_room(self._last, tracks, -1)
+        make_room(self._way, tracks, np.nan)
 
     def passed(self) -> Passed:
         """All passings so far, each track once per gate and side.
@@ -182,8 +183,8 @@ class Passing:
 
     def ways(self, tracks: int) -> Floats:
         """(T,) what each track has driven in all, with corners _CORNER apart; 0 for those of which nothing is known."""
-        way = _longer(self._way, max(tracks, len(self._way)), np.nan)[:tracks]
-        state = _longer(self._state, max(tracks, len(self._state)), np.nan)[:tracks]
+        self._make_room(tracks)
+        way, state = self._way[:tracks], self._state[:tracks]
         rest = np.hypot(state[:, _X] - way[:, 0], state[:, _Y] - way[:, 1])
         return np.asarray(np.nan_to_num(way[:, 2] + rest))
 
@@ -199,13 +200,6 @@ def lasting(track: Ints, gate: Ints, side: Ints, t: Floats) -> Mask:
     lasting = np.ones(len(t), bool)
     lasting[order[first]] = lasting[order[first + 1]] = False
     return lasting
-
-
-def _longer(values: np.ndarray, length: int, fill: float) -> np.ndarray:
-    """(length, ...) the values, and `fill` after them."""
-    longer = np.full((length, *values.shape[1:]), fill, values.dtype)
-    longer[: len(values)] = values
-    return longer
 
 
 @kernel
@@ -231,7 +225,7 @@ def _look(
         if np.isnan(x):
             continue
         now[_T], now[_X], now[_Y], now[_SIGMA] = t[i], x, y, sigma[i]
-        now[_SPEED] = np.hypot(v[i, 0], v[i, 1])
+        now[_SPEED] = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
         now[_SPEED_SIGMA], now[_SPEED_SHARED] = speed_sigma[i], speed_shared[i]
         x0, y0 = state[k, _X], state[k, _Y]
         if np.isnan(way[k, 0]):
@@ -306,13 +300,13 @@ def _met(
 @kernel
 def _distance(x: float, y: float, segment: Floats, first: int, end: int) -> float:
     """Distance of a point from a gate."""
-    nearest = np.inf
+    nearest = np.inf  # its square
     for s in range(first, end):
         ax, ay = segment[s, 0], segment[s, 1]
         dx, dy = segment[s, 2] - ax, segment[s, 3] - ay
         place = min(max(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
-        nearest = min(nearest, np.hypot(x - ax - place * dx, y - ay - place * dy))
-    return nearest
+        nearest = min(nearest, (x - ax - place * dx) ** 2 + (y - ay - place * dy) ** 2)
+    return np.sqrt(nearest)
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from vidtrack.arrays.covariance import correlation
-from vidtrack.arrays.rows import room
+from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
@@ -162,9 +162,7 @@ class Reader:
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         rows = _on_road(ground, column, track, t, seen, merged, edge)
-        if len(self._latest) < len(self._numbers):
-            more = room(len(self._latest), len(self._numbers)) - len(self._latest)
-            self._latest = np.vstack([self._latest, np.full((more, 5), np.nan)])
+        make_room(self._latest, len(self._numbers), np.nan)
         _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
         return rows
 
@@ -214,17 +212,35 @@ def _on_road(
     ground: Ground, column: dict[str, Floats], track: Ints, t: Floats, seen: Mask, merged: Mask, edge: Floats
 ) -> Rows:
     """Rows with a calibration, from the columns of the road."""
-    xy, sigma = _positions(ground, column)
-    speed, heading = column["speed_kmh"] / 3.6, np.radians(column["heading_deg"])
-    ahead = np.column_stack([np.sin(heading), np.cos(heading)])
-    length, sx, sy = column["length_m"], column["sigma_x_m"], column["sigma_y_m"]
-    margin = _MARGIN * np.where(np.isnan(length), _USUAL_M, length)
-    speeds = speed, column["speed_sigma_kmh"] / 3.6, column["speed_shared_sigma_kmh"] / 3.6
-    sides = length, column["length_sigma_m"], column["width_m"]
-    spread = np.column_stack([sx**2, sy**2, column["corr_xy_m"] * sx * sy])
-    state = xy, sigma, margin, speed[:, None] * ahead
-    hidden = partly_hidden(t, np.column_stack([column[name] for name in BOX]), merged)
-    return Rows(track, t, seen, merged, hidden, *state, *speeds, *sides, ahead, spread, edge)
+    speed, own, shared = (column[name] / 3.6 for name in ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"))
+    xy, sigma, spread, ahead, v, margin = _laid_out(
+        *(column[name] for name in ("x_m", "y_m", "sigma_x_m", "sigma_y_m", "corr_xy_m", "heading_deg", "length_m")),
+        speed,
+    )
+    box = np.column_stack([column[name] for name in BOX])
+    _place_roughly(ground, box, xy, sigma)
+    hidden, state = partly_hidden(t, box, merged), (xy, sigma, margin, v, speed, own, shared)
+    sides = column["length_m"], column["length_sigma_m"], column["width_m"]
+    return Rows(track, t, seen, merged, hidden, *state, *sides, ahead, spread, edge)
+
+
+@kernel
+def _laid_out(
+    x: Floats, y: Floats, sigma_x: Floats, sigma_y: Floats, corr: Floats, heading: Floats, length: Floats, speed: Floats
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+    """xy, sigma, spread, ahead, v and margin of `Rows`, of columns (N,); `heading` in degrees."""
+    rows = len(x)
+    xy, spread, ahead, v = np.empty((rows, 2)), np.empty((rows, 3)), np.empty((rows, 2)), np.empty((rows, 2))
+    sigma, margin = np.empty(rows), np.empty(rows)
+    for i in range(rows):
+        xy[i, 0], xy[i, 1] = x[i], y[i]
+        sx, sy, angle = sigma_x[i], sigma_y[i], np.radians(heading[i])
+        spread[i, 0], spread[i, 1], spread[i, 2] = sx * sx, sy * sy, corr[i] * sx * sy
+        sigma[i] = np.sqrt((sx * sx + sy * sy) / 2)
+        ahead[i, 0], ahead[i, 1] = np.sin(angle), np.cos(angle)
+        v[i, 0], v[i, 1] = speed[i] * ahead[i, 0], speed[i] * ahead[i, 1]
+        margin[i] = _MARGIN * (_USUAL_M if np.isnan(length[i]) else length[i])
+    return xy, sigma, spread, ahead, v, margin
 
 
 def _needed(folder: Path, ground: Ground | None) -> tuple[str, ...]:
@@ -266,22 +282,18 @@ def edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
         return uncut(np.column_stack([column[name] for name in EDGE_COLUMNS]), size)
 
 
-def _positions(ground: Ground, column: dict[str, Floats]) -> tuple[Floats, Floats]:
-    """(N, 2) positions on the road [m] and (N,) their standard deviations.
+def _place_roughly(ground: Ground, box: Floats, xy: Floats, sigma: Floats) -> None:
+    """Place those that have no position on the road: xy (N, 2) m, sigma (N,) m; box (N, 4) px.
 
-    Where the run has none, since the calibration is not sure there or the border cuts the box, the middle of a
-    footprint that points anywhere stands in: good enough to tell the side of a gate.
+    The calibration is not sure there, or the border cuts the box. The middle of a footprint that points anywhere stands
+    in: good enough to tell the side of a gate.
     """
-    xy = np.column_stack([column["x_m"], column["y_m"]])
-    sigma = np.hypot(column["sigma_x_m"], column["sigma_y_m"]) / np.sqrt(2)
     rough = np.flatnonzero(np.isnan(xy[:, 0]))
     if len(rough):
-        box = np.column_stack([column[name][rough] for name in BOX])
         with np.errstate(invalid="ignore", divide="ignore"):
-            middle, _ = footprint(ground, box, np.full((len(rough), 2), np.nan), 0.0)
+            middle, _ = footprint(ground, box[rough], np.full((len(rough), 2), np.nan), 0.0)
             xy[rough] = ground.metres(middle)
         sigma[rough] = _ROUGH_M
-    return xy, sigma
 
 
 @kernel

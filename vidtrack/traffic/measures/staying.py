@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.rows import room
+from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
@@ -65,20 +65,15 @@ class Staying:
         if len(rows) == 0:
             return
         tracks = int(rows.track.max()) + 1
-        if tracks > len(self._last_t):
-            more = room(len(self._last_t), tracks) - len(self._last_t)
-            self._last_t = np.append(self._last_t, np.full(more, np.nan))
-            self._open = np.vstack([self._open, np.full((more, self._zones + 1), -1)])
-        unknown = np.full(len(rows), np.nan)
-        speed = np.hypot(rows.v[:, 0], rows.v[:, 1]) if self._metres else unknown
+        make_room(self._last_t, tracks, np.nan)
+        make_room(self._open, tracks, -1)
+        v = rows.v if self._metres else np.full((len(rows), 2), np.nan)
         row = 0
         while row < len(rows):
-            if self._count + self._zones + 1 > len(self._whole):
-                more = len(self._whole) + 64 * (self._zones + 1)
-                self._real = np.vstack([self._real, np.zeros((more, 5))])
-                self._whole = np.vstack([self._whole, np.zeros((more, 4), np.int64)])
+            make_room(self._real, self._count + 64 * (self._zones + 1), 0.0)
+            make_room(self._whole, self._count + 64 * (self._zones + 1), 0)
             row, self._count = _look(
-                row, self._count, rows.t, rows.xy, speed, rows.track, self._side, self._first,
+                row, self._count, rows.t, rows.xy, v, rows.track, self._side, self._first,
                 self._last_t, self._open, self._real, self._whole,
             )  # fmt: skip
 
@@ -136,7 +131,7 @@ def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
 
 @kernel
 def _look(
-    row: int, count: int, t: Floats, xy: Floats, speed: Floats, track: Ints, side: Floats, first: Ints,
+    row: int, count: int, t: Floats, xy: Floats, v: Floats, track: Ints, side: Floats, first: Ints,
     last_t: Floats, open_: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the stays need more room; the next row and stay.
@@ -153,7 +148,7 @@ def _look(
             continue
         new = np.isnan(last_t[k])
         dt = 0.0 if new else t[i] - last_t[k]
-        stands = speed[i] < STANDS_M_S
+        stands = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] < STANDS_M_S**2
         for z in range(zones + 1):
             here = stands if z == zones else _inside(x, y, side, first[z], first[z + 1])
             stay = open_[k, z]

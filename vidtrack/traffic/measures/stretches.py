@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.arrays.rows import room
+from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
-from vidtrack.traffic.lengths import length_sums, length_terms, mean_length
+from vidtrack.traffic.lengths import add_lengths, mean_length
 from vidtrack.traffic.measures.rows import Rows
 
 _PLACE_M = 0.3
@@ -90,7 +90,7 @@ class Stretches:
         self._state = np.full((0, 9), np.nan)
         self._since = np.full((0, 2 + 2 * _CHECKS), np.nan)
         self._current = np.empty(0, np.int64)
-        self._head, self._tail = np.full((2, 0, 9), np.nan)
+        self._head, self._tail = np.empty((0, 9)), np.empty((0, 9))
         self._track, self._until = np.empty(0, np.int64), np.empty(0)
         self._sums = np.zeros((0, 4))
         self._count = 0
@@ -100,53 +100,46 @@ class Stretches:
         if len(rows) == 0:
             return rows
         self._make_room(int(rows.track.max()) + 1, len(rows))
-        alone = rows.seen & ~rows.merged & np.isfinite(rows.xy[:, 0]) if self._metres else np.isfinite(rows.xy[:, 0])
         number = np.empty(len(rows), np.int64)
         self._count = _follow(
-            rows.track, rows.t, rows.xy, rows.sigma**2 + _PLACE_M**2, alone & rows.seen, self._metres, self._state,
+            rows.track, rows.t, rows.xy, rows.sigma, rows.seen, rows.merged, self._metres, self._state,
             self._since, self._current, self._head, self._tail, self._track, self._until, number, self._count,
         )  # fmt: skip
-        low = int(number.min())
-        terms = length_terms(rows.length, rows.length_sigma, rows.hidden)
-        self._sums[low : self._count] += length_sums(number - low, terms, self._count - low)
+        add_lengths(self._sums, number, rows.length, rows.length_sigma, rows.hidden)
         return replace(rows, track=number)
 
     def lives(self) -> Lives:
         """Of all stretches so far."""
         n = self._count
         ends = _end(self._head[:n]), _end(self._tail[:n])
-        return Lives(*ends, *mean_length(self._sums[:n]), self._track[:n], self._until[:n])
+        return Lives(*ends, *mean_length(self._sums[:n]), self._track[:n].copy(), self._until[:n].copy())
 
     def _make_room(self, tracks: int, rows: int) -> None:
         """For tracks (K), and for as many stretches as these rows can begin."""
-        if tracks > len(self._current):
-            more = room(len(self._current), tracks) - len(self._current)
-            self._state = np.concatenate([self._state, np.full((more * _STATES, 9), np.nan)])
-            self._since = np.concatenate([self._since, np.full((more, self._since.shape[1]), np.nan)])
-            self._current = np.concatenate([self._current, np.full(more, -1)])
+        make_room(self._state, tracks * _STATES, np.nan)
+        make_room(self._since, tracks, np.nan)
+        make_room(self._current, tracks, -1)
         stretches = self._count + rows
-        if stretches > len(self._track):
-            more = room(len(self._track), stretches) - len(self._track)
-            unknown = np.full((more, 9), np.nan)
-            self._head, self._tail = np.vstack([self._head, unknown]), np.vstack([self._tail, unknown])
-            self._track = np.concatenate([self._track, np.full(more, -1)])
-            self._until = np.concatenate([self._until, np.full(more, np.inf)])
-            self._sums = np.concatenate([self._sums, np.zeros((more, 4))])
+        make_room(self._head, stretches, np.nan)
+        make_room(self._tail, stretches, np.nan)
+        make_room(self._track, stretches, -1)
+        make_room(self._until, stretches, np.inf)
+        make_room(self._sums, stretches, 0.0)
 
 
 def _end(states: Floats) -> End:
     spread = np.column_stack([states[:, PXX] + states[:, LASTING], states[:, PXV : PVV + 1]])
-    return End(states[:, T], states[:, X : Y + 1], states[:, VX : VY + 1], spread)
+    return End(states[:, T].copy(), states[:, X : Y + 1].copy(), states[:, VX : VY + 1].copy(), spread)
 
 
 @kernel
 def _follow(
-    track: Ints, t: Floats, xy: Floats, variance: Floats, alone: Mask, metres: bool, state: Floats, since: Floats,
-    current: Ints, head: Floats, tail: Floats, of_track: Ints, until: Floats, number: Ints, count: int,
+    track: Ints, t: Floats, xy: Floats, sigma: Floats, seen: Mask, merged: Mask, metres: bool, state: Floats,
+    since: Floats, current: Ints, head: Floats, tail: Floats, of_track: Ints, until: Floats, number: Ints, count: int,
 ) -> int:  # fmt: skip
     """Number rows by stretches; returns how many there are.
 
-    t (N,), xy (N, 2), variance (N,) of a position, alone (N,) seen and in no shared blob
+    t, xy, sigma, seen, merged   (N, ...) as in `Rows`
     state   (K * _STATES, 9) of each track the long filter, then for each check what this was when the check began, and
             the filter that began with it
     since   (K, 2 + 2 _CHECKS) when the long filter began, and 1 after rows in which the track was not alone; then of
@@ -163,10 +156,11 @@ def _follow(
             count += 1
         mine = current[k]
         number[i] = mine
-        if not alone[i]:
+        x, y, first = xy[i, 0], xy[i, 1], k * _STATES
+        if not seen[i] or (metres and merged[i]) or np.isnan(x):
             since[k, 1] = 1
             continue
-        x, y, spread, first = xy[i, 0], xy[i, 1], variance[i], k * _STATES
+        spread = sigma[i] * sigma[i] + _PLACE_M**2
         new = np.isnan(state[first, T])
         if new or not metres:
             _begin(state, first, now, x, y, spread)
@@ -253,10 +247,10 @@ def _ahead(state: Floats, i: int, t: float) -> tuple[float, float, float, float,
 def _step(state: Floats, i: int, t: float, x: float, y: float, variance: float) -> float:
     """Predict and update with a row, unless it is far off; returns its squared distance."""
     px, py, xx, xv, vv = _ahead(state, i, t)
-    dx, dy, s = x - px, y - py, xx + variance
-    distance = (dx * dx + dy * dy) / s
+    dx, dy, weight = x - px, y - py, 1 / (xx + variance)
+    distance = (dx * dx + dy * dy) * weight
     if distance <= _FAR:
-        place, pace = xx / s, xv / s
+        place, pace = xx * weight, xv * weight
         state[i, T], state[i, X], state[i, Y] = t, px + place * dx, py + place * dy
         state[i, VX] += pace * dx
         state[i, VY] += pace * dy

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.rows import room
+from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 
@@ -57,10 +57,7 @@ class Knotting:
         """Look at rows: track (N,), t (N,) s, xy (N, 2) m roughly, edge (N, 4) px."""
         if len(track) == 0:
             return
-        tracks = int(track.max()) + 1
-        if tracks > len(self._open):
-            more = room(len(self._open), tracks) - len(self._open)
-            self._open = np.vstack([self._open, np.full((more, COLUMNS), np.nan)])
+        make_room(self._open, int(track.max()) + 1, np.nan)
         who, done = np.empty(len(track), np.int64), np.empty((len(track), 6))
         count = _gather(track, t, xy, edge, self._open, who, done)
         self._keep(who[:count], done[:count])
@@ -111,7 +108,7 @@ def _gather(track: Ints, t: Floats, xy: Floats, edge: Floats, open_: Floats, who
         if (
             knot[_ROWS] > 0
             and t[i] - knot[_BEGIN] >= STEP_S
-            and np.hypot(xy[i, 0] - knot[_X], xy[i, 1] - knot[_Y]) >= STEP_M
+            and (xy[i, 0] - knot[_X]) ** 2 + (xy[i, 1] - knot[_Y]) ** 2 >= STEP_M**2
         ):
             _mean(knot, done[count])
             who[count] = track[i]
