@@ -105,7 +105,10 @@ class Ground:
         unit variance that the calibration makes: with D of two positions, their covariance is D1 D2'.
         """
         X = self.plane.into(xy_m)
-        moved = np.linalg.solve(by_point(self.k, X), by_k(self.k, X))  # picture_of(k, X) stays where it is
+        (a, b), (c, d) = by_point(self.k, X).transpose(1, 2, 0)[..., None]
+        across, down = by_k(self.k, X).transpose(1, 0, 2)
+        # picture_of(k, X) stays where it is
+        moved = np.stack([d * across - b * down, a * down - c * across], axis=1) / (a * d - b * c)[:, None]
         return np.asarray(-self.plane.scale * moved @ self._errors())
 
     def varied(self) -> Iterator[tuple[Ground, Ground]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.rows import Rows
 
 _PLACE_M, _LENGTH_M, _SPEED_M_S = 1.0, 1.5, 3.0
@@ -33,18 +34,20 @@ class Bodies:
     merged: Mask
 
     @classmethod
-    def of(cls, rows: Rows) -> Bodies:
-        """The rows that the picture shows, with a place, a heading and a length that are known well enough."""
-        sure = rows.seen & np.isfinite(rows.length + rows.width + rows.xy[:, 0] + rows.v[:, 0] + rows.spread[:, 0])
-        with np.errstate(invalid="ignore"):
-            sure &= (rows.spread[:, 0] + rows.spread[:, 1]) / 2 < _PLACE_M**2
-            sure &= (rows.length_sigma < _LENGTH_M) & (rows.speed_sigma < _SPEED_M_S)
-        sides = rows.length, rows.width
-        table = np.column_stack(
-            [rows.t, rows.xy, rows.ahead, *sides, rows.v, rows.length_sigma, rows.speed_sigma, rows.spread]
-        )
-        every = cls(rows.track, table, rows.merged)
-        return every if sure.all() else every.only(np.flatnonzero(sure))
+    def nothing(cls) -> Bodies:
+        """None."""
+        return cls(np.empty(0, np.int64), np.empty((0, XY + 1)), np.empty(0, bool))
+
+    def and_also(self, rows: Rows) -> Bodies:
+        """These, and rows that the picture shows, with a place, a heading and a length that are known well enough."""
+        here, most = len(self), len(self) + len(rows)
+        track, table, merged = np.empty(most, np.int64), np.empty((most, XY + 1)), np.empty(most, bool)
+        track[:here], table[:here], merged[:here] = self.track, self.table, self.merged
+        count = _known(
+            here, rows.track, rows.t, rows.seen, rows.merged, rows.xy, rows.ahead, rows.length, rows.width,
+            rows.v, rows.length_sigma, rows.speed_sigma, rows.spread, track, table, merged,
+        )  # fmt: skip
+        return Bodies(track[:count], table[:count], merged[:count])
 
     def __len__(self) -> int:
         return len(self.track)
@@ -72,11 +75,6 @@ class Bodies:
     def only(self, chosen: Mask | Ints | slice) -> Bodies:
         """The rectangles of a mask, of indices or of a slice."""
         return Bodies(self.track[chosen], self.table[chosen], self.merged[chosen])
-
-    def and_also(self, other: Bodies) -> Bodies:
-        """Both, these first."""
-        names = [column.name for column in fields(self)]
-        return Bodies(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
 
     def after(self, seconds: Floats) -> Bodies:
         """Where they are so much later (N,) if they drive straight on."""
@@ -156,14 +154,42 @@ class Encounters:
 
     @property
     def pair(self) -> Ints:
-        """(E, 2) the two vehicles, the smaller number first."""
-        return np.sort(np.column_stack([self.first, self.second]), axis=1)
+        """(E,) one number for the two vehicles of each."""
+        return pairs(self.first, self.second)
 
     def least(self) -> Ints:
         """Indices of the moments that count, one of each two vehicles, the earlier one of equals."""
         pair = self.pair
-        order = np.lexsort((self.value, self.t, np.round(self.rank, 6), pair[:, 1], pair[:, 0]))
-        return order[np.diff(pair[order], axis=0, prepend=-1).any(axis=1)]
+        order = np.lexsort((self.value, self.t, np.round(self.rank, 6), pair))
+        return order[np.diff(pair[order], prepend=-1) != 0]
+
+
+@kernel
+def _known(
+    count: int, track: Ints, t: Floats, seen: Mask, merged: Mask, xy: Floats, ahead: Floats, length: Floats,
+    width: Floats, v: Floats, length_sigma: Floats, speed_sigma: Floats, spread: Floats,
+    tracks: Ints, table: Floats, shared: Mask,
+) -> int:  # fmt: skip
+    """Write rectangles that are known well enough into the three columns of `Bodies`, from `count` on; returns how many
+    there are then."""
+    for i in range(len(track)):
+        known = length[i] + width[i] + xy[i, 0] + v[i, 0]
+        sure = (spread[i, 0] + spread[i, 1]) / 2 < _PLACE_M**2 and length_sigma[i] < _LENGTH_M
+        if not (seen[i] and np.isfinite(known) and sure and speed_sigma[i] < _SPEED_M_S):
+            continue
+        tracks[count], shared[count] = track[i], merged[i]
+        one = table[count]
+        one[T], one[X], one[Y], one[EX], one[EY] = t[i], xy[i, 0], xy[i, 1], ahead[i, 0], ahead[i, 1]
+        one[LENGTH], one[WIDTH], one[VX], one[VY] = length[i], width[i], v[i, 0], v[i, 1]
+        one[LENGTH_SIGMA], one[SPEED_SIGMA] = length_sigma[i], speed_sigma[i]
+        one[XX], one[YY], one[XY] = spread[i, 0], spread[i, 1], spread[i, 2]
+        count += 1
+    return count
+
+
+def pairs(one: Ints, other: Ints) -> Ints:
+    """(N,) one number for each two vehicles (N,), in order of the smaller number and then of the larger one."""
+    return np.asarray(np.minimum(one, other) << 32 | np.maximum(one, other))
 
 
 def touching_place(a: Bodies, b: Bodies, n: Floats) -> Floats:

@@ -29,6 +29,7 @@ from vidtrack.traffic.measures.bodies import (
     T,
     X,
     Y,
+    pairs,
     touching_place,
 )
 
@@ -57,10 +58,10 @@ def closing(bodies: Bodies) -> Encounters:
 
 def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
     """Of rows (M, 2) with times to collision and normals (M, 3) the least of each two vehicles."""
-    pair = np.sort(bodies.track[who], axis=1)
-    order = np.lexsort((found[:, 0], pair[:, 1], pair[:, 0]))
-    new = np.diff(pair[order], axis=0, prepend=-1).any(axis=1)
-    who, (ttc, *n) = who[order[new]], found[order[new]].T
+    pair = pairs(*bodies.track[who].T)
+    order = np.lexsort((found[:, 0], pair))
+    first = order[np.diff(pair[order], prepend=-1) != 0]
+    who, (ttc, *n) = who[first], found[first].T
     behind = np.sum((bodies.xy[who[:, 1]] - bodies.xy[who[:, 0]]) * bodies.v[who].sum(axis=1), axis=1) > 0
     who[behind] = who[behind, ::-1]
     a, b, normal = bodies.only(who[:, 0]), bodies.only(who[:, 1]), np.column_stack(n)

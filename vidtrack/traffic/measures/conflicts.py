@@ -14,7 +14,7 @@ from vidtrack.traffic.measures.rows import Rows
 
 _ACROSS_RAD, _AGAINST_RAD = np.radians(85), np.radians(150)
 """Angles from which on vehicles cross (SSAM), and meet head-on"""
-_KINDS = np.array(["rear-end", "merging", "crossing", "head-on"])
+KINDS = "rear-end", "merging", "crossing", "head-on"
 TTC, PET = range(2)
 _CLEAR = 2.0
 """Standard deviations from 0"""
@@ -51,30 +51,34 @@ class Conflicts:
         return len(self.t)
 
     @property
+    def kind(self) -> Ints:
+        """(C,) what the angle says, an index of KINDS."""
+        return np.digitize(self.angle, (CROSSING_RAD, _ACROSS_RAD, _AGAINST_RAD))
+
+    @property
     def kinds(self) -> list[str]:
-        """(C,) what the angle says."""
-        return [str(kind) for kind in _KINDS[np.digitize(self.angle, (CROSSING_RAD, _ACROSS_RAD, _AGAINST_RAD))]]
+        """(C,) the same in words."""
+        return [KINDS[kind] for kind in self.kind.tolist()]
 
 
 class Meeting:
     """Takes blocks of rows in order of time; remembers those of the last _MEMORY_S, and each block's encounters."""
 
     def __init__(self) -> None:
-        self._recent: Bodies | None = None
+        self._recent = Bodies.nothing()
         self._done = -np.inf
         self._closed, self._encroached = [Encounters.nothing()], [Encounters.nothing()]
 
     def add(self, rows: Rows) -> None:
         """Look at some rows. Their last moment may go on in the next block and waits for it."""
-        bodies = Bodies.of(rows)
-        self._recent = bodies if self._recent is None else self._recent.and_also(bodies)
+        self._recent = self._recent.and_also(rows)
         if len(self._recent):
             self._look(until=self._recent.t[-1])
 
     def _look(self, until: float) -> None:
         """Take the moments before `until` that are new; for encroachments those PET_S earlier."""
         bodies = self._recent
-        if bodies is None or until <= self._done:
+        if until <= self._done:
             return
         first, last = np.searchsorted(bodies.t, [self._done, until])
         if first < last:
@@ -102,10 +106,10 @@ class Meeting:
         self._look(until)
         closed, encroached = Encounters.together(self._closed), Encounters.together(self._encroached)
         both = Encounters.together([closed, encroached])
-        pairs, row = np.unique(both.pair, axis=0, return_inverse=True)
+        pairs, row = np.unique(both.pair, return_inverse=True)
         newest = np.full(len(pairs), -np.inf)
-        np.maximum.at(newest, row.ravel(), both.t)
-        over = (newest <= self._done - 2 * PET_S)[row.ravel()]
+        np.maximum.at(newest, row, both.t)
+        over = (newest <= self._done - 2 * PET_S)[row]
         found = []
         for one, done in zip((closed, encroached), np.split(over, [len(closed)]), strict=True):
             done_ones = one.only(done & (one.first != one.second))
@@ -124,8 +128,8 @@ def _clear(met: Encounters) -> Encounters:
 
 def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:
     """One row for each two vehicles: time and place of the encroachment, else of the closing."""
-    pairs, row = np.unique(np.concatenate([closed.pair, encroached.pair]), axis=0, return_inverse=True)
-    rows = np.split(row.ravel(), [len(closed)])
+    pairs, row = np.unique(np.concatenate([closed.pair, encroached.pair]), return_inverse=True)
+    rows = np.split(row, [len(closed)])
     value, sigma, when = np.full((3, 2, len(pairs)), np.nan)
     xy, speed = np.full((2, len(pairs), 2), np.nan), np.empty((len(pairs), 2))
     first, second = np.empty((2, len(pairs)), np.int64)

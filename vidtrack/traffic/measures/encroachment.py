@@ -30,7 +30,7 @@ PET_S = 5.0
 """s; a longer post-encroachment time is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
 CROSSING_RAD = np.radians(30)
 """Vehicles whose headings differ less follow each other (SSAM: rear-end)"""
-_FOLLOWS = float(np.cos(CROSSING_RAD))
+_FOLLOWS, _ACROSS = float(np.cos(CROSSING_RAD)), float(np.sin(CROSSING_RAD))
 _LEG = 16
 """Rows; with fewer there are more boxes to compare, with more the boxes hold more road where the vehicle is not"""
 _ROUNDING_S = 1e-6
@@ -40,8 +40,8 @@ cross"""
 _SLOWEST = 0.5
 """m/s; for when a vehicle that is about to stand leaves or comes, since it does not go on with that speed"""
 
-LEFT, LOW, BEGIN, RIGHT, HIGH, END, AHEAD_X, AHEAD_Y, TURNED = range(9)
-"""Columns of legs: box [m] and time [s]; first heading, and by how much the later ones differ from it [rad]"""
+LEFT, LOW, BEGIN, RIGHT, HIGH, END, AHEAD_X, AHEAD_Y, COS_TURNED, SIN_TURNED = range(10)
+"""Columns of legs: box [m] and time [s]; first heading, and cosine and sine of the angle by which later ones differ"""
 _HULL = tuple((k, np.minimum) for k in (LEFT, LOW, BEGIN)) + tuple((k, np.maximum) for k in (RIGHT, HIGH, END))
 
 
@@ -53,7 +53,7 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
     Its value is NaN where they follow each other, or nobody knows where their ways cross: no other one counts for it.
     """
     order = _by_track(bodies.track)
-    track, rectangle = bodies.track[order], bodies.table[:, : WIDTH + 1][order]
+    track, rectangle = _sorted(bodies.track, bodies.table, order)
     i, j = _met(track, rectangle, since, until)
     late = rectangle[i, T] > rectangle[j, T]
     i, j = np.where(late, j, i), np.where(late, i, j)
@@ -82,13 +82,20 @@ def _met(track: Ints, rectangle: Floats, since: float, until: float) -> tuple[In
     return rows[:count, 0], rows[:count, 1]
 
 
+@kernel
 def _legs_begin(track: Ints) -> tuple[Ints, Ints]:
     """(L + 1,) rows at which the legs of tracks begin, and (K + 1,) the legs at which those of the next track do."""
-    new = np.diff(track, prepend=track[:1] - 1) != 0
-    since = np.flatnonzero(new)
-    number = np.arange(len(track)) - np.repeat(since, np.diff(since, append=len(track)))
-    begin = np.flatnonzero(number % _LEG == 0)
-    return np.append(begin, len(track)), np.append(np.flatnonzero(new[begin]), len(begin))
+    begin, first, legs, tracks = np.empty(len(track) + 1, np.int64), np.empty(len(track) + 1, np.int64), 0, 0
+    for i in range(len(track)):
+        if i == 0 or track[i] != track[i - 1]:
+            first[tracks] = legs
+            tracks += 1
+        elif i - begin[legs - 1] < _LEG:
+            continue
+        begin[legs] = i
+        legs += 1
+    begin[legs], first[tracks] = len(track), legs
+    return begin[: legs + 1].copy(), first[: tracks + 1].copy()
 
 
 def _details(a: Bodies, b: Bodies, steps: Floats) -> Encounters:
@@ -131,9 +138,20 @@ def _by_track(track: Ints) -> Ints:
 
 
 @kernel
+def _sorted(track: Ints, table: Floats, order: Ints) -> tuple[Ints, Floats]:
+    """(N,) tracks and (N, 7) rectangles, columns T to WIDTH, in an order."""
+    tracks, rectangle = np.empty(len(order), np.int64), np.empty((len(order), WIDTH + 1))
+    for k in range(len(order)):
+        tracks[k] = track[order[k]]
+        for column in range(WIDTH + 1):
+            rectangle[k, column] = table[order[k], column]
+    return tracks, rectangle
+
+
+@kernel
 def _legs(begin: Ints, rectangle: Floats) -> Floats:
-    """(L, 9) boxes, times and headings of legs: columns LEFT..."""
-    leg = np.empty((len(begin) - 1, 9))
+    """(L, 10) boxes, times and headings of legs: columns LEFT..."""
+    leg = np.empty((len(begin) - 1, SIN_TURNED + 1))
     for k in range(len(leg)):
         now, first = leg[k], rectangle[begin[k]]
         now[LEFT], now[LOW], now[RIGHT], now[HIGH] = np.inf, np.inf, -np.inf, -np.inf
@@ -145,7 +163,7 @@ def _legs(begin: Ints, rectangle: Floats) -> Floats:
             now[LEFT], now[RIGHT] = min(now[LEFT], x - across), max(now[RIGHT], x + across)
             now[LOW], now[HIGH] = min(now[LOW], y - up), max(now[HIGH], y + up)
             least = min(least, _cosine(first, rectangle[i]))
-        now[TURNED] = np.arccos(max(least, -1.0))
+        now[COS_TURNED], now[SIN_TURNED] = least, np.sqrt(max(1 - least * least, 0.0))
     return leg
 
 
@@ -172,7 +190,7 @@ def look(
             if count == len(rows):
                 return a, before
             legs = first[one], first[one + 1], first[other], first[other + 1]
-            i, j = _nearest(*legs, leg, begin, rectangle, since, until)
+            i, j = _nearest(*legs, life[one], leg, begin, rectangle, since, until)
             if i >= 0:
                 rows[count, 0], rows[count, 1] = i, j
                 count += 1
@@ -181,15 +199,17 @@ def look(
 
 @kernel
 def _nearest(
-    one: int, one_end: int, other: int, other_end: int, leg: Floats, begin: Ints, rectangle: Floats, since: float,
-    until: float,
+    one: int, one_end: int, other: int, other_end: int, hull: Floats, leg: Floats, begin: Ints, rectangle: Floats,
+    since: float, until: float,
 ) -> tuple[int, int]:  # fmt: skip
     """Of the legs of two tracks the rows, nearest in time, whose rectangles overlap; -1 where there are none.
 
-    The later row is not before `since`, and before `until`.
+    The later row is not before `since`, and before `until`. `hull` is the box around all legs of the first track.
     """
     best, first, second = PET_S, -1, -1
     for b in range(other, other_end):
+        if not _boxes_meet(hull, leg[b]):
+            continue
         while one < one_end and leg[one, END] < leg[b, BEGIN] - best:
             one += 1
         for a in range(one, one_end):
@@ -204,6 +224,8 @@ def _nearest(
                 t = rectangle[j, T]
                 while low < begin[a + 1] and rectangle[low, T] < t - best:
                     low += 1
+                if not _in_box(rectangle[j], leg[a]):
+                    continue
                 for i in range(low, begin[a + 1]):
                     if rectangle[i, T] > t + best:
                         break
@@ -248,10 +270,22 @@ def _boxes_meet(one: Floats, other: Floats) -> bool:
 
 
 @kernel
+def _in_box(one: Floats, leg: Floats) -> bool:
+    """Whether a rectangle may meet those of a leg."""
+    x, y, across, up = _extent(one)
+    beside = leg[LEFT] <= x + across and x - across <= leg[RIGHT]
+    return beside and leg[LOW] <= y + up and y - up <= leg[HIGH]
+
+
+@kernel
 def _crossing(one: Floats, other: Floats) -> bool:
     """Whether the headings of two legs may differ by CROSSING_RAD."""
+    cos = one[COS_TURNED] * other[COS_TURNED] - one[SIN_TURNED] * other[SIN_TURNED]
+    sin = one[SIN_TURNED] * other[COS_TURNED] + one[COS_TURNED] * other[SIN_TURNED]
+    if min(one[COS_TURNED], other[COS_TURNED], cos) <= _FOLLOWS:
+        return True  # both together turn so much
     cosine = one[AHEAD_X] * other[AHEAD_X] + one[AHEAD_Y] * other[AHEAD_Y]
-    return np.arccos(min(max(cosine, -1.0), 1.0)) + one[TURNED] + other[TURNED] >= CROSSING_RAD
+    return cosine <= _FOLLOWS * cos + _ACROSS * sin
 
 
 @kernel
@@ -267,7 +301,7 @@ def _extent(one: Floats) -> tuple[float, float, float, float]:
 
 @kernel
 def _distance(one: Floats, other: Floats) -> float:
-    return np.hypot(one[X] - other[X], one[Y] - other[Y])
+    return np.sqrt((one[X] - other[X]) ** 2 + (one[Y] - other[Y]) ** 2)
 
 
 @kernel

@@ -21,7 +21,7 @@ from vidtrack.traffic.calibration.sections import section_doubts
 from vidtrack.traffic.measures.ahead import compile_ahead
 from vidtrack.traffic.measures.by_traffic import by_stretches, contradicting
 from vidtrack.traffic.measures.checks import balance, movements
-from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
+from vidtrack.traffic.measures.conflicts import KINDS, PET, TTC, Meeting
 from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
@@ -32,7 +32,7 @@ from vidtrack.traffic.measures.rows import Reader
 from vidtrack.traffic.measures.runs import Day, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.stretches import Lives, Stretches
-from vidtrack.traffic.measures.tables import stamps, table
+from vidtrack.traffic.measures.tables import stamps, table, words
 from vidtrack.traffic.measures.trip_speeds import TripSpeeds, trip_speeds
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.naming import whole_tracks
@@ -326,14 +326,14 @@ class _Figures:
         columns: dict[str, tuple[str, Any]] = {
             "time_s": ("s", found.t),
             "utc": ("utc", stamps(self.day.utc, found.t)),
-            "kind": ("", found.kinds),
+            "kind": ("", words(KINDS, found.kind)),
             "angle_deg": ("deg", np.degrees(found.angle)),
             "run": ("n", self.session[found.second]),
         }
         for name, who, speed in zip(("first", "second"), (found.first, found.second), found.speed.T, strict=True):
             columns |= {
                 f"{name}_track_id": ("n", self.track_id[who]),
-                f"{name}_class": ("", [self.kind[k] for k in who.tolist()]),
+                f"{name}_class": ("", words(self.kind, who)),
                 f"{name}_speed_kmh": ("km/h", 3.6 * speed),
             }
         for name, kind in (("ttc", TTC), ("pet", PET)):
@@ -345,7 +345,7 @@ class _Figures:
                 **{f"{name}_x_m": ("m", x), f"{name}_y_m": ("m", y)},
                 **{f"{name}_x_px": ("px", x_px), f"{name}_y_px": ("px", y_px)},
             }
-        return table(columns | {"reason": ("", ["merged" if one else "seen" for one in found.merged.tolist()])})
+        return table(columns | {"reason": ("", words(("seen", "merged"), found.merged.astype(int)))})
 
     def _checks(self) -> pa.Table:
         found = balance(self.trips, self.edges, self.watched)
@@ -364,7 +364,7 @@ class _Figures:
     def _class_of(self, track: Ints) -> dict[str, tuple[str, Any]]:
         """The classes of tracks, and how sure they are."""
         return {
-            "class": ("", [self.kind[k] for k in track.tolist()]),
+            "class": ("", words(self.kind, track)),
             "class_probability": ("1", self.kind_probability[track]),
         }
 

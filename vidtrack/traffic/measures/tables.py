@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints
 
 _TIME = pa.timestamp("ms", "UTC")
 _KINDS: dict[str, pa.DataType] = {"": pa.string(), "1": pa.float64(), "n": pa.int64(), "yes": pa.bool_(), "utc": _TIME}
@@ -32,6 +32,11 @@ def table(columns: Mapping[str, tuple[str, Any]]) -> pa.Table:
         arrays.append(pa.array(values, kind, from_pandas=True) if not isinstance(values, pa.Array) else values)
         fields.append(pa.field(name, kind, metadata={"unit": "1" if unit in ("n", "yes", "") else unit}))
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
+
+
+def words(names: Sequence[str | None], number: Ints) -> pa.Array:
+    """(N,) the name of each number (N,)."""
+    return pa.array(names, pa.string()).take(pa.array(number))
 
 
 def stamps(utc: datetime | None, t: Floats) -> NDArray[np.datetime64]:

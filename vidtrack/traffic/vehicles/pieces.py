@@ -50,5 +50,9 @@ def _jumps(ground: Ground, t: Floats, place: Floats) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         v = np.diff(place, axis=0) / h[:, None]
         change = np.linalg.norm(np.diff(v, axis=0), axis=1)
-        sigma = _PX * np.linalg.norm(ground.by_own_error(place[1:-1]), axis=(1, 2)) * np.hypot(1 / h[1:], 1 / h[:-1])
-        return np.asarray(change > _BRAKING * (h[1:] + h[:-1]) / 2 + _SIGMAS * np.sqrt(2) * sigma)
+        change -= _BRAKING * (h[1:] + h[:-1]) / 2
+        far = np.flatnonzero(change > 0)
+        sigma = np.linalg.norm(ground.by_own_error(place[1 + far]), axis=(1, 2)) * np.hypot(1 / h[1 + far], 1 / h[far])
+        jumps = np.zeros(len(change), bool)
+        jumps[far] = change[far] > _SIGMAS * np.sqrt(2) * _PX * sigma
+        return jumps
