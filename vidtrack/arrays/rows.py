@@ -51,6 +51,21 @@ def make_room(table: np.ndarray, rows: int, fill: float) -> None:
 
 
 @kernel
+def by_number(number: Ints) -> Ints:
+    """(N,) rows in order of whole numbers (N,), those of the same one as they come. For numbers close together."""
+    low = number.min() if len(number) else 0
+    begin = np.zeros(number.max() - low + 2 if len(number) else 1, np.int64)
+    for i in range(len(number)):
+        begin[number[i] - low + 1] += 1
+    begin = np.cumsum(begin)
+    order = np.empty(len(number), np.int64)
+    for i in range(len(number)):
+        order[begin[number[i] - low]] = i
+        begin[number[i] - low] += 1
+    return order
+
+
+@kernel
 def starts(row: Ints, rows: int) -> Ints:
     """(rows + 1,) index of each row's first entry in the sorted `row` (B,); the last element is B."""
     start = np.empty(rows + 1, np.int64)

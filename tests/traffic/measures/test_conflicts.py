@@ -12,6 +12,7 @@ from vidtrack.simulate.roads.conflicts import time_to_collision
 from vidtrack.simulate.roads.events import motion
 from vidtrack.simulate.roads.stage import footprints
 from vidtrack.simulate.scene import touching
+from vidtrack.traffic.measures.bodies import least_of
 from vidtrack.traffic.measures.conflicts import PET, TTC, Meeting
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.rows import Rows
@@ -50,6 +51,17 @@ def found_in(rows, block=None, vehicle=None):
         meeting.add(rows.only(np.arange(first, min(first + block, len(rows)))))
     tracks = int(rows.track.max(initial=0)) + 1
     return meeting.conflicts(np.arange(tracks) if vehicle is None else vehicle, ALWAYS)
+
+
+RANK = st.sampled_from([0.0, 1.0, 2.0, np.nan])
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), RANK, RANK), max_size=30))
+def test_the_least_of_each_pair_is_that_of_a_sort(rows):
+    pair, one, other = np.array(rows, float).reshape(-1, 3).T
+    order = np.lexsort((other, one, pair))
+    first = order[np.diff(pair[order], prepend=-1) != 0]
+    assert least_of(pair.astype(int), one, other).tolist() == first.tolist()
 
 
 def test_one_that_drives_up_to_another_closes_the_gap():

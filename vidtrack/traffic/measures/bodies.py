@@ -159,9 +159,7 @@ class Encounters:
 
     def least(self) -> Ints:
         """Indices of the moments that count, one of each two vehicles, the earlier one of equals."""
-        pair = self.pair
-        order = np.lexsort((self.value, self.t, np.round(self.rank, 6), pair))
-        return order[np.diff(pair[order], prepend=-1) != 0]
+        return least_of(self.pair, np.round(self.rank, 6), self.t, self.value)
 
 
 @kernel
@@ -190,6 +188,19 @@ def _known(
 def pairs(one: Ints, other: Ints) -> Ints:
     """(N,) one number for each two vehicles (N,), in order of the smaller number and then of the larger one."""
     return np.asarray(np.minimum(one, other) << 32 | np.maximum(one, other))
+
+
+def least_of(pair: Ints, *ranks: Floats) -> Ints:
+    """Indices of one row of each pair (N,), in order of pairs: the least by the first of the ranks (N,).
+
+    Of equals it is the least by the next one, and so on, and then the first. NaN is more than any number.
+    """
+    least = np.argsort(pair, kind="stable")
+    for rank in (np.where(np.isnan(one), np.inf, one) for one in ranks):
+        first = np.flatnonzero(np.diff(pair[least], prepend=-1))
+        lowest = np.minimum.reduceat(rank[least], first) if len(first) else rank
+        least = least[~(rank[least] > np.repeat(lowest, np.diff(first, append=len(least))))]
+    return least[np.diff(pair[least], prepend=-1) != 0]
 
 
 def touching_place(a: Bodies, b: Bodies, n: Floats) -> Floats:

@@ -29,6 +29,7 @@ from vidtrack.traffic.measures.bodies import (
     T,
     X,
     Y,
+    least_of,
     pairs,
     touching_place,
 )
@@ -58,9 +59,7 @@ def closing(bodies: Bodies) -> Encounters:
 
 def _least(bodies: Bodies, who: Ints, found: Floats) -> Encounters:
     """Of rows (M, 2) with times to collision and normals (M, 3) the least of each two vehicles."""
-    pair = pairs(*bodies.track[who].T)
-    order = np.lexsort((found[:, 0], pair))
-    first = order[np.diff(pair[order], prepend=-1) != 0]
+    first = least_of(pairs(*bodies.track[who].T), found[:, 0])
     who, (ttc, *n) = who[first], found[first].T
     behind = np.sum((bodies.xy[who[:, 1]] - bodies.xy[who[:, 0]]) * bodies.v[who].sum(axis=1), axis=1) > 0
     who[behind] = who[behind, ::-1]

@@ -22,6 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vidtrack.arrays.rows import by_number
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.bodies import EX, EY, LENGTH, WIDTH, Bodies, Encounters, T, X, Y, touching_place
@@ -52,7 +53,7 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
 
     Its value is NaN where they follow each other, or nobody knows where their ways cross: no other one counts for it.
     """
-    order = _by_track(bodies.track)
+    order = by_number(bodies.track)
     track, rectangle = _sorted(bodies.track, bodies.table, order)
     i, j = _met(track, rectangle, since, until)
     late = rectangle[i, T] > rectangle[j, T]
@@ -120,21 +121,6 @@ def _step(track: Ints, rectangle: Floats, row: Ints, way: int) -> Floats:
     """(E,) s to the next row of the same track, or from the one before; 0 where there is none."""
     other = np.clip(row + way, 0, len(track) - 1)
     return np.where(track[other] == track[row], np.abs(rectangle[other, T] - rectangle[row, T]), 0.0)
-
-
-@kernel
-def _by_track(track: Ints) -> Ints:
-    """(N,) rows in order of tracks, those of each as they come."""
-    low = track.min() if len(track) else 0
-    begin = np.zeros(track.max() - low + 2 if len(track) else 1, np.int64)
-    for i in range(len(track)):
-        begin[track[i] - low + 1] += 1
-    begin = np.cumsum(begin)
-    order = np.empty(len(track), np.int64)
-    for i in range(len(track)):
-        order[begin[track[i] - low]] = i
-        begin[track[i] - low] += 1
-    return order
 
 
 @kernel

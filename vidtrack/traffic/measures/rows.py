@@ -278,8 +278,7 @@ def edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
     """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
     if EDGE_COLUMNS[0] not in column:
         return np.full((len(column["time_s"]), 4), np.nan)
-    with np.errstate(invalid="ignore"):
-        return uncut(np.column_stack([column[name] for name in EDGE_COLUMNS]), size)
+    return uncut(np.column_stack([column[name] for name in EDGE_COLUMNS]), size)
 
 
 def _place_roughly(ground: Ground, box: Floats, xy: Floats, sigma: Floats) -> None:

@@ -97,15 +97,12 @@ def fit(
                                       band[:n], right[:n], whole, rest)  # fmt: skip
             _factor(band[:n], right[:n])
             _eliminate(right[:n], whole, rest)
-            step = np.maximum(np.linalg.solve(whole, rest), _LEAST - size[i])
+            _invert(whole, cov[i])
+            step = np.maximum(_times(cov[i], rest), _LEAST - size[i])
             size[i] += step
             moved = max(np.abs(step).max(), _move(band[:n], right[:n], step, path[a:b]))
             if coarse == 1.0 and moved < _STILL_M:
                 break
-        inverse = np.linalg.inv(whole)
-        for s in range(SIZE):
-            for u in range(SIZE):
-                cov[i, s, u] = inverse[s, u]
         quality[i] = max(misfit, _LEAST_MISFIT)
         if strange > _FAR_SHARE:
             size[i], cov[i], quality[i] = np.nan, np.nan, np.nan
@@ -249,6 +246,32 @@ def _eliminate(right: Floats, whole: Floats, rest: Floats) -> None:
 
 
 @kernel
+def _invert(whole: Floats, inverse: Floats) -> None:
+    """Write the inverse of a symmetric positive definite matrix (SIZE, SIZE): Gauss and Jordan, column by column."""
+    inverse[:] = whole
+    for p in range(SIZE):
+        pivot = 1 / inverse[p, p]
+        inverse[p, p] = 1.0
+        for c in range(SIZE):
+            inverse[p, c] *= pivot
+        for r in range(SIZE):
+            if r != p:
+                factor, inverse[r, p] = inverse[r, p], 0.0
+                for c in range(SIZE):
+                    inverse[r, c] -= factor * inverse[p, c]
+
+
+@kernel
+def _times(matrix: Floats, vector: Floats) -> Floats:
+    """(SIZE,) product of a matrix (SIZE, SIZE) and a vector (SIZE,)."""
+    product = np.zeros(SIZE)
+    for s in range(SIZE):
+        for r in range(SIZE):
+            product[s] += matrix[s, r] * vector[r]
+    return product
+
+
+@kernel
 def _move(band: Floats, right: Floats, step: Floats, path: Floats) -> float:
     """Move the path (K, 2) as far as it goes with a step of the size (SIZE,); returns how far at most."""
     n, most = len(band), 0.0
@@ -299,7 +322,7 @@ def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
         for s in range(SIZE):
             by_size[s] -= a[r] * right[r, s]
     _solve_one(band, a)
-    size = cov @ by_size
+    size = _times(cov, by_size)
     for r in range(len(a)):
         for s in range(SIZE):
             a[r] -= right[r, s] * size[s]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.rows import make_room
+from vidtrack.arrays.rows import by_number, make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 
@@ -71,7 +71,7 @@ class Knotting:
         columns = list(zip(*self._done, strict=True))
         self._done.clear()
         values, t, who = (np.concatenate(columns.pop()) for _ in range(3))  # a day of them is large: none stays twice
-        order = np.lexsort((t, who))
+        order = by_number(who)  # those of each track come in order of time
         first = np.searchsorted(who[order], np.arange(tracks + 1))
         del who
         for column in values.T:
