@@ -1,6 +1,10 @@
 """Stays in zones, and queues: known answers and brute force."""
 
+from pathlib import Path
+
 import numpy as np
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 from drawn_runs import CALIBRATED, along, site, straight, write_run
 from hypothesis import given, settings
@@ -55,6 +59,38 @@ def test_three_wait_one_behind_the_other(tmp_path):
     assert rows[0]["begin_s"] == pytest.approx(5.5 - 0.278, abs=0.1)
     assert rows[0]["end_s"] == pytest.approx(18.1 + 0.278, abs=0.1)
     assert rows[0]["length_m"] == pytest.approx(14 + 4, abs=0.2)  # from the front of the first to the rear of the last
+
+
+def without_metres_before(run, x_px):
+    """The calibration's points begin at this place: rows before it have no metres."""
+    path = Path(run) / "tracks.parquet"
+    table = pq.read_table(path)
+    known = pc.greater_equal(table["x_px"], x_px)
+    for number, name in enumerate(table.column_names):
+        if name.endswith(("_m", "_kmh", "_deg")):
+            table = table.set_column(number, name, pc.if_else(known, table[name], None))
+    pq.write_table(table, path)
+
+
+def test_who_waits_outside_the_calibration_s_points_is_in_the_queue_but_not_in_its_length(tmp_path):
+    tracks = [stopping(1, 2.0, 300, 12.0), stopping(2, 4.0, 230, 11.0), stopping(3, 6.0, 160, 10.0)]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    without_metres_before(run, 250)
+    rows = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()
+    assert [(row["leg"], row["vehicles"], row["length_m"]) for row in rows] == [("west", 3, pytest.approx(4))]
+    assert rows[0]["begin_s"] == pytest.approx(5.5 - 0.278, abs=0.1)
+    assert rows[0]["end_s"] == pytest.approx(18.1 + 0.278, abs=1.0)  # stands until it has moved by 1.4 m
+    without_metres_before(run, 640)
+    rows = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()
+    assert [(row["leg"], row["vehicles"], row["length_m"]) for row in rows] == [("west", 3, None)]
+
+
+def test_who_drives_slowly_outside_the_calibration_s_points_does_not_stand(tmp_path):
+    run = write_run(tmp_path / "run", [straight(1, 2.0, 60, 240, 17.0, 30)], metres=True)  # 6 km/h
+    without_metres_before(run, 640)
+    tables = measured([run], site(CALIBRATED | ZONES)).tables
+    assert len(tables["queues"]) == 0
+    assert [row["standing_s"] for row in tables["stays"].to_pylist()] == [0]
 
 
 STANDING = st.tuples(st.integers(0, 200), st.integers(1, 60), st.integers(-1, 1), st.integers(0, 50))

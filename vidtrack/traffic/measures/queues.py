@@ -20,7 +20,8 @@ class Queues:
     leg         (Q,) number of the leg
     begin, end  (Q,) s
     vehicles    (Q,) largest number that stood at a time
-    length      (Q,) m; largest distance from the front of the first one, where it came to stand, to the rear of another
+    length      (Q,) m; largest distance from the front of the first one, where it came to stand, to the rear of
+                another, of those whose places are sure; NaN without any
     """
 
     leg: Ints
@@ -46,7 +47,8 @@ def queues_of(standing: Stays, leg: Ints, length: Floats) -> Queues:
     latest = np.maximum.accumulate(end + apart)
     first = np.flatnonzero(np.append(True, begin[1:] + apart[1:] - latest[:-1] > STANDING_PAUSE_S))
     queue = np.repeat(np.arange(len(first)), np.diff(np.append(first, len(leg))))
-    head = first[queue]
+    placed = np.where(np.isfinite(xy[:, 0]), np.arange(len(leg)), len(leg) - 1)
+    head = np.minimum.reduceat(placed, first)[queue]
     extent = np.linalg.norm(xy - xy[head], axis=1) + half + half[head]
     gone = np.searchsorted(np.sort(end + apart), begin + apart, side="right")
     standing_then = np.arange(len(leg)) + 1 - gone
@@ -56,5 +58,5 @@ def queues_of(standing: Stays, leg: Ints, length: Floats) -> Queues:
         begin=begin[first][by_time],
         end=np.maximum.reduceat(end, first)[by_time],
         vehicles=np.maximum.reduceat(standing_then, first)[by_time],
-        length=np.maximum.reduceat(extent, first)[by_time],
+        length=np.fmax.reduceat(extent, first)[by_time],
     )

@@ -18,6 +18,8 @@ STANDS_M_S = 5 / 3.6
 """m/s; slower vehicles stand"""
 ZONE_PAUSE_S, STANDING_PAUSE_S = 1.0, 2.0
 """s; two stays of a vehicle with less between them are one"""
+_STILL_S = 1.0
+"""s; a vehicle whose speed is not known stands when it has not moved for so long by more than one at STANDS_M_S does"""
 _LENS_STEPS = 8
 BEGIN, END, STOOD, X, Y = range(5)
 TRACK, ZONE, CAME, LEFT = range(4)
@@ -31,7 +33,7 @@ class Stays:
     begin, end      (E,) s
     stood           (E,) s of it that the vehicle stood; NaN without a calibration
     came, left      (E,) whether it was seen before and afterwards; else it was there before, or still is
-    xy              (E, 2) where it was at the beginning, in the unit of positions
+    xy              (E, 2) where it was at the beginning, in the unit of positions; NaN where that is not sure
     """
 
     zone: Ints
@@ -56,7 +58,7 @@ class Staying:
         closed = [np.column_stack([outline, np.roll(outline, -1, axis=0)]) for outline in outlines]
         self._side = np.concatenate([*closed, np.empty((0, 4))])
         self._first = np.cumsum([0, *map(len, closed)])
-        self._last_t = np.full(0, np.nan)
+        self._last_t, self._still = np.full(0, np.nan), np.full((0, 3), np.nan)
         self._open = np.full((0, self._zones + 1), -1)
         self._real, self._whole, self._count = np.zeros((0, 5)), np.zeros((0, 4), np.int64), 0
 
@@ -66,15 +68,15 @@ class Staying:
             return
         tracks = int(rows.track.max()) + 1
         make_room(self._last_t, tracks, np.nan)
+        make_room(self._still, tracks, np.nan)
         make_room(self._open, tracks, -1)
-        v = rows.v if self._metres else np.full((len(rows), 2), np.nan)
         row = 0
         while row < len(rows):
             make_room(self._real, self._count + 64 * (self._zones + 1), 0.0)
             make_room(self._whole, self._count + 64 * (self._zones + 1), 0)
             row, self._count = _look(
-                row, self._count, rows.t, rows.xy, v, rows.track, self._side, self._first,
-                self._last_t, self._open, self._real, self._whole,
+                row, self._count, rows.t, rows.xy, rows.v, rows.track, self._metres, self._side, self._first,
+                self._last_t, self._still, self._open, self._real, self._whole,
             )  # fmt: skip
 
     def in_zones(self, vehicle: Ints) -> Stays:
@@ -131,12 +133,13 @@ def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
 
 @kernel
 def _look(
-    row: int, count: int, t: Floats, xy: Floats, v: Floats, track: Ints, side: Floats, first: Ints,
-    last_t: Floats, open_: Ints, real: Floats, whole: Ints,
+    row: int, count: int, t: Floats, xy: Floats, v: Floats, track: Ints, metres: bool, side: Floats, first: Ints,
+    last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the stays need more room; the next row and stay.
 
     last_t  (T,) s; of each track; open_ (T, Z + 1) its stay in each zone, the last one for standing; -1: none
+    still   (T, 3) since when [s] a track whose speed is not known is near x, y
     real, whole   the stays: columns BEGIN... and TRACK...
     """
     zones = len(first) - 1
@@ -148,13 +151,23 @@ def _look(
             continue
         new = np.isnan(last_t[k])
         dt = 0.0 if new else t[i] - last_t[k]
-        stands = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] < STANDS_M_S**2
+        square, sure, since = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], True, t[i] - dt / 2
+        stands = metres and square < STANDS_M_S**2
+        if metres and np.isnan(square):
+            far = STANDS_M_S * _STILL_S
+            if not (x - still[k, 1]) ** 2 + (y - still[k, 2]) ** 2 <= far * far:
+                still[k, 0], still[k, 1], still[k, 2] = t[i], x, y
+            stands, sure, since = t[i] - still[k, 0] >= _STILL_S, False, still[k, 0]
+        else:
+            still[k, 1] = np.nan
         for z in range(zones + 1):
             here = stands if z == zones else _inside(x, y, side, first[z], first[z + 1])
             stay = open_[k, z]
             if here and stay < 0:
-                real[count, BEGIN], real[count, END], real[count, STOOD] = t[i] - dt / 2, t[i], 0.0
-                real[count, X], real[count, Y] = x, y
+                real[count, BEGIN], real[count, END], real[count, STOOD] = since, t[i], 0.0
+                if z < zones:
+                    real[count, BEGIN] = t[i] - dt / 2
+                real[count, X], real[count, Y] = (x, y) if sure else (np.nan, np.nan)
                 whole[count, TRACK], whole[count, ZONE], whole[count, CAME], whole[count, LEFT] = k, z, not new, 0
                 open_[k, z] = count
                 count += 1

@@ -15,7 +15,7 @@ class LegDay:
     """What came in from a leg in each interval, (I,); NaN where nobody watched.
 
     flow            vehicles/h over its entry gates
-    queue, queue_m  most vehicles that stood in one queue, and the length of the longest one [m]
+    queue, queue_m  most vehicles that stood in one queue, and the length of the longest one [m], NaN if none is known
     """
 
     leg: str
@@ -42,10 +42,10 @@ def legs_of(found: Findings) -> list[LegDay]:
         if leg not in shown:
             continue
         flow = np.bincount(at[start == leg], minlength=bins) / hours
-        queue, queue_m = np.where(watched, np.zeros((2, bins)), np.nan)
+        queue, queue_m = np.where(watched, 0.0, np.nan), np.full(bins, np.nan)
         for k in np.flatnonzero(queue_leg == leg).tolist():
             over = slice(int(first[k]), int(last[k]) + 1)
             queue[over] = np.maximum(queue[over], vehicles[k])
-            queue_m[over] = np.maximum(queue_m[over], length[k])
-        result.append(LegDay(str(leg), flow, queue, queue_m))
+            queue_m[over] = np.fmax(queue_m[over], length[k])
+        result.append(LegDay(str(leg), flow, queue, np.where(queue > 0, queue_m, queue)))
     return result
