@@ -263,7 +263,15 @@ def test_a_run_of_radar_is_refused(tmp_path):
 def test_a_damaged_table_is_told(tmp_path):
     run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
     (run / "tracks.parquet").write_bytes(b"PAR1 and then nothing")
-    with pytest.raises(FormatError, match="is damaged"):
+    with pytest.raises(
+        FormatError, match=r"tracks\.parquet is damaged: .*; vidtrack repair .* makes it from tracks\.csv"
+    ):
+        measured([str(run)], site())
+    (run / "tracks.parquet").unlink()
+    (run / "tracks.csv").write_bytes(b"\xff\x00,\r,\xfe\n1,2\r")
+    summary = json.loads((run / "summary.json").read_text())
+    (run / "summary.json").write_text(json.dumps(summary | {"interrupted": False}))
+    with pytest.raises(FormatError, match=r"tracks\.csv is damaged: .*; vidtrack repair .* may help"):
         measured([str(run)], site())
 
 

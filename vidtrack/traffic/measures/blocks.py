@@ -67,7 +67,7 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
                     yield pa.Table.from_batches(waiting)
                     waiting.clear()
     except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} makes it from tracks.csv") from None
+        raise _damaged(path, error) from None
     if waiting:
         yield pa.Table.from_batches(waiting)
 
@@ -98,13 +98,22 @@ def _whole_lines(path: Path) -> int:
 def column_names(folder: Path) -> set[str]:
     """Names of the columns of a run's table of tracks. Raises FormatError."""
     path = folder / "tracks.parquet"
-    try:
-        if path.is_file():
+    if path.is_file():
+        try:
             return set(pq.read_schema(path).names)
-        with (folder / "tracks.csv").open(encoding="utf-8") as file:
+        except pa.ArrowInvalid as error:
+            raise _damaged(path, error) from None
+    path = folder / "tracks.csv"
+    try:
+        with path.open(encoding="utf-8") as file:
             return set(file.readline().strip().split(","))
-    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
-        raise FormatError(f"{path} is damaged: {error}") from None
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} may help") from None
+
+
+def _damaged(path: Path, error: Exception) -> FormatError:
+    """What is wrong with a Parquet table, and what to do."""
+    return FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} makes it from tracks.csv")
 
 
 def numbers(table: pa.Table, name: str) -> Floats:

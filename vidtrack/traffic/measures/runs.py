@@ -259,7 +259,10 @@ def _cut_off(folder: Path) -> bool:
 
 
 def _cells(line: bytes) -> int:
-    return len(next(csv.reader([line.decode("utf-8", errors="replace")])))
+    try:
+        return len(next(csv.reader([line.decode("utf-8", errors="replace")])))
+    except csv.Error:  # no line of a table
+        return 0
 
 
 def _split(run: str) -> tuple[Path, datetime | None]:
