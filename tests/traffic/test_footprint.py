@@ -8,8 +8,9 @@ import pytest
 from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 
 from vidtrack.formats import read_mot
+from vidtrack.traffic.boxes import partly_hidden, uncut
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut, velocity
+from vidtrack.traffic.footprint import Footprints, footprint, velocity
 from vidtrack.traffic.site import Site
 
 CAMERA = Pinhole()

@@ -9,8 +9,9 @@ import numpy as np
 from vidtrack.arrays.types import Floats
 from vidtrack.scan import Scan
 from vidtrack.tracks import Tracks
+from vidtrack.traffic.boxes import within
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, within
+from vidtrack.traffic.footprint import Footprints
 
 UNKNOWN_PX_S = 1e3
 """px/s; standard deviation of the velocity of a blob without a track."""

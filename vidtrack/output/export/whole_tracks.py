@@ -6,8 +6,8 @@ import numpy as np
 import pyarrow as pa
 
 from vidtrack.arrays.types import Ints
+from vidtrack.traffic.boxes import partly_hidden
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.footprint import partly_hidden
 from vidtrack.traffic.lengths import add_lengths, mean_length
 from vidtrack.traffic.measures.blocks import numbers
 from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS, edges, states

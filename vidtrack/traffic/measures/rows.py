@@ -15,8 +15,9 @@ from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
+from vidtrack.traffic.boxes import partly_hidden, uncut
 from vidtrack.traffic.calibration.ground import Ground
-from vidtrack.traffic.footprint import Footprints, footprint, partly_hidden, uncut
+from vidtrack.traffic.footprint import Footprints, footprint
 from vidtrack.traffic.lines import foot_of
 from vidtrack.traffic.measures.blocks import blocks, column_names, numbers, whole_pictures
 from vidtrack.traffic.measures.runs import Day, Recording

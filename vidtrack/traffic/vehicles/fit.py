@@ -17,10 +17,9 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import inlined, kernel
+from vidtrack.traffic.vehicles.band import BAND, SIZE, eliminate, factor, invert, move, solve_back, solve_one, times
 from vidtrack.traffic.vehicles.cuboid import box_edges
 
-SIZE = 4
-"""Numbers of the whole track: length, width, height [m], and by how much the boxes are too wide [px]."""
 MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 1.0, 1.2, 1.0])
 """The size as it is known beforehand."""
 _LEAST = np.array([0.3, 0.3, 0.5, -5.0])
@@ -53,8 +52,6 @@ _ROUNDING_M = 1.2
 """m; a body is no cuboid. As it turns, the points that its edges rest on move along it by as much in a radian"""
 _LEAST_MISFIT = 0.05
 """Of noise as it is stated above: it is not taken to be less, however well a short track fits."""
-_BAND = 4
-"""Places beside the diagonal of the normal matrix, for two coordinates and two neighbours"""
 _LEAST_KNOTS, _LEAST_PATH_M, _SPEED_KNOTS = 3, 2.0, 4
 """For a size; a speed needs more."""
 
@@ -76,7 +73,7 @@ def fit(
     most = 0
     for i in range(len(first) - 1):
         most = max(most, first[i + 1] - first[i])
-    band, right = np.empty((2 * most, _BAND + 1)), np.empty((2 * most, SIZE + 1))
+    band, right = np.empty((2 * most, BAND + 1)), np.empty((2 * most, SIZE + 1))
     heading, whole, rest = np.empty((most, 2)), np.empty((SIZE, SIZE)), np.empty(SIZE)
     for i in range(len(first) - 1):
         a, b = first[i], first[i + 1]
@@ -95,12 +92,12 @@ def fit(
             _headings(path[a:b], heading)
             misfit, strange = _normal(t[a:b], edge[a:b], rows[a:b], path[a:b], heading, size[i], G, up, coarse,
                                       band[:n], right[:n], whole, rest)  # fmt: skip
-            _factor(band[:n], right[:n])
-            _eliminate(right[:n], whole, rest)
-            _invert(whole, cov[i])
-            step = np.maximum(_times(cov[i], rest), _LEAST - size[i])
+            factor(band[:n], right[:n])
+            eliminate(right[:n], whole, rest)
+            invert(whole, cov[i])
+            step = np.maximum(times(cov[i], rest), _LEAST - size[i])
             size[i] += step
-            moved = max(np.abs(step).max(), _move(band[:n], right[:n], step, path[a:b]))
+            moved = max(np.abs(step).max(), move(band[:n], right[:n], step, path[a:b]))
             if coarse == 1.0 and moved < _STILL_M:
                 break
         quality[i] = max(misfit, _LEAST_MISFIT)
@@ -109,7 +106,7 @@ def fit(
             continue
         if b - a < _SPEED_KNOTS or asked_of[i] == asked_of[i + 1]:
             continue
-        _solve_back(band[:n], right[:n])
+        solve_back(band[:n], right[:n])
         for w in range(asked_of[i], asked_of[i + 1]):
             _speed(t[a:b], path[a:b], asked[w], band[:n], right[:n], size[i], cov[i], quality[i], speed[w])
             speed[w, 4] += a
@@ -136,7 +133,7 @@ def _normal(
     t: Floats, edge: Floats, rows: Floats, path: Floats, heading: Floats, size: Floats, G: Floats, up: Floats,
     coarse: float, band: Floats, right: Floats, whole: Floats, rest: Floats,
 ) -> tuple[float, float]:  # fmt: skip
-    """Write the normal equations: of the path band (2 K, _BAND + 1) and, with its coupling to the size and its right
+    """Write the normal equations: of the path band (2 K, BAND + 1) and, with its coupling to the size and its right
     side, right (2 K, SIZE + 1); of the size whole (SIZE, SIZE) and rest (SIZE,).
 
     Returns the misfit, 1 where the noise is as stated, and the share of edges that are far off.
@@ -209,120 +206,14 @@ def _bending(t: Floats, k: int, c: Floats) -> None:
 
 
 @kernel
-def _factor(band: Floats, right: Floats) -> None:
-    """Cholesky's factor of a band matrix (n, _BAND + 1), row i has (i, i), (i, i - 1), ...; in place.
-
-    Of the diagonal it has the inverses, since all that is done with it is to divide by it. The right sides
-    (n, SIZE + 1) are solved with the factor on the way, not yet with its transpose.
-    """
-    for i in range(len(band)):
-        reach = min(i, _BAND)
-        for d in range(reach, 0, -1):
-            value = band[i, d]
-            for m in range(reach, d, -1):
-                value -= band[i, m] * band[i - d, m - d]
-            band[i, d] = value * band[i - d, 0]
-        value = band[i, 0]
-        for d in range(1, reach + 1):
-            value -= band[i, d] ** 2
-            for c in range(SIZE + 1):
-                right[i, c] -= band[i, d] * right[i - d, c]
-        band[i, 0] = 1 / np.sqrt(max(value, 1e-12))
-        for c in range(SIZE + 1):
-            right[i, c] *= band[i, 0]
-
-
-@kernel
-def _eliminate(right: Floats, whole: Floats, rest: Floats) -> None:
-    """Take the path out of the size's equations (Schur complement), with the right sides as `_factor` leaves them."""
-    for k in range(len(right)):
-        for s in range(SIZE):
-            for r in range(s + 1):
-                whole[s, r] -= right[k, s] * right[k, r]
-            rest[s] -= right[k, s] * right[k, SIZE]
-    for s in range(SIZE):
-        for r in range(s):
-            whole[r, s] = whole[s, r]
-
-
-@kernel
-def _invert(whole: Floats, inverse: Floats) -> None:
-    """Write the inverse of a symmetric positive definite matrix (SIZE, SIZE): Gauss and Jordan, column by column."""
-    inverse[:] = whole
-    for p in range(SIZE):
-        pivot = 1 / inverse[p, p]
-        inverse[p, p] = 1.0
-        for c in range(SIZE):
-            inverse[p, c] *= pivot
-        for r in range(SIZE):
-            if r != p:
-                factor, inverse[r, p] = inverse[r, p], 0.0
-                for c in range(SIZE):
-                    inverse[r, c] -= factor * inverse[p, c]
-
-
-@kernel
-def _times(matrix: Floats, vector: Floats) -> Floats:
-    """(SIZE,) product of a matrix (SIZE, SIZE) and a vector (SIZE,)."""
-    product = np.zeros(SIZE)
-    for s in range(SIZE):
-        for r in range(SIZE):
-            product[s] += matrix[s, r] * vector[r]
-    return product
-
-
-@kernel
-def _move(band: Floats, right: Floats, step: Floats, path: Floats) -> float:
-    """Move the path (K, 2) as far as it goes with a step of the size (SIZE,); returns how far at most."""
-    n, most = len(band), 0.0
-    for r in range(n - 1, -1, -1):
-        change = right[r, SIZE]
-        for s in range(SIZE):
-            change -= right[r, s] * step[s]
-        for d in range(1, min(n - 1 - r, _BAND) + 1):
-            change -= band[r + d, d] * right[r + d, SIZE]
-        change *= band[r, 0]
-        right[r, SIZE] = change
-        path[r // 2, r % 2] += change
-        most = max(most, abs(change))
-    return most
-
-
-@kernel
-def _solve_back(band: Floats, right: Floats) -> None:
-    """Solve for the coupling to the size, the first SIZE right sides, with the transpose of the factor, too."""
-    n = len(band)
-    for i in range(n - 1, -1, -1):
-        for d in range(1, min(n - 1 - i, _BAND) + 1):
-            for c in range(SIZE):
-                right[i, c] -= band[i + d, d] * right[i + d, c]
-        for c in range(SIZE):
-            right[i, c] *= band[i, 0]
-
-
-@kernel
-def _solve_one(band: Floats, right: Floats) -> None:
-    """Solve for one right side (n,)."""
-    n = len(band)
-    for i in range(n):
-        for d in range(1, min(i, _BAND) + 1):
-            right[i] -= band[i, d] * right[i - d]
-        right[i] *= band[i, 0]
-    for i in range(n - 1, -1, -1):
-        for d in range(1, min(n - 1 - i, _BAND) + 1):
-            right[i] -= band[i + d, d] * right[i + d]
-        right[i] *= band[i, 0]
-
-
-@kernel
 def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
     """Solve for one right side a (n,) of the path, together with the size, in place: the path's share."""
     by_size = np.zeros(SIZE)
     for r in range(len(a)):
         for s in range(SIZE):
             by_size[s] -= a[r] * right[r, s]
-    _solve_one(band, a)
-    size = _times(cov, by_size)
+    solve_one(band, a)
+    size = times(cov, by_size)
     for r in range(len(a)):
         for s in range(SIZE):
             a[r] -= right[r, s] * size[s]
@@ -337,7 +228,7 @@ def _variances(band: Floats, right: Floats, cov: Floats, a: Floats, begin: int) 
         for s in range(SIZE):
             for m in range(2 * _NEAR):
                 by_size[s, m] -= a[r, m] * right[r, s]
-        for d in range(1, min(r - begin, _BAND) + 1):
+        for d in range(1, min(r - begin, BAND) + 1):
             for m in range(2 * _NEAR):
                 a[r, m] -= band[r, d] * a[r - d, m]
         for m in range(2 * _NEAR):

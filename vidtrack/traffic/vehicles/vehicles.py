@@ -9,8 +9,9 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.calibration.ground import Ground
+from vidtrack.traffic.vehicles.band import SIZE
 from vidtrack.traffic.vehicles.classes import Classified, classified
-from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, SIZE, fit
+from vidtrack.traffic.vehicles.fit import MEAN, SIGMA, fit
 from vidtrack.traffic.vehicles.knots import Knots, Knotting
 from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
