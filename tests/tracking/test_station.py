@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import expm
 
 import vidtrack as vt
+from vidtrack.estimate.fixed_gain import FixedGainBank
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.station import Visibility
@@ -171,3 +172,10 @@ def test_what_a_radar_sees_or_is_far_too_fast_for_its_blind_zone_is_left_as_it_i
 
 def test_a_radar_without_a_blind_zone_has_none():
     assert Sector((0.0, 0.0), 100.0).blind is None
+
+
+def test_a_filter_of_fixed_gain_takes_positions_only():
+    filters = FixedGainBank(vt.ConstantVelocity(), 1.0)
+    filters.insert(np.array([[30.0, 0.5, 0.0, 0.0]]), np.eye(4)[None], np.ones(1))
+    Sector((0.0, 0.0), 100.0, slowest=1.0).blind.update(filters, 0.0, np.ones(1, bool), 0.9)
+    np.testing.assert_array_equal(filters.x, [[30.0, 0.5, 0.0, 0.0]])
