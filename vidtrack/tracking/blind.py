@@ -9,6 +9,7 @@ import numpy as np
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.decision import Decision
 from vidtrack.estimate.bank import Estimator
+from vidtrack.estimate.noise import as_if_new
 from vidtrack.estimate.sensor import Sensor
 from vidtrack.scan import Scan
 
@@ -32,8 +33,11 @@ class BlindZone:
     sensor: Sensor
     sigma: float
 
-    def update(self, bank: Estimator, t: float, missed: Mask, detection: float | Floats) -> None:
-        """Update the rows of a bank that were missed (T,) at t [s], at P of `detection`, one for all or (T,)."""
+    def update(self, bank: Estimator, t: float, missed: Mask, detection: float | Floats, since: float = 0.0) -> None:
+        """Update the rows of a bank that were missed (T,) at t [s], at P of `detection`, one for all or (T,).
+
+        since  seconds since the sensor's last scan: how far h is from zero lasts, as errors of blobs do
+        """
         zhat, cov = bank.predicted_measurement(self.sensor)
         S = cov[:, 0, 0] + self.sigma**2
         there = detection * np.sqrt(self.sigma**2 / S) * np.exp(-(zhat[:, 0] ** 2) / (2 * S))
@@ -41,6 +45,6 @@ class BlindZone:
         beta[beta < LEAST] = 0.0
         row = beta.nonzero()[0]
         if len(row):
-            zero = Scan(t, np.zeros((1, 1)), np.full((1, 1), self.sigma**2), self.sensor)
+            zero = Scan(t, np.zeros((1, 1)), as_if_new(np.full((1, 1), self.sigma**2), since), self.sensor)
             decision = Decision(np.arange(len(bank)), row, np.zeros(len(row), np.int64), beta[row], 1 - beta)
             bank.update(decision, zero, self.sensor)

@@ -154,15 +154,18 @@ class Stations:
             detection = detection * register.visible[:, number]
         return detection * share, clutter
 
-    def miss(self, scan: Scan, missed: Mask, register: Register, bank: Estimator) -> None:
-        """Update the rows of a bank that the scan did not show (T,) by what that tells of them."""
+    def miss(self, scan: Scan, missed: Mask, register: Register, bank: Estimator, since: float) -> None:
+        """Update the rows of a bank that the scan did not show (T,) by what that tells of them.
+
+        since: seconds after the station's last scan
+        """
         station = self.each[scan.station]
         if station.blind is None:
             return
         missed = missed & (self.share(scan, bank.x, bank.model) > 0)
         if np.count_nonzero(missed):
             sight = 1.0 if station.visibility is None else register.visible[:, scan.station]
-            station.blind.update(bank, scan.t, missed, station.rates.detection(register.run) * sight)
+            station.blind.update(bank, scan.t, missed, station.rates.detection(register.run) * sight, since)
 
     def record(
         self, scan: Scan, register: Register, x: Floats, model: Motion, hit: Mask, sure: Mask, detection: Floats,
