@@ -200,6 +200,7 @@ def build_road_tracker(
             ),
             feed.coverage,
             BY_RADAR,
+            blind=feed.coverage.blind,
         )
         for feed in feeds
     ]
