@@ -136,8 +136,9 @@ def test_an_opening_is_read_twice_only_if_it_is_large_or_longer_than_the_source(
 
 
 def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):
-    with pytest.raises(ConfigError, match="preview_s has no effect on a camera"):
-        load(assignments=["detector.disturbance.preview_s=3"], kind=Input.CAMERA)
+    for setting in ("preview_s=3", "patches=false"):
+        with pytest.raises(ConfigError, match="has no effect on a camera"):
+            load(assignments=[f"detector.disturbance.{setting}"], kind=Input.CAMERA)
     for k, frame in enumerate(frames(2, drives_off)):
         cv2.imwrite(str(tmp_path / f"{k:03d}.png"), frame.y)
     ghost = {}

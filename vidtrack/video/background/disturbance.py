@@ -18,6 +18,7 @@ from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import brightest, contrast, disturbance, haziness, strong, veil
 from vidtrack.video.background.exposure import follow_gain, follow_tint
 from vidtrack.video.background.majority import majority
+from vidtrack.video.background.patches import patched
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
@@ -94,10 +95,13 @@ class Disturbance:
                 pictures.append((frame.time_s, smooth(self._view.reduce(frame))))
         if len(pictures) < 2:
             return
-        nothing = np.empty((0, 4))
+        nothing, stands = np.empty((0, 4)), True
         for time_s, picture in reversed(pictures):
             self._apply(picture, -time_s, nothing)
+            stands &= not self._camera.moves
         self._rewind(*pictures[0])
+        if stands and self._settings.patches:
+            self._scene = patched(self._scene, [picture for _, picture in pictures])
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""
