@@ -16,6 +16,8 @@ from vidtrack.config.video import DetectorSettings
 from vidtrack.errors import ConfigError
 from vidtrack.run.video import build_detector, look_ahead, track
 from vidtrack.video.background import create
+from vidtrack.video.background.shadow import _HARD as HARD
+from vidtrack.video.background.shadow import SOFT, Sunlight
 from vidtrack.video.frame import Frame
 from vidtrack.video.pictures import ImageSequence
 from vidtrack.video.source import open_source
@@ -150,3 +152,17 @@ def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):
             ghost[seconds] = detector.apply(next(source), NONE_KNOWN).mask.any()
     assert ghost == {0: False, 2: True}
     assert len(list(track(tmp_path, load(assignments=["source.fps=10"])))) == 20
+
+
+@pytest.mark.parametrize(("ahead", "sunlight", "seconds"), [(True, HARD, 5), (True, SOFT, 1), (False, HARD, 1)])
+def test_shadow_becomes_scene_late_after_a_preview_in_the_sun(monkeypatch, ahead, sunlight, seconds):
+    waits = []
+    monkeypatch.setattr(Sunlight, "tolerance", sunlight)
+    shown = list(frames(3, stands))
+    detector = create(DetectorSettings())
+    if ahead:
+        detector.preview(shown)
+    monkeypatch.setattr("vidtrack.video.background.disturbance.absorb", lambda *given: waits.append(float(given[-1])))
+    for frame in shown:
+        detector.apply(frame, NONE_KNOWN)
+    assert set(waits) == {seconds}

@@ -60,8 +60,10 @@ class Disturbance:
         "_veil_by_place",
         "_coloured",
         "_dark",
+        "_previewed",
     )
     ADDED: ClassVar = {
+        "_previewed": lambda found: False,
         "_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black)),
         "_brightest": lambda found: brightest(found._scene.luma),
     }
@@ -81,6 +83,7 @@ class Disturbance:
         self._coloured, self._dark = True, False
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
+        self._previewed = False  # since the start
         self._frames = 0  # learnt since the start
         self._changed_s = 0.0  # how long the picture has been another one
 
@@ -112,7 +115,7 @@ class Disturbance:
             self._scene = self._start(picture, time_s)
         dt, self._time_s = time_s - self._time_s, time_s
         if dt > _GAP_S:
-            self._start_s = time_s
+            self._start_s, self._previewed = time_s, False
         known = self._camera.on_canvas(known, self._view.step)
         if self._settings.registration:
             self._scene = self._camera.follow(picture.luma, self._scene, known, time_s)
@@ -149,7 +152,7 @@ class Disturbance:
         self._camera = Camera(self._settings.still_s)
         self._change = Change(self._settings.relearn_share)
         self._time_s = self._start_s = time_s
-        self._frames, self._changed_s = 0, 0.0
+        self._frames, self._changed_s, self._previewed = 0, 0.0, not lost
 
     def _map(
         self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
@@ -195,7 +198,7 @@ class Disturbance:
 
     def _start(self, picture: Picture, time_s: float) -> Scene:
         self._time_s = self._start_s = time_s
-        self._frames = 0
+        self._frames, self._previewed = 0, False
         self._change.restart(time_s)
         self._camera.restart()
         scene = start(picture)
@@ -285,5 +288,6 @@ class Disturbance:
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
         """Absorb pixels covered for absorb_s, and lasting shadow, into the scene."""
         s = self._settings
-        shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
+        cast = self._previewed and self._sunlight.tolerance is not SOFT
+        shadow_s = _UNSURE_SHADOW_S if self._unsure and not cast else _SHADOW_S
         absorb(picture, scene, hit, np.float32(s.absorb_s), np.float32(s.steady_s), np.float32(shadow_s))
