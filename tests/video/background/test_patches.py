@@ -79,6 +79,13 @@ def test_the_smooth_side_of_a_lorry_is_not_taken_for_a_marked_road():
     assert off(patched(before, pictures), ground).sum() < 50
 
 
+def test_after_a_change_of_the_whole_light_the_scene_stays():
+    ground = road()
+    pictures = [picture(ground, queue(t)) for t in range(-20, 30)]
+    before = start(picture(ground - 40, queue(0)))
+    assert patched(before, pictures) is before
+
+
 def test_a_picture_smaller_than_a_patch_has_none():
     tiny = start(Picture(*(np.zeros((side, side), np.uint8) for side in (4, 2, 2))))
     assert patched(tiny, [Picture(*(np.full((side, side), 200, np.uint8) for side in (4, 2, 2)))] * 5) is tiny
