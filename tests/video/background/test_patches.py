@@ -73,7 +73,7 @@ def test_marks_on_the_road_that_smooth_lorries_hide_for_most_of_the_time_stay():
 
 def test_the_smooth_side_of_a_lorry_is_not_taken_for_a_marked_road():
     ground = road(marked=True)
-    pictures = [picture(ground, [(-20, 200, (140, 128, 128))] if t < 30 else ()) for t in range(50)]
+    pictures = [picture(ground, [(30, 90, (140, 128, 128))] if t < 30 else ()) for t in range(50)]
     before = start(picture(ground, [(62, 26, CARS[0])]))
     assert off(before, ground).sum() > 500
     assert off(patched(before, pictures), ground).sum() < 50
