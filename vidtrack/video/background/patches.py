@@ -20,7 +20,7 @@ from vidtrack.video.frame import Image
 _SIDE = 8  # px of a patch
 _ALIKE = 15  # grey levels, of luminance and both chromas together, within which pixels are the same
 _HIDDEN = 0.5  # share of the pictures that do not show the scene, above which a patch is doubted
-_MOST = 0.25  # share of the patches, above which the light or the view has changed, not the traffic
+_MOST = 0.4  # share of the patches, above which the light or the view has changed, not the traffic
 _BESIDE = 0.2  # share of the known patches around that a picture may hide, and still show the road between them
 _PICTURES = 2  # that must show a patch alike
 _APART = 3  # px over which steps are taken
