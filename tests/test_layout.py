@@ -41,6 +41,7 @@ FLOORS = (
     "config",
     "state",
     "errors",
+    "beside",
     "compiled",
 )
 """From the top: a file may import its own floor and those below it."""

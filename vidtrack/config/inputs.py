@@ -33,7 +33,8 @@ _OF_PICTURES = (
 _UNREAD = {
     Input.VIDEO: ("detections", "radar", "live", "events", "tracker.redundant"),
     Input.CAMERA: (
-        *("detections", "radar", "tracker.redundant", "detector.disturbance.preview_s"),
+        *("detections", "radar", "tracker.redundant"),
+        *("detector.disturbance.preview_s", "detector.disturbance.patches"),
         *("output.smooth", "output.smooth_lag_s"),
     ),
     Input.DETECTIONS: (

@@ -63,6 +63,8 @@ class DisturbanceSettings(Group):
     """s; the same for foreground that does not change while it stands"""
     preview_s: float = Field(10.0, ge=0)
     """s; the scene is learnt from so much of a file, run backwards, before tracking begins; 0: from the first frame"""
+    patches: bool = True
+    """what most of these seconds hide is taken from their pictures in which the road around it is free"""
     relearn_share: float = Field(0.6, gt=0, le=1)
     """share of the picture; a larger foreground is a change of light or view, not traffic"""
     relearn_s: float = Field(1.0, ge=0)

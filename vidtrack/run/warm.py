@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from atexit import register
 from collections.abc import Iterator
 from itertools import islice
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from vidtrack.arrays.types import Ints
-from vidtrack.compiled import CACHE, PACKAGE
+from vidtrack.beside import python
+from vidtrack.compiled import CACHE
 from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, video_steps
@@ -57,11 +57,7 @@ def warm() -> None:
 def warm_beside() -> None:
     """Start `warm` in a process of its own, for the first run on a machine with a second core; it ends with ours."""
     if CACHE and (cpu_count() or 1) > 1:
-        helper = subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import warm; warm()"],
-            cwd=PACKAGE.parent,  # Python looks there first: another vidtrack, as a clone, would have kernels of its own
-            stderr=subprocess.DEVNULL,
-        )
+        helper = subprocess.Popen(python(f"from {__name__} import warm; warm()"), stderr=subprocess.DEVNULL)
         register(helper.kill)
 
 

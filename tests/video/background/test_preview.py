@@ -16,6 +16,8 @@ from vidtrack.config.video import DetectorSettings
 from vidtrack.errors import ConfigError
 from vidtrack.run.video import build_detector, look_ahead, track
 from vidtrack.video.background import create
+from vidtrack.video.background.shadow import _HARD as HARD
+from vidtrack.video.background.shadow import SOFT, Sunlight
 from vidtrack.video.frame import Frame
 from vidtrack.video.pictures import ImageSequence
 from vidtrack.video.source import open_source
@@ -136,8 +138,9 @@ def test_an_opening_is_read_twice_only_if_it_is_large_or_longer_than_the_source(
 
 
 def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):
-    with pytest.raises(ConfigError, match="preview_s has no effect on a camera"):
-        load(assignments=["detector.disturbance.preview_s=3"], kind=Input.CAMERA)
+    for setting in ("preview_s=3", "patches=false"):
+        with pytest.raises(ConfigError, match="has no effect on a camera"):
+            load(assignments=[f"detector.disturbance.{setting}"], kind=Input.CAMERA)
     for k, frame in enumerate(frames(2, drives_off)):
         cv2.imwrite(str(tmp_path / f"{k:03d}.png"), frame.y)
     ghost = {}
@@ -149,3 +152,17 @@ def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):
             ghost[seconds] = detector.apply(next(source), NONE_KNOWN).mask.any()
     assert ghost == {0: False, 2: True}
     assert len(list(track(tmp_path, load(assignments=["source.fps=10"])))) == 20
+
+
+@pytest.mark.parametrize(("ahead", "sunlight", "seconds"), [(True, HARD, 5), (True, SOFT, 1), (False, HARD, 1)])
+def test_shadow_becomes_scene_late_after_a_preview_in_the_sun(monkeypatch, ahead, sunlight, seconds):
+    waits = []
+    monkeypatch.setattr(Sunlight, "tolerance", sunlight)
+    shown = list(frames(3, stands))
+    detector = create(DetectorSettings())
+    if ahead:
+        detector.preview(shown)
+    monkeypatch.setattr("vidtrack.video.background.disturbance.absorb", lambda *given: waits.append(float(given[-1])))
+    for frame in shown:
+        detector.apply(frame, NONE_KNOWN)
+    assert set(waits) == {seconds}

@@ -6,12 +6,12 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import threading
 from contextlib import suppress
 from selectors import EVENT_READ, DefaultSelector
 from typing import Any
 
+from vidtrack.beside import python
 from vidtrack.run.batch.task import VERSION, Outcome
 from vidtrack.video.resources import CORES
 
@@ -54,7 +54,7 @@ class Child:
     def __init__(self, out: str) -> None:
         self.out = out
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "vidtrack.run.batch.worker"],
+            python("from vidtrack.run.batch.worker import main; main()"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

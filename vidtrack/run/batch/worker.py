@@ -1,7 +1,4 @@
-"""The process that does tasks: one task a line of standard input, beats and outcomes as lines of standard output.
-
-python -m vidtrack.run.batch.worker
-"""
+"""The process that does tasks: one task a line of standard input, beats and outcomes as lines of standard output."""
 
 from __future__ import annotations
 
@@ -44,7 +41,3 @@ def _own_output() -> TextIO:
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     return answers
-
-
-if __name__ == "__main__":
-    main()

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
+from vidtrack.beside import python
 from vidtrack.compiled import CACHE, kept
 from vidtrack.traffic.measures.encroachment import look
 from vidtrack.traffic.measures.runs import Day
@@ -16,13 +17,7 @@ from vidtrack.traffic.site import Site
 _LARGE = 500_000_000
 """Bytes; beside smaller tables there is room for the compiler, too: it takes 0.15 GB."""
 
-# the first place that Python looks in is the folder it runs in, which may hold anything
-_BEGINNING = """
-import sys
-sys.path.pop(0)
-from vidtrack.traffic.measures.measure import beginning
-beginning(sys.stdin.read())
-"""
+_BEGINNING = "from vidtrack.traffic.measures.measure import beginning; beginning(sys.stdin.read())"
 
 
 def compile_ahead(runs: Sequence[str], site: Site, day: Day) -> None:
@@ -33,7 +28,7 @@ def compile_ahead(runs: Sequence[str], site: Site, day: Day) -> None:
         return
     with suppress(OSError):  # without the other process it takes more memory, and no more
         subprocess.run(
-            [sys.executable, "-c", _BEGINNING],
+            python(_BEGINNING),
             input=json.dumps([list(runs), site.model_dump(mode="json", by_alias=True)]),
             text=True,
             stdout=subprocess.DEVNULL,

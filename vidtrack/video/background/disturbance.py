@@ -18,6 +18,7 @@ from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import brightest, contrast, disturbance, haziness, strong, veil
 from vidtrack.video.background.exposure import follow_gain, follow_tint
 from vidtrack.video.background.majority import majority
+from vidtrack.video.background.patches import patched
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
 from vidtrack.video.background.regions import fill_holes, find_ghosts, paint
 from vidtrack.video.background.scene import Scene, absorb, adopt, learn, no_scene, spare, start, uncovered
@@ -59,8 +60,10 @@ class Disturbance:
         "_veil_by_place",
         "_coloured",
         "_dark",
+        "_previewed",
     )
     ADDED: ClassVar = {
+        "_previewed": lambda found: False,
         "_dark": lambda found: is_dark(found._scene.luma, np.float32(found._view.black)),
         "_brightest": lambda found: brightest(found._scene.luma),
     }
@@ -80,6 +83,7 @@ class Disturbance:
         self._coloured, self._dark = True, False
         self._scene = no_scene()
         self._time_s = self._start_s = 0.0
+        self._previewed = False  # since the start
         self._frames = 0  # learnt since the start
         self._changed_s = 0.0  # how long the picture has been another one
 
@@ -94,10 +98,13 @@ class Disturbance:
                 pictures.append((frame.time_s, smooth(self._view.reduce(frame))))
         if len(pictures) < 2:
             return
-        nothing = np.empty((0, 4))
+        nothing, stands = np.empty((0, 4)), True
         for time_s, picture in reversed(pictures):
             self._apply(picture, -time_s, nothing)
+            stands &= not self._camera.moves
         self._rewind(*pictures[0])
+        if stands and self._settings.patches:
+            self._scene = patched(self._scene, [picture for _, picture in pictures])
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""
@@ -108,7 +115,7 @@ class Disturbance:
             self._scene = self._start(picture, time_s)
         dt, self._time_s = time_s - self._time_s, time_s
         if dt > _GAP_S:
-            self._start_s = time_s
+            self._start_s, self._previewed = time_s, False
         known = self._camera.on_canvas(known, self._view.step)
         if self._settings.registration:
             self._scene = self._camera.follow(picture.luma, self._scene, known, time_s)
@@ -145,7 +152,7 @@ class Disturbance:
         self._camera = Camera(self._settings.still_s)
         self._change = Change(self._settings.relearn_share)
         self._time_s = self._start_s = time_s
-        self._frames, self._changed_s = 0, 0.0
+        self._frames, self._changed_s, self._previewed = 0, 0.0, not lost
 
     def _map(
         self, picture: Picture, known: Floats, dt: float, span: Ints | None = None
@@ -191,7 +198,7 @@ class Disturbance:
 
     def _start(self, picture: Picture, time_s: float) -> Scene:
         self._time_s = self._start_s = time_s
-        self._frames = 0
+        self._frames, self._previewed = 0, False
         self._change.restart(time_s)
         self._camera.restart()
         scene = start(picture)
@@ -281,5 +288,6 @@ class Disturbance:
     def _absorb(self, picture: Picture, scene: Scene, hit: Image) -> None:
         """Absorb pixels covered for absorb_s, and lasting shadow, into the scene."""
         s = self._settings
-        shadow_s = _UNSURE_SHADOW_S if self._unsure else _SHADOW_S
+        cast = self._previewed and self._sunlight.tolerance is not SOFT
+        shadow_s = _UNSURE_SHADOW_S if self._unsure and not cast else _SHADOW_S
         absorb(picture, scene, hit, np.float32(s.absorb_s), np.float32(s.steady_s), np.float32(shadow_s))
