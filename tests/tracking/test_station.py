@@ -5,7 +5,6 @@ import pytest
 from scipy.linalg import expm
 
 import vidtrack as vt
-from vidtrack.estimate.fixed_gain import FixedGainBank
 from vidtrack.radar.network.coverage import Sector
 from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.station import Visibility
@@ -101,81 +100,3 @@ def test_what_stands_and_only_looks_like_a_target_is_not_confirmed_by_a_station_
 def test_lasting_errors_that_have_no_effect_or_no_sense_are_refused(lasting_s, lasting_m):
     with pytest.raises(vt.ConfigError, match="lasting_m"):
         vt.Station(lasting_s=lasting_s, lasting_m=lasting_m)
-
-
-def test_what_leaves_all_coverage_ends_after_as_many_scans_as_a_miss_everywhere():
-    """It drove on for ever, because nobody missed it."""
-
-    def alive(coverage):
-        stations = [vt.Station(vt.Rates(0.9, 1e-6), coverage)]
-        life = vt.LogRatio(coast_scans=5)
-        tracker = vt.Tracker(vt.ConstantVelocity(speed=20.0), picture=vt.NoPicture(), life=life, stations=stations)
-        counts = []
-        for k in range(40):
-            x = 50.0 + 5 * k
-            z = np.array([[x, 0.0]])[: int(x < 100)]
-            counts.append(len(tracker.step(vt.Scan(0.5 * k, z, np.eye(2)))))
-        return counts
-
-    counts = alive(Sector((0.0, 0.0), 100.0))
-    assert counts[9] == 1  # its last plot
-    assert counts[-1] == 0
-    assert counts.index(0, 10) == 15
-
-
-def test_a_vehicle_that_stops_before_a_doppler_radar_is_where_it_stopped():
-    """Without what the misses tell its track drove on at the speed of its last plot, and ended."""
-
-    def error_m(blind):
-        sector = Sector((0.0, 0.0), 200.0, slowest=1.0)
-        station = vt.Station(vt.Rates(0.9, 1e-6), sector, blind=sector.blind if blind else None)
-        model = vt.ConstantVelocity(accel=2.0, speed=20.0, hold_s=2.0)
-        life = vt.LogRatio(coast_scans=60)
-        tracker = vt.Tracker(model, picture=vt.NoPicture(), life=life, stations=[station])
-        sensor = vt.PositionRangeRate((0.0, 0.0))
-        for k in range(120):
-            t = 0.1 * k
-            speed = max(0.0, 10 - 2.0 * t)
-            x = 60.0 + 10 * min(t, 5.0) - min(t, 5.0) ** 2
-            z = np.array([[x, 5.0, speed * x / np.hypot(x, 5.0)]])[: int(speed > 1)]
-            tracks = tracker.step(vt.Scan(t, z, np.diag([0.2, 0.2, 0.05]), sensor))
-        return float(np.hypot(*(tracks.xy - [85.0, 5.0]).T).min(initial=np.inf))
-
-    assert error_m(blind=True) < 1.0
-    assert error_m(blind=False) > 4.0
-
-
-@pytest.mark.parametrize("bank", [vt.KalmanBank, vt.UnscentedBank])
-def test_a_miss_of_what_may_be_blind_is_the_mixture_of_bayes_rule(bank):
-    model = vt.ConstantVelocity()
-    filters = bank(model)
-    x, P = np.array([[30.0, 1.5, 0.0, 0.0]]), np.diag([1.0, 1.0, 1e-9, 1e-9])[None]
-    filters.insert(x, P, np.ones(1))
-    sector = Sector((0.0, 0.0), 100.0, slowest=1.0)
-    zone = sector.blind
-    zone.update(filters, 0.0, np.ones(1, bool), 0.8)
-    v = np.linspace(-8, 10, 20001)  # of the range rate, which here is vx
-    weight = np.exp(-((v - 1.5) ** 2) / 2) * (1 - 0.8 * (1 - 2.0 ** -(v**2)))
-    mean = np.average(v, weights=weight)
-    assert filters.x[0, 1] == pytest.approx(mean, rel=1e-3)
-    assert filters.P[0, 1, 1] == pytest.approx(np.average((v - mean) ** 2, weights=weight), rel=1e-3)
-
-
-def test_what_a_radar_sees_or_is_far_too_fast_for_its_blind_zone_is_left_as_it_is():
-    filters = vt.KalmanBank(vt.ConstantVelocity())
-    filters.insert(np.array([[30.0, 15.0, 0.0, 0.0], [30.0, 0.1, 0.0, 0.0]]), np.tile(np.eye(4), (2, 1, 1)), np.ones(2))
-    before = filters.x.copy(), filters.P.copy()
-    Sector((0.0, 0.0), 100.0, slowest=1.0).blind.update(filters, 0.0, np.array([True, False]), 0.9)
-    np.testing.assert_array_equal(filters.x, before[0])
-    np.testing.assert_array_equal(filters.P, before[1])
-
-
-def test_a_radar_without_a_blind_zone_has_none():
-    assert Sector((0.0, 0.0), 100.0).blind is None
-
-
-def test_a_filter_of_fixed_gain_takes_positions_only():
-    filters = FixedGainBank(vt.ConstantVelocity(), 1.0)
-    filters.insert(np.array([[30.0, 0.5, 0.0, 0.0]]), np.eye(4)[None], np.ones(1))
-    Sector((0.0, 0.0), 100.0, slowest=1.0).blind.update(filters, 0.0, np.ones(1, bool), 0.9)
-    np.testing.assert_array_equal(filters.x, [[30.0, 0.5, 0.0, 0.0]])

@@ -200,7 +200,6 @@ def build_road_tracker(
             ),
             feed.coverage,
             BY_RADAR,
-            blind=feed.coverage.blind,
         )
         for feed in feeds
     ]

@@ -137,10 +137,6 @@ class Register:
         """
         _see(self.history, self.alone_s, self.updated_s, self.status, self.missed, hit, sure, looked, station, t, dt)
 
-    def grow_old(self, rows: Ints) -> None:
-        """Note that nothing looks at these rows (K,) any more: their last hits lie a scan farther back."""
-        self.history[rows] = (self.history[rows] << 1) & SCANS
-
     def seen(self, looked: Mask) -> None:
         """Begin to count misses anew for the rows that were looked at (T,) and seen."""
         _begin_anew(self.missed, self.history, looked)

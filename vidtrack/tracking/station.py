@@ -11,11 +11,9 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.errors import ConfigError, ScanError
-from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
-from vidtrack.tracking.blind import BlindZone
 from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracks import MERGED, TENTATIVE
@@ -63,7 +61,6 @@ class Station:
                 one. 0: each scan counts
     lasting_m   m or px; the same for travel: of a tentative track, scans within this distance are together the evidence
                 of one, with `lasting_s` only. 0: its travel does not count
-    blind       what it does not detect inside; a miss then tells where a target may be. None: nothing
     """
 
     rates: Rates = field(default_factory=Rates)
@@ -71,7 +68,6 @@ class Station:
     visibility: Visibility | None = None
     lasting_s: float = 0.0
     lasting_m: float = 0.0
-    blind: BlindZone | None = None
 
     STATE = ("rates",)
 
@@ -154,51 +150,18 @@ class Stations:
             detection = detection * register.visible[:, number]
         return detection * share, clutter
 
-    def miss(self, scan: Scan, missed: Mask, register: Register, bank: Estimator, since: float) -> None:
-        """Update the rows of a bank that the scan did not show (T,) by what that tells of them.
-
-        since: seconds after the station's last scan
-        """
-        station = self.each[scan.station]
-        if station.blind is None:
-            return
-        missed = missed & (self.share(scan, bank.x, bank.model) > 0)
-        if np.count_nonzero(missed):
-            sight = 1.0 if station.visibility is None else register.visible[:, scan.station]
-            station.blind.update(bank, scan.t, missed, station.rates.detection(register.run) * sight, since)
-
     def record(
-        self, scan: Scan, register: Register, x: Floats, model: Motion, hit: Mask, sure: Mask, detection: Floats,
-        dt: float,
-    ) -> Mask:  # fmt: skip
-        """Note which rows (T,) with states x (T, n) of a model the scan shows, of an expected P_D (T,).
-
-        Returns those that it looked at: it showed them, or they are rather covered and visible than not. Rows outside
-        the coverage of all stations grow old with each scan.
-        """
+        self, scan: Scan, register: Register, share: float | Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
+    ) -> Mask:
+        """Note which rows (T,) the scan shows, of a covered share and an expected P_D; returns those looked at."""
         number = scan.station
-        share = self.share(scan, x, model)
         looked = hit | (share >= 0.5)
+        register.record_hits(hit, sure, looked, number, scan.t, dt)
         if self.each[number].visibility is not None:
-            known = register.visible[:, number].copy()
+            known = register.visible[:, number]
             missed = np.maximum(known - detection, 0.0) / np.maximum(1 - detection, 1e-9)
             register.visible[:, number] = np.where(hit, 1.0, np.where(looked, missed, known))
-            looked = hit | (share * known >= 0.5)
-        register.record_hits(hit, sure, looked, number, scan.t, dt)
-        other = (~looked).nonzero()[0]
-        if len(other):
-            register.grow_old(other[self._outside(x[other], model)])
         return looked
-
-    def _outside(self, x: Floats, model: Motion) -> Mask:
-        """(T,) whether no station covers states x (T, n) of a model."""
-        outside = np.ones(len(x), bool)
-        for station in self.each:
-            if station.coverage is None:
-                return np.zeros(len(x), bool)
-            xy, v = x.take(model.position, axis=1), x.take(model.velocity, axis=1)
-            outside &= station.coverage.share(xy, v) == 0
-        return outside
 
     def learn(self, found: Association, register: Register, alone: Mask, looked: Mask, dt: float) -> None:
         """Learn P_D and clutter density from rows (K,) that share no measurement, dt seconds after the last scan."""

@@ -266,8 +266,8 @@ class Tracker:
         register = self.register
         self.bank.update(found.decision, for_update(scan, since), scan.sensor or POSITION)
         hit, sure = found.taken >= 0, self.two_stage.surely(scan, found.taken)
-        self.stations.miss(scan, found.measurement < 0, register, self.bank, since)
-        looked = self.stations.record(scan, register, self.bank.x, self.model, hit, sure, found.problem.detection, dt)
+        share = self.stations.share(scan, self.bank.x, self.model)
+        looked = self.stations.record(scan, register, share, hit, sure, found.problem.detection, dt)
         if scan.label is not None:
             rows = hit.nonzero()[0]
             told = scan.label[found.taken[rows]]

@@ -8,8 +8,6 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.radar.coordinates import to_polar, wrap
-from vidtrack.radar.sensors import RangeRate
-from vidtrack.tracking.blind import BlindZone
 
 BLIND = 0.02
 """Share of P_D that is left for a target too slow for Doppler, because its velocity is not known exactly."""
@@ -31,13 +29,6 @@ class Sector:
     middle: float = 0.0
     width: float = 2 * np.pi
     slowest: float = 0.0
-
-    @property
-    def blind(self) -> BlindZone | None:
-        """The range rates that the Doppler filter does not pass; at `slowest` P_D is half. None: it passes all."""
-        if self.slowest == 0:
-            return None
-        return BlindZone(RangeRate(self.origin), self.slowest / np.sqrt(2 * np.log(2)))
 
     def share(self, xy: Floats, v: Floats) -> Floats:
         """(T,) share at positions and velocities (T, 2): 0 outside, 1 inside, less for slow ones."""
