@@ -13,4 +13,8 @@ def python(statement: str) -> list[str]:
     Python looks first in the folder that it runs in, where another vidtrack may lie, as in a clone beside an installed
     copy: it would compile kernels of its own, or do another version's work.
     """
-    return [sys.executable, "-c", f"import sys; sys.path[0] = {str(PACKAGE.parent)!r}; {statement}"]
+    return [
+        sys.executable,
+        "-c",
+        f"import sys; sys.path[:] = [{str(PACKAGE.parent)!r}, *filter(None, sys.path)]; {statement}",
+    ]

@@ -99,6 +99,40 @@ def test_a_preview_of_another_view_is_forgotten():
     assert not found.mask[:, :40].any()
 
 
+def creeping(seconds, gain=lambda t: 1.0, cut_s=np.inf):
+    """Three cars that creep along a road, a car's length apart; the light, and another view from a time on."""
+    grey = np.full((SHAPE[0] // 2, SHAPE[1] // 2), 128, np.uint8)
+    road = next(frames(1, lambda t: None)).y.astype(float)
+    road[72:] = 100  # a smooth dark lane and grass
+    other = next(frames(1, lambda t: None, seed=9)).y.astype(float)
+    for k in range(round(seconds * FPS)):
+        picture = road.copy()
+        for n in range(-2, 4):
+            left = round(5 * k / FPS) + 48 * n
+            picture[84:104, max(left, 0) : max(left + 30, 0)] = (200, 50, 150)[n % 3]
+        shown = other if k / FPS >= cut_s else gain(k / FPS) * picture
+        y = shown + np.random.default_rng(k).normal(0, 2, SHAPE)
+        yield Frame(k, k / FPS, np.clip(y, 0, 255).astype(np.uint8), grey, grey, full_range=True)
+
+
+def scene_of(shown, patches):
+    detector = create(DetectorSettings.model_validate({"disturbance": {"patches": patches}}))
+    detector.preview(shown)
+    return detector.scene()[..., 0].astype(int)
+
+
+@pytest.mark.parametrize("gain", [lambda t: 1.0, lambda t: 1 - 0.03 * t])
+def test_the_road_that_a_queue_hides_is_taken_from_pictures_that_show_it(gain):
+    lane = slice(84, 104)
+    wrong = {on: (np.abs(scene_of(creeping(10, gain), on)[lane] - 100) > 30).sum() for on in (True, False)}
+    assert wrong[True] < 0.7 * wrong[False]
+
+
+def test_after_a_cut_no_patch_is_of_the_other_view():
+    shown = list(creeping(10, cut_s=1.2))
+    assert np.array_equal(scene_of(shown, True), scene_of(shown, False))
+
+
 def test_one_frame_is_no_preview():
     shown = next(frames(1, stands))
     detector = create(DetectorSettings())

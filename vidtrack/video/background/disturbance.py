@@ -16,7 +16,7 @@ from vidtrack.config.video import DisturbanceSettings
 from vidtrack.video.background.beam import is_dark, mark_beams, shows_lamps
 from vidtrack.video.background.change import Change
 from vidtrack.video.background.distance import brightest, contrast, disturbance, haziness, strong, veil
-from vidtrack.video.background.exposure import follow_gain, follow_tint
+from vidtrack.video.background.exposure import follow_gain, follow_tint, relit
 from vidtrack.video.background.majority import majority
 from vidtrack.video.background.patches import patched
 from vidtrack.video.background.picture import Picture, View, is_coloured, smooth
@@ -98,13 +98,18 @@ class Disturbance:
                 pictures.append((frame.time_s, smooth(self._view.reduce(frame))))
         if len(pictures) < 2:
             return
-        nothing, stands = np.empty((0, 4)), True
+        nothing, stands = np.empty((0, 4)), self._settings.registration
         for time_s, picture in reversed(pictures):
             self._apply(picture, -time_s, nothing)
             stands &= not self._camera.moves
+        learnt = [
+            picture for time_s, picture in pictures if time_s <= -self._start_s
+        ]  # since the light or view changed
         self._rewind(*pictures[0])
-        if stands and self._settings.patches:
-            self._scene = patched(self._scene, [picture for _, picture in pictures])
+        if stands and self._previewed and self._settings.patches:
+            black = np.float32(self._view.black)
+            shown = [relit(picture, self._scene, black) for picture in learnt] if self._settings.exposure else learnt
+            self._scene = patched(self._scene, shown)
 
     def apply(self, frame: Frame, known: Floats) -> Foreground:
         """Foreground of `frame`; pixels in `known` boxes (K, 4) [scene px] are never absorbed into the scene."""

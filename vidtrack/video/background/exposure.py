@@ -31,6 +31,18 @@ def follow_gain(picture: Picture, scene: Scene, black: np.float32) -> None:
                 _amplify(plane[y], g, black)
 
 
+def relit(picture: Picture, scene: Scene, black: np.float32) -> Picture:
+    """The picture in the light of the scene, of which no pixel is covered."""
+    lit = scene._replace(luma=scene.luma.copy(), former=scene.former[:0])
+    follow_gain(picture, lit, black)
+    light, shown = ((plane - black).sum() for plane in (scene.luma, lit.luma))
+    if light <= 0 or abs(shown / light - 1) < _STEP / 2:
+        return picture
+    back, zeros = light / shown, (black, 128, 128)
+    planes = (zero + back * (plane - zero) for plane, zero in zip(picture, zeros, strict=True))
+    return Picture(*(np.clip(np.rint(plane), 0, 255).astype(np.uint8) for plane in planes))
+
+
 @inlined
 def _amplify(row: Levels, g: np.float32, black: np.float32) -> None:
     for x in range(len(row)):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -20,8 +21,9 @@ from vidtrack.video.frame import Image
 _SIDE = 8  # px of a patch
 _ALIKE = 15  # grey levels, of luminance and both chromas together, within which pixels are the same
 _HIDDEN = 0.5  # share of the pictures that do not show the scene, above which a patch is doubted
-_MOST = 0.4  # share of the patches, above which the light or the view has changed, not the traffic
+_MOST = 0.3  # share of the patches, above which the light or the view has changed, not the traffic; it bounds the time
 _BESIDE = 0.2  # share of the known patches around that a picture may hide, and still show the road between them
+_ELSE = 0.5  # share of a picture that differs, above which it is of another light or view
 _PICTURES = 2  # that must show a patch alike
 _APART = 3  # px over which steps are taken
 _EVERYWHERE = slice(None)
@@ -32,32 +34,39 @@ Place = tuple[int, int]
 Planes = NDArray[np.int16]
 
 
+class Patch(NamedTuple):
+    """roughness  mean step of brightness in it and over its border; planes  (c, 8, 8) what it shows"""
+
+    roughness: float
+    planes: Planes
+
+
 def patched(scene: Scene, pictures: Sequence[Picture]) -> Scene:
     """The scene of a standing camera, with patches of its pictures where most of them do not show it.
 
-    Of the pictures that show the scene around a patch the one is taken that is smoothest there, with its border to what
-    is known, if more pictures are like it than like the scene. What is found is known for the patches beside it; the
-    smoothest come first.
+    Of the pictures that show the scene around a patch the one is looked for that is smoothest there, with its border to
+    what is known. If more pictures are like it than like the scene, their median is taken. What is found is known for
+    the patches beside it; the smoothest come first.
+
+    pictures  of the size of the scene, and in its light
     """
-    if min(scene.luma.shape) < _SIDE:
-        return scene
     work = _Patchwork(scene, pictures)
     if work.known.mean() < 1 - _MOST:
         return scene
     best = {place: work.best(place) for place in work.doubted()}
-    waiting = [(found[0], place) for place, found in best.items() if found is not None]
+    waiting = [(patch.roughness, place) for place, patch in best.items() if patch is not None]
     heapify(waiting)
     while waiting:
         roughness, place = heappop(waiting)
-        found = best[place]
-        if work.known[place] or found is None or found[0] != roughness:
+        patch = best[place]
+        if work.known[place] or patch is None or patch.roughness != roughness:
             continue  # looked at again since then
-        work.put(place, found[1])
+        work.put(place, patch.planes)
         for beside in work.around(place):
             if not work.known[beside]:
                 best[beside] = again = work.best(beside)
                 if again is not None:
-                    heappush(waiting, (again[0], beside))
+                    heappush(waiting, (again.roughness, beside))
     return work.scene()
 
 
@@ -69,21 +78,22 @@ class _Patchwork:
     """
 
     def __init__(self, scene: Scene, pictures: Sequence[Picture]) -> None:
-        self._scene, self._pictures = scene, pictures
-        now = Picture(*(np.rint(plane).astype(np.uint8) for plane in scene[:3]))
-        self._now = _planes(now)
-        rows, columns = (side // _SIDE for side in scene.luma.shape)
-        whole = slice(rows * _SIDE), slice(columns * _SIDE)
-        self.hidden = np.empty((rows, columns, len(pictures)), np.float32)
-        unseen = np.zeros((rows * _SIDE, columns * _SIDE), np.int16)
-        for t, picture in enumerate(pictures):
-            unlike = _unlike(picture, now)[whole]
+        self._scene = scene
+        now = _whole(Picture(*(np.rint(plane).astype(np.uint8) for plane in scene[:3])))
+        self._now = _planes(now).astype(np.int16)
+        differs = [(picture, _unlike(picture, now)) for picture in map(_whole, pictures)]
+        like = [(picture, unlike) for picture, unlike in differs if unlike.mean() <= 255 * _ELSE]
+        self._pictures = [picture for picture, _ in like]
+        rows, columns = (side // _SIDE for side in now.luma.shape)
+        self.hidden = np.empty((rows, columns, len(like)), np.float32)
+        unseen = np.zeros(now.luma.shape, np.int16)
+        for t, (_, unlike) in enumerate(like):
             unseen += unlike & 1
             self.hidden[..., t] = cv2.resize(unlike, (columns, rows), interpolation=cv2.INTER_AREA) / np.float32(255)
         often = unseen.reshape(rows, _SIDE, columns, _SIDE).max((1, 3))
-        self.known = often <= _HIDDEN * len(pictures)
-        self._shown: dict[Place, Planes] = {}
-        self._changed = np.zeros(scene.luma.shape, bool)
+        self.known = often <= _HIDDEN * len(like)
+        self._shown: dict[Place, Image] = {}
+        self._changed = np.zeros(now.luma.shape, bool)
 
     def doubted(self) -> list[Place]:
         """The patches that are not known."""
@@ -95,8 +105,8 @@ class _Patchwork:
         rows, columns = self.known.shape
         return [(i, j) for i, j in beside if 0 <= i < rows and 0 <= j < columns]
 
-    def best(self, place: Place) -> tuple[float, Planes] | None:
-        """The roughness of the best patch (c, 8, 8) and itself; None without one that is sure."""
+    def best(self, place: Place) -> Patch | None:
+        """The best patch; None without one that is sure."""
         known = [beside for beside in self.around(place) if self.known[beside]]
         if not any(beside in known for beside in self.around(place, _SIDES)):
             return None
@@ -110,8 +120,8 @@ class _Patchwork:
         if alike.sum() < _PICTURES:
             return None
         if _distance(smoothest, now).mean() < _ALIKE / 2:
-            return least, now
-        return (least, np.median(shown[alike], 0).astype(np.int16)) if alike.sum() > same.sum() else None
+            return Patch(least, now)
+        return Patch(least, np.median(shown[alike], 0).astype(np.int16)) if alike.sum() > same.sum() else None
 
     def put(self, place: Place, patch: Planes) -> None:
         """Take a patch (c, 8, 8) for the scene; it is known then."""
@@ -120,11 +130,13 @@ class _Patchwork:
         self._now[:, rows, columns] = patch
         self.hidden[place] = (_distance(self._of_pictures(place), patch) > _ALIKE).mean((1, 2))
         self.known[place] = True
+        del self._shown[place]
 
     def scene(self) -> Scene:
         """The scene with the patches that were put."""
         scene = Scene(*(plane.copy() for plane in self._scene))
-        y, x = np.nonzero(self._changed)
+        h, w = scene.luma.shape
+        y, x = np.nonzero(self._changed[:h, :w])
         scene.luma[y, x], scene.noise[y, x] = self._now[0, y, x], FRESH_NOISE
         for plane, now in zip((scene.cb, scene.cr), self._now[1:], strict=False):
             plane[y // 2, x // 2] = now[y, x]
@@ -135,7 +147,7 @@ class _Patchwork:
         if place not in self._shown:
             rows, columns = _pixels(place)
             self._shown[place] = np.stack([_planes(picture, rows, columns) for picture in self._pictures])
-        return self._shown[place]
+        return self._shown[place].astype(np.int16)
 
     def _roughness(self, place: Place, patch: Planes) -> NDArray[np.float64]:
         """(n,) mean step of brightness in patches (n, c, 8, 8), and over their border to what is known."""
@@ -162,7 +174,20 @@ def _pixels(place: Place) -> tuple[slice, slice]:
     return slice(top, top + _SIDE), slice(left, left + _SIDE)
 
 
-def _planes(picture: Picture, rows: slice = _EVERYWHERE, columns: slice = _EVERYWHERE) -> Planes:
+def _whole(picture: Picture) -> Picture:
+    """The picture with its last rows and columns repeated up to whole patches."""
+    h, w = picture.luma.shape
+    down, right = -h % _SIDE, -w % _SIDE
+    if down == right == 0:
+        return picture
+    luma = np.pad(picture.luma, ((0, down), (0, right)), "edge")
+    if not picture.cb.size:
+        return picture._replace(luma=luma)
+    half = ((0, (h + down) // 2 - len(picture.cb)), (0, (w + right) // 2 - picture.cb.shape[1]))
+    return Picture(luma, *(np.pad(plane, half, "edge") for plane in picture[1:]))
+
+
+def _planes(picture: Picture, rows: slice = _EVERYWHERE, columns: slice = _EVERYWHERE) -> Image:
     """(c, h, w) luminance, and both chromas if there are any, of these rows and columns; they begin at even ones."""
     luma = picture.luma[rows, columns]
     planes = [luma]
@@ -172,7 +197,7 @@ def _planes(picture: Picture, rows: slice = _EVERYWHERE, columns: slice = _EVERY
         for plane in picture[1:]:
             part = plane[y : y + (h + 1) // 2, x : x + (w + 1) // 2]
             planes.append(part.repeat(2, 0).repeat(2, 1)[:h, :w])
-    return np.stack(planes).astype(np.int16)
+    return np.stack(planes)
 
 
 def _distance(a: Planes, b: Planes, axis: int = -3) -> Planes:
