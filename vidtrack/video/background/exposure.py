@@ -15,6 +15,7 @@ _POINTS = 1500  # wanted on the grid
 _DARK, _BRIGHT = np.float32(24), np.float32(235)  # grey levels between which a ratio means something
 _CLIPPED = np.float32(250)
 _STEP = np.float32(0.02)  # a smaller change is left to learning
+_SEEN = np.float32(0.1)  # a smaller change leaves pictures alike
 _LARGEST = np.float32(4)  # no exposure changes more at once: the lens is covered, or the picture is missing
 _TINT_STEP = np.float32(0.01)  # share of the light; a smaller change of the white balance is left to learning
 _LARGEST_TINT = np.float32(0.5)
@@ -36,7 +37,7 @@ def relit(picture: Picture, scene: Scene, black: np.float32) -> Picture:
     lit = scene._replace(luma=scene.luma.copy(), former=scene.former[:0])
     follow_gain(picture, lit, black)
     light, shown = ((plane - black).sum() for plane in (scene.luma, lit.luma))
-    if light <= 0 or abs(shown / light - 1) < _STEP / 2:
+    if light <= 0 or abs(shown / light - 1) < _SEEN:
         return picture
     back, zeros = light / shown, (black, 128, 128)
     planes = (zero + back * (plane - zero) for plane, zero in zip(picture, zeros, strict=True))
