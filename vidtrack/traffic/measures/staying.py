@@ -20,6 +20,8 @@ ZONE_PAUSE_S, STANDING_PAUSE_S = 1.0, 2.0
 """s; two stays of a vehicle with less between them are one"""
 _STILL_S = 1.0
 """s; a vehicle whose speed is not known stands when it has not moved for so long by more than one at STANDS_M_S does"""
+_EDGE_SHARE = 0.5
+"""Of the shorter side of a box that the border cuts: while it stands none of its edges moves by more"""
 _LENS_STEPS = 8
 BEGIN, END, STOOD, X, Y = range(5)
 TRACK, ZONE, CAME, LEFT = range(4)
@@ -58,7 +60,7 @@ class Staying:
         closed = [np.column_stack([outline, np.roll(outline, -1, axis=0)]) for outline in outlines]
         self._side = np.concatenate([*closed, np.empty((0, 4))])
         self._first = np.cumsum([0, *map(len, closed)])
-        self._last_t, self._still = np.full(0, np.nan), np.full((0, 3), np.nan)
+        self._last_t, self._still = np.full(0, np.nan), np.full((0, 7), np.nan)
         self._open = np.full((0, self._zones + 1), -1)
         self._real, self._whole, self._count = np.zeros((0, 5)), np.zeros((0, 4), np.int64), 0
 
@@ -75,8 +77,8 @@ class Staying:
             make_room(self._real, self._count + 64 * (self._zones + 1), 0.0)
             make_room(self._whole, self._count + 64 * (self._zones + 1), 0)
             row, self._count = _look(
-                row, self._count, rows.t, rows.xy, rows.v, rows.track, self._metres, self._side, self._first,
-                self._last_t, self._still, self._open, self._real, self._whole,
+                row, self._count, rows.t, rows.xy, rows.v, rows.cut, rows.track, self._metres, self._side,
+                self._first, self._last_t, self._still, self._open, self._real, self._whole,
             )  # fmt: skip
 
     def in_zones(self, vehicle: Ints) -> Stays:
@@ -133,13 +135,13 @@ def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
 
 @kernel
 def _look(
-    row: int, count: int, t: Floats, xy: Floats, v: Floats, track: Ints, metres: bool, side: Floats, first: Ints,
-    last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
+    row: int, count: int, t: Floats, xy: Floats, v: Floats, cut: Floats, track: Ints, metres: bool, side: Floats,
+    first: Ints, last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the stays need more room; the next row and stay.
 
     last_t  (T,) s; of each track; open_ (T, Z + 1) its stay in each zone, the last one for standing; -1: none
-    still   (T, 3) since when [s] a track whose speed is not known is near x, y
+    still   (T, 7) since when [s] a track whose speed is not known is near x, y, and its box as it was then, cut
     real, whole   the stays: columns BEGIN... and TRACK...
     """
     zones = len(first) - 1
@@ -155,8 +157,9 @@ def _look(
         stands = metres and square < STANDS_M_S**2
         if metres and np.isnan(square):
             far = STANDS_M_S * _STILL_S
-            if not (x - still[k, 1]) ** 2 + (y - still[k, 2]) ** 2 <= far * far:
-                still[k, 0], still[k, 1], still[k, 2] = t[i], x, y
+            near = (x - still[k, 1]) ** 2 + (y - still[k, 2]) ** 2 <= far * far
+            if not near or _drives_in(cut[i], still[k, 3:]):
+                still[k, 0], still[k, 1], still[k, 2], still[k, 3:] = t[i], x, y, cut[i]
             stands, sure, since = t[i] - still[k, 0] >= _STILL_S, False, still[k, 0]
         else:
             still[k, 1] = np.nan
@@ -179,6 +182,19 @@ def _look(
                 open_[k, z] = -1
         last_t[k] = t[i]
     return len(t), count
+
+
+@kernel
+def _drives_in(box: Floats, before: Floats) -> bool:
+    """Whether an edge of a box (4,) that the border cuts has moved since before; the border holds one in its place."""
+    if np.isnan(box[0]) or np.isnan(before[0]):
+        return False
+    most = _EDGE_SHARE * min(before[2], before[3])
+    for side in range(2):
+        moved = box[side] - before[side]
+        if abs(moved) > most or abs(moved + box[side + 2] - before[side + 2]) > most:
+            return True
+    return False
 
 
 @kernel
