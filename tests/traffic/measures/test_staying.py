@@ -99,6 +99,16 @@ def test_who_drives_slowly_outside_the_calibration_s_points_does_not_stand(tmp_p
     assert [row["standing_s"] for row in tables["stays"].to_pylist()] == [0]
 
 
+def test_who_has_not_moved_yet_within_the_points_has_a_place(tmp_path):
+    """Their headings are empty, and so their velocities; places and speeds are not."""
+    t = np.arange(400) / 25
+    tracks = [along(n, t, x + 25 * np.clip(t - 10 - n, 0, None) ** 2) for n, x in ((1, 80), (2, 30))]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    without_metres(run, lambda table: pc.less(table["speed_kmh"], 1), "heading_deg")
+    row = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()[0]
+    assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(5 + 4))
+
+
 def cut_below(run, height_px):
     """Boxes 25 px wide and so high, without metres where the lower border of the picture cuts them."""
     path = Path(run) / "tracks.parquet"

@@ -77,8 +77,8 @@ class Staying:
             make_room(self._real, self._count + 64 * (self._zones + 1), 0.0)
             make_room(self._whole, self._count + 64 * (self._zones + 1), 0)
             row, self._count = _look(
-                row, self._count, rows.t, rows.xy, rows.v, rows.cut, rows.track, self._metres, self._side,
-                self._first, self._last_t, self._still, self._open, self._real, self._whole,
+                row, self._count, rows.t, rows.xy, np.isfinite(rows.spread[:, 0]), rows.v, rows.cut, rows.track,
+                self._metres, self._side, self._first, self._last_t, self._still, self._open, self._real, self._whole,
             )  # fmt: skip
 
     def in_zones(self, vehicle: Ints) -> Stays:
@@ -135,11 +135,12 @@ def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
 
 @kernel
 def _look(
-    row: int, count: int, t: Floats, xy: Floats, v: Floats, cut: Floats, track: Ints, metres: bool, side: Floats,
-    first: Ints, last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
+    row: int, count: int, t: Floats, xy: Floats, sure: Mask, v: Floats, cut: Floats, track: Ints, metres: bool,
+    side: Floats, first: Ints, last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the stays need more room; the next row and stay.
 
+    sure    (N,) whether the calibration knows the place
     last_t  (T,) s; of each track; open_ (T, Z + 1) its stay in each zone, the last one for standing; -1: none
     still   (T, 7) since when [s] a track whose speed is not known is near x, y, and its box as it was then, cut
     real, whole   the stays: columns BEGIN... and TRACK...
@@ -153,14 +154,14 @@ def _look(
             continue
         new = np.isnan(last_t[k])
         dt = 0.0 if new else t[i] - last_t[k]
-        square, sure, since = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], True, t[i] - dt / 2
+        square, since = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], t[i] - dt / 2
         stands = metres and square < STANDS_M_S**2
         if metres and np.isnan(square):
             far = STANDS_M_S * _STILL_S
             near = (x - still[k, 1]) ** 2 + (y - still[k, 2]) ** 2 <= far * far
             if not near or _drives_in(cut[i], still[k, 3:]):
                 still[k, 0], still[k, 1], still[k, 2], still[k, 3:] = t[i], x, y, cut[i]
-            stands, sure, since = t[i] - still[k, 0] >= _STILL_S, False, still[k, 0]
+            stands, since = t[i] - still[k, 0] >= _STILL_S, still[k, 0]
         else:
             still[k, 1] = np.nan
         for z in range(zones + 1):
@@ -170,7 +171,7 @@ def _look(
                 real[count, BEGIN], real[count, END], real[count, STOOD] = since, t[i], 0.0
                 if z < zones:
                     real[count, BEGIN] = t[i] - dt / 2
-                real[count, X], real[count, Y] = (x, y) if sure else (np.nan, np.nan)
+                real[count, X], real[count, Y] = (x, y) if sure[i] else (np.nan, np.nan)
                 whole[count, TRACK], whole[count, ZONE], whole[count, CAME], whole[count, LEFT] = k, z, not new, 0
                 open_[k, z] = count
                 count += 1
