@@ -275,6 +275,15 @@ def test_a_damaged_table_is_told(tmp_path):
         measured([str(run)], site())
 
 
+def test_a_table_whose_footer_is_lost_is_told_in_one_line(tmp_path):
+    run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
+    whole = (run / "tracks.parquet").read_bytes()
+    footer = int.from_bytes(whole[-8:-4], "little")
+    (run / "tracks.parquet").write_bytes(whole[: -8 - footer] + bytes(footer) + whole[-8:])
+    with pytest.raises(FormatError, match=r"^[^\n]*tracks\.parquet is damaged: [^\n]*; vidtrack repair [^\n]*$"):
+        measured([str(run)], site())
+
+
 def test_a_table_of_a_run_that_ended_is_whole(tmp_path):
     """What is missing would be taken for a time in which nobody came."""
     run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
