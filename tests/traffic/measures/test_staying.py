@@ -109,6 +109,17 @@ def test_who_has_not_moved_yet_within_the_points_has_a_place(tmp_path):
     assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(5 + 4))
 
 
+def test_who_stops_and_creeps_outside_the_points_stood_as_long_as_within(tmp_path):
+    t = np.arange(1250) / 25
+    creeping = along(1, t, 60 + 100 * np.clip(t, 0, 2) + 5 * np.clip(t - 2, 0, 20) + 100 * np.clip(t - 42, 0, 8))
+    run = write_run(tmp_path / "run", [creeping], metres=True)  # at 1.8 km/h for 20 s, and stands for 20 s
+    within = measured([run], site(CALIBRATED | ZONES)).tables["stays"].to_pylist()[0]["standing_s"]
+    without_metres_before(run, 640)
+    assert within == pytest.approx(40, abs=0.2)
+    outside = measured([run], site(CALIBRATED | ZONES)).tables["stays"].to_pylist()[0]["standing_s"]
+    assert outside == pytest.approx(within, abs=1.5)  # once until it has left its place
+
+
 def cut_below(run, height_px):
     """Boxes 25 px wide and so high, without metres where the lower border of the picture cuts them."""
     path = Path(run) / "tracks.parquet"

@@ -154,7 +154,7 @@ def _look(
             continue
         new = np.isnan(last_t[k])
         dt = 0.0 if new else t[i] - last_t[k]
-        square, since = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], t[i] - dt / 2
+        square, since, stood = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], t[i] - dt / 2, dt
         stands = metres and square < STANDS_M_S**2
         if metres and np.isnan(square):
             far = STANDS_M_S * _STILL_S
@@ -162,6 +162,8 @@ def _look(
             if not near or _drives_in(cut[i], still[k, 3:]):
                 still[k, 0], still[k, 1], still[k, 2], still[k, 3:] = t[i], x, y, cut[i]
             stands, since = t[i] - still[k, 0] >= _STILL_S, still[k, 0]
+            if stands and open_[k, zones] < 0:
+                stood = t[i] - since
         else:
             still[k, 1] = np.nan
         for z in range(zones + 1):
@@ -177,7 +179,7 @@ def _look(
                 count += 1
             elif here:
                 real[stay, END] = t[i]
-                real[stay, STOOD] += dt if stands else 0.0
+                real[stay, STOOD] += min(stood, t[i] - real[stay, BEGIN]) if stands else 0.0
             elif stay >= 0:
                 real[stay, END], whole[stay, LEFT] = t[i] - dt / 2, 1
                 open_[k, z] = -1
