@@ -91,6 +91,14 @@ def test_who_waits_outside_the_calibration_s_points_is_in_the_queue_but_not_in_i
     assert [(row["leg"], row["vehicles"], row["length_m"]) for row in rows] == [("west", 3, None)]
 
 
+def test_who_comes_to_stand_without_a_place_has_it_from_when_it_is_known(tmp_path):
+    tracks = [stopping(1, 2.0, 300, 12.0), stopping(2, 6.0, 160, 10.0)]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    without_metres(run, lambda table: pc.and_(pc.greater(table["time_s"], 5.0), pc.less(table["time_s"], 9.5)))
+    row = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()[0]
+    assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(14 + 4, abs=0.2))
+
+
 def test_who_drives_slowly_outside_the_calibration_s_points_does_not_stand(tmp_path):
     run = write_run(tmp_path / "run", [straight(1, 2.0, 60, 240, 17.0, 30)], metres=True)  # 6 km/h
     without_metres_before(run, 640)

@@ -35,7 +35,7 @@ class Stays:
     begin, end      (E,) s
     stood           (E,) s of it that the vehicle stood; NaN without a calibration
     came, left      (E,) whether it was seen before and afterwards; else it was there before, or still is
-    xy              (E, 2) where it was at the beginning, in the unit of positions; NaN where that is not sure
+    xy              (E, 2) where it was as soon as that was sure, in the unit of positions; NaN where it never was
     """
 
     zone: Ints
@@ -101,9 +101,11 @@ class Staying:
         first = np.flatnonzero(np.append(True, ~same)[: len(who)])
         last = np.append(first[1:], len(who))[: len(first)] - 1
         end = np.maximum.reduceat(real[:, END], first) if len(first) else np.empty(0)
+        placed = np.where(np.isfinite(real[:, X]), np.arange(len(who)), len(who))
+        placed = np.minimum(np.minimum.reduceat(placed, first), last) if len(first) else first
         stood = np.add.reduceat(real[:, STOOD], first) if len(first) else np.empty(0)
         sorted_ = np.argsort(real[first, BEGIN], kind="stable")
-        first, last = first[sorted_], last[sorted_]
+        first, last, placed = first[sorted_], last[sorted_], placed[sorted_]
         return Stays(
             zone=whole[first, ZONE],
             vehicle=who[first],
@@ -112,7 +114,7 @@ class Staying:
             stood=stood[sorted_],
             came=whole[first, CAME] > 0,
             left=whole[last, LEFT] > 0,
-            xy=real[first][:, [X, Y]],
+            xy=real[placed][:, [X, Y]],
         )
 
 
@@ -179,6 +181,8 @@ def _look(
                 count += 1
             elif here:
                 real[stay, END] = t[i]
+                if sure[i] and np.isnan(real[stay, X]):
+                    real[stay, X], real[stay, Y] = x, y
                 real[stay, STOOD] += min(stood, t[i] - real[stay, BEGIN]) if stands else 0.0
             elif stay >= 0:
                 real[stay, END], whole[stay, LEFT] = t[i] - dt / 2, 1
