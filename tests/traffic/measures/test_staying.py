@@ -99,6 +99,12 @@ def test_who_comes_to_stand_without_a_place_has_it_from_when_it_is_known(tmp_pat
     assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(14 + 4, abs=0.2))
 
 
+def test_a_row_that_seems_to_stand_makes_no_queue():
+    begin, xy, yes = np.array([0.0, 10.0]), np.zeros((2, 2)), np.ones(2, bool)
+    stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy)
+    assert queues_of(stays, np.zeros(2, int), np.full(2, 4.0)).begin.tolist() == [10.0]
+
+
 def test_who_drives_slowly_outside_the_calibration_s_points_does_not_stand(tmp_path):
     run = write_run(tmp_path / "run", [straight(1, 2.0, 60, 240, 17.0, 30)], metres=True)  # 6 km/h
     without_metres_before(run, 640)
