@@ -1,6 +1,7 @@
 """The normal equations of a track's fit: a band matrix of its path, bordered by the few numbers of the whole track.
 
-By Cholesky's factor of the band; the numbers of the whole track are eliminated first (Schur complement).
+By Cholesky's factor of the band: the path is eliminated first, and the numbers of the whole track follow from what is
+left of their equations (Schur complement).
 """
 
 from __future__ import annotations

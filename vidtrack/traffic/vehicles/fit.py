@@ -7,8 +7,9 @@ the vehicle and by how much its boxes are too wide (px). The sum of squares has,
     (p_k+1 - p_k) / h_k - (p_k - p_k-1) / h_k-1          the velocity is a random walk, with variance JOLT per second
     size - what vehicles are like                        wide: classes are told apart afterwards
 
-By Gauss and Newton: the p_k are coupled to two neighbours on either side, so their normal matrix is a band; the four
-numbers of the whole track are eliminated first (Schur complement). The vehicle heads along its path.
+By Gauss and Newton: the p_k are coupled to two neighbours on either side, so their normal matrix is a band; they
+are eliminated first, from the equations of the four numbers of the whole track (`band`). The vehicle heads along its
+path.
 """
 
 from __future__ import annotations
