@@ -113,8 +113,10 @@ def column_names(folder: Path) -> set[str]:
 
 def damaged(path: Path, error: Exception) -> FormatError:
     """What is wrong with a Parquet table, and what to do."""
-    what = str(error).strip()  # some end in a new line
-    return FormatError(f"{path} is damaged: {what}; vidtrack repair {path.parent} makes it from tracks.csv")
+    what, advice = str(error).strip(), "copy it again, or track the video again"  # some end in a new line
+    if (path.parent / "tracks.csv").is_file():
+        advice = f"vidtrack repair {path.parent} makes it from tracks.csv"
+    return FormatError(f"{path} is damaged: {what}; {advice}")
 
 
 def numbers(table: pa.Table, name: str) -> Floats:
