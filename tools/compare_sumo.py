@@ -214,7 +214,8 @@ def queues(folder: Path, tables: dict[str, pa.Table]) -> tuple[np.ndarray, np.nd
                 continue
             then = (times > row["begin_s"] - 2) & (times < row["end_s"] + 1)
             off.append(row["vehicles"] - most[then, 0].max(initial=0))
-            metres.append(row["length_m"] - most[then, 1].max(initial=0))
+            if row["length_m"] is not None:  # all stand outside the calibration's points
+                metres.append(row["length_m"] - most[then, 1].max(initial=0))
             free &= ~then
         alone += int(np.count_nonzero(free))
     return np.array(off), np.array(metres), alone

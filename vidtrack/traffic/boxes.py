@@ -28,6 +28,12 @@ def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
     return inside
 
 
+def cut(box: Floats, size: tuple[int, int]) -> Mask:
+    """(N,) whether the left, right or lower border of a picture (width, height) cuts boxes (N, 4)."""
+    (left, top, wide, high), (width, height) = box.T, size
+    return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
+
+
 @kernel
 def _cut_off(edge: Floats, near: float, right: float, bottom: float) -> None:
     """Forget left and top edges up to `near`, and right and lower ones from `right` and `bottom` on."""

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.traffic.boxes import partly_hidden, uncut, within
+from vidtrack.traffic.boxes import cut, partly_hidden, uncut, within
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.pace import Pace
 from vidtrack.traffic.vehicles.naming import Naming
@@ -147,7 +147,7 @@ class Footprints:
         rim    (N,) px, or one for all; by how much boxes reach beyond vehicles on each side, as outlines of blobs do
         """
         hidden = np.zeros(len(track), bool) if merged is None else partly_hidden(t, box, merged)
-        box = np.where(self._cut(box)[:, None], np.nan, within(box, rim))
+        box = np.where(cut(box, self._size)[:, None], np.nan, within(box, rim))
         with np.errstate(invalid="ignore"):
             paced = None if edge is None else self._paced(track, t, edge)
             headings = self._headings(track, xy, u, P, box, paced)
@@ -259,11 +259,6 @@ class Footprints:
         ends = order[np.diff(track[order], append=-1) != 0]
         self._heading = dict(zip(track[ends].tolist(), filled[ends], strict=True))
         return filled[len(ids) :]
-
-    def _cut(self, box: Floats) -> Mask:
-        """(N,) whether the left, right or lower border of the picture cuts the box."""
-        (left, top, wide, high), (width, height) = box.T, self._size
-        return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
 
 
 def footprint(ground: Ground, box: Floats, e: Floats, slender: float) -> tuple[Floats, Floats]:

@@ -121,7 +121,7 @@ def no_run(folder):
         (without_site, 2, "give it with --site"),
         (outside, 3, "has no positions in metres: no vehicle was found inside"),
         (without_table, 3, "vidtrack repair"),
-        (with_a_damaged_table, 3, "not a readable Parquet file"),
+        (with_a_damaged_table, 3, "tracks.parquet is damaged"),
         (with_a_damaged_summary, 3, "is damaged"),
         (out_of_order, 3, "not in order of time"),
         (with_frames_out_of_order, 3, "not in order of frame"),

@@ -31,7 +31,7 @@ def rows_of(track, t, xy, v, length=4.0, width=2.0, heading=None, sigma=0.0, spe
     ahead = np.column_stack([np.cos(angle), np.sin(angle)])
     rows = Rows(
         *(track, t, yes, ~yes, ~yes, xy.astype(float), full(sigma), full(1.0), v.astype(float)),
-        *(np.hypot(*v.T), full(speed_sigma), full(0), *sides, ahead, spread, np.full((count, 4), np.nan)),
+        *(np.hypot(*v.T), full(speed_sigma), full(0), *sides, ahead, spread, *2 * [np.full((count, 4), np.nan)]),
     )
     return rows.only(np.argsort(t, kind="stable"))
 

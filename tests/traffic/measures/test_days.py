@@ -263,6 +263,9 @@ def test_a_run_of_radar_is_refused(tmp_path):
 def test_a_damaged_table_is_told(tmp_path):
     run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
     (run / "tracks.parquet").write_bytes(b"PAR1 and then nothing")
+    with pytest.raises(FormatError, match=r"tracks\.parquet is damaged: .*; copy it again, or track the video again$"):
+        measured([str(run)], site())
+    (run / "tracks.csv").touch()
     with pytest.raises(
         FormatError, match=r"tracks\.parquet is damaged: .*; vidtrack repair .* makes it from tracks\.csv"
     ):
@@ -272,6 +275,15 @@ def test_a_damaged_table_is_told(tmp_path):
     summary = json.loads((run / "summary.json").read_text())
     (run / "summary.json").write_text(json.dumps(summary | {"interrupted": False}))
     with pytest.raises(FormatError, match=r"tracks\.csv is damaged: .*; vidtrack repair .* may help"):
+        measured([str(run)], site())
+
+
+def test_a_table_whose_footer_is_lost_is_told_in_one_line(tmp_path):
+    run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
+    whole = (run / "tracks.parquet").read_bytes()
+    footer = int.from_bytes(whole[-8:-4], "little")
+    (run / "tracks.parquet").write_bytes(whole[: -8 - footer] + bytes(footer) + whole[-8:])
+    with pytest.raises(FormatError, match=r"^[^\n]*tracks\.parquet is damaged: [^\n]*; copy it again[^\n]*$"):
         measured([str(run)], site())
 
 

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
-from drawn_runs import CALIBRATED, along, site, straight, write_run
+from drawn_runs import CALIBRATED, SIZE, along, site, straight, write_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -61,15 +62,20 @@ def test_three_wait_one_behind_the_other(tmp_path):
     assert rows[0]["length_m"] == pytest.approx(14 + 4, abs=0.2)  # from the front of the first to the rear of the last
 
 
-def without_metres_before(run, x_px):
-    """The calibration's points begin at this place: rows before it have no metres."""
+def without_metres(run, where, columns=("_m", "_kmh", "_deg")):
+    """Leave these columns empty in some rows of a run, a mask or a function of the table."""
     path = Path(run) / "tracks.parquet"
     table = pq.read_table(path)
-    known = pc.greater_equal(table["x_px"], x_px)
+    empty = where(table) if callable(where) else where
     for number, name in enumerate(table.column_names):
-        if name.endswith(("_m", "_kmh", "_deg")):
-            table = table.set_column(number, name, pc.if_else(known, table[name], None))
+        if name.endswith(columns):
+            table = table.set_column(number, name, pc.if_else(empty, None, table[name]))
     pq.write_table(table, path)
+
+
+def without_metres_before(run, x_px):
+    """The calibration's points begin at this place: rows before it have no metres."""
+    without_metres(run, lambda table: pc.less(table["x_px"], x_px))
 
 
 def test_who_waits_outside_the_calibration_s_points_is_in_the_queue_but_not_in_its_length(tmp_path):
@@ -85,12 +91,73 @@ def test_who_waits_outside_the_calibration_s_points_is_in_the_queue_but_not_in_i
     assert [(row["leg"], row["vehicles"], row["length_m"]) for row in rows] == [("west", 3, None)]
 
 
+def test_who_comes_to_stand_without_a_place_has_it_from_when_it_is_known(tmp_path):
+    tracks = [stopping(1, 2.0, 300, 12.0), stopping(2, 6.0, 160, 10.0)]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    without_metres(run, lambda table: pc.and_(pc.greater(table["time_s"], 5.0), pc.less(table["time_s"], 9.5)))
+    row = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()[0]
+    assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(14 + 4, abs=0.2))
+
+
+def test_a_row_that_seems_to_stand_makes_no_queue():
+    begin, xy, yes = np.array([0.0, 10.0]), np.zeros((2, 2)), np.ones(2, bool)
+    stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy)
+    assert queues_of(stays, np.zeros(2, int), np.full(2, 4.0)).begin.tolist() == [10.0]
+
+
 def test_who_drives_slowly_outside_the_calibration_s_points_does_not_stand(tmp_path):
     run = write_run(tmp_path / "run", [straight(1, 2.0, 60, 240, 17.0, 30)], metres=True)  # 6 km/h
     without_metres_before(run, 640)
     tables = measured([run], site(CALIBRATED | ZONES)).tables
     assert len(tables["queues"]) == 0
     assert [row["standing_s"] for row in tables["stays"].to_pylist()] == [0]
+
+
+def test_who_has_not_moved_yet_within_the_points_has_a_place(tmp_path):
+    """Their headings are empty, and so their velocities; places and speeds are not."""
+    t = np.arange(400) / 25
+    tracks = [along(n, t, x + 25 * np.clip(t - 10 - n, 0, None) ** 2) for n, x in ((1, 80), (2, 30))]
+    run = write_run(tmp_path / "run", tracks, metres=True)
+    without_metres(run, lambda table: pc.less(table["speed_kmh"], 1), "heading_deg")
+    row = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()[0]
+    assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(5 + 4))
+
+
+def test_who_stops_and_creeps_outside_the_points_stood_as_long_as_within(tmp_path):
+    t = np.arange(1250) / 25
+    creeping = along(1, t, 60 + 100 * np.clip(t, 0, 2) + 5 * np.clip(t - 2, 0, 20) + 100 * np.clip(t - 42, 0, 8))
+    run = write_run(tmp_path / "run", [creeping], metres=True)  # at 1.8 km/h for 20 s, and stands for 20 s
+    within = measured([run], site(CALIBRATED | ZONES)).tables["stays"].to_pylist()[0]["standing_s"]
+    without_metres_before(run, 640)
+    assert within == pytest.approx(40, abs=0.2)
+    outside = measured([run], site(CALIBRATED | ZONES)).tables["stays"].to_pylist()[0]["standing_s"]
+    assert outside == pytest.approx(within, abs=1.5)  # once until it has left its place
+
+
+def cut_below(run, height_px):
+    """Boxes 25 px wide and so high, without metres where the lower border of the picture cuts them."""
+    path = Path(run) / "tracks.parquet"
+    table = pq.read_table(path)
+    x, y = (table[name].to_numpy() for name in ("x_px", "y_px"))
+    top, bottom = y - height_px / 2, np.minimum(y + height_px / 2, SIZE[1])
+    for name, values in (("left", x - 12.5), ("top", top), ("width", 0 * x + 25), ("height", bottom - top)):
+        table = table.set_column(table.column_names.index(f"{name}_px"), f"{name}_px", pa.array(values))
+    pq.write_table(table, path)
+    without_metres(run, pa.array(bottom == SIZE[1]))
+
+
+def test_a_van_that_drives_in_over_the_border_does_not_stand(tmp_path):
+    """The border holds the lower edge of its box for 2 s, and so its place."""
+    t = np.arange(350) / 25
+    run = write_run(tmp_path / "run", [(1, t, np.column_stack([0 * t + 320, 510 - 30 * t]))], metres=True)  # 11 km/h
+    cut_below(run, 60)
+    gates = {
+        "south": {"line": [[0, 300], [639, 300]], "role": "entry"},
+        "north": {"line": [[639, 200], [0, 200]], "role": "exit"},
+    }
+    tables = measured([run], site(CALIBRATED | {"gates": gates})).tables
+    assert [row["from_leg"] for row in tables["trips"].to_pylist()] == ["south"]
+    assert len(tables["queues"]) == 0
 
 
 STANDING = st.tuples(st.integers(0, 200), st.integers(1, 60), st.integers(-1, 1), st.integers(0, 50))

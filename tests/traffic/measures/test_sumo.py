@@ -5,21 +5,35 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 TOOLS = Path(__file__).parents[3] / "tools"
 
 
 @pytest.fixture(scope="module")
-def sumo():
+def tool():
     sys.path.insert(0, str(TOOLS))
     try:
-        tool = importlib.import_module("compare_sumo")
+        return importlib.import_module("compare_sumo")
     finally:
         sys.path.remove(str(TOOLS))
+
+
+@pytest.fixture(scope="module")
+def sumo(tool):
     if tool.binary("sumo") is None or tool.binary("netconvert") is None:
         pytest.skip("needs SUMO: pip install eclipse-sumo, and SUMO_HOME its folder sumo")
     return tool
+
+
+def test_a_queue_without_a_length_is_compared_by_its_vehicles(tool, tmp_path):
+    jam = '<interval id="west" begin="5" maxJamLengthInVehicles="2" maxJamLengthInMeters="9"/>'
+    (tmp_path / "e2.xml").write_text(f"<detector>{jam}</detector>")
+    row = {"leg": "west", "begin_s": 4.0, "end_s": 9.0, "vehicles": 3}
+    ours = pa.Table.from_pylist([row | {"length_m": 10.5}, row | {"length_m": None}])
+    vehicles, metres, alone = tool.queues(tmp_path, {"queues": ours})
+    assert (vehicles.tolist(), metres.tolist(), alone) == ([1, 1], [1.5], 0)
 
 
 def test_sumo_s_detectors_see_the_same(sumo, tmp_path):

@@ -17,7 +17,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.output.export.whole_tracks import WholeTracks
 from vidtrack.traffic.lengths import UNKNOWN
-from vidtrack.traffic.measures.blocks import whole_pictures
+from vidtrack.traffic.measures.blocks import column_names, damaged, whole_pictures
 from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site
@@ -168,7 +168,7 @@ def open_road_run(folder: Path, site: Path | None = None) -> RoadRun:
         )
     whole = WholeTracks(_of_size(drawn, summary))
     look = _FirstLook()
-    edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= _column_names(folder) else ()
+    edges = EDGE_COLUMNS if set(EDGE_COLUMNS) <= column_names(folder) else ()
     for table in whole_pictures(_batches(folder, (*_NEEDED[:6], "length_m", "length_sigma_m", *BOX, *edges)), folder):
         whole.add(table)
         look.add(table)
@@ -240,7 +240,7 @@ def _batches(folder: Path, columns: tuple[str, ...] | None = None) -> Iterator[p
             for batch in file.iter_batches(_BATCH, columns=columns):
                 yield pa.Table.from_batches([batch])
     except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
+        raise damaged(path, error) from None
 
 
 def _summary(folder: Path) -> dict[str, Any]:
@@ -262,18 +262,10 @@ def _check_columns(folder: Path) -> None:
     path = folder / "tracks.parquet"
     if not path.is_file():
         raise FormatError(f"{folder} has no tracks.parquet; vidtrack repair {folder} makes it from tracks.csv")
-    names = _column_names(folder)
+    names = column_names(folder)
     if not set(_NEEDED) <= names:
         what = "is a run of radar plots" if "scan" in names else "has no positions in metres"
         raise ConfigError(f"{folder} {what}; only runs of vidtrack track --site with a [calibration] can be exported")
-
-
-def _column_names(folder: Path) -> set[str]:
-    path = folder / "tracks.parquet"
-    try:
-        return set(pq.read_schema(path).names)
-    except (pa.ArrowInvalid, OSError) as error:
-        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
 
 
 def _of_size(site: Site, summary: dict[str, Any]) -> Site:

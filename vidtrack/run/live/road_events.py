@@ -112,7 +112,7 @@ def prepare() -> None:
             *sides,
             v / 10,
             spread,
-            np.full((len(track), 4), np.nan),
+            *2 * [np.full((len(track), 4), np.nan)],
         )
     )
     meeting.settled(np.inf)

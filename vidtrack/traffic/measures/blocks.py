@@ -67,7 +67,7 @@ def blocks(folder: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
                     yield pa.Table.from_batches(waiting)
                     waiting.clear()
     except (pa.ArrowInvalid, OSError) as error:
-        raise _damaged(path, error) from None
+        raise damaged(path, error) from None
     if waiting:
         yield pa.Table.from_batches(waiting)
 
@@ -101,8 +101,8 @@ def column_names(folder: Path) -> set[str]:
     if path.is_file():
         try:
             return set(pq.read_schema(path).names)
-        except pa.ArrowInvalid as error:
-            raise _damaged(path, error) from None
+        except (pa.ArrowInvalid, OSError) as error:
+            raise damaged(path, error) from None
     path = folder / "tracks.csv"
     try:
         with path.open(encoding="utf-8") as file:
@@ -111,9 +111,12 @@ def column_names(folder: Path) -> set[str]:
         raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} may help") from None
 
 
-def _damaged(path: Path, error: Exception) -> FormatError:
+def damaged(path: Path, error: Exception) -> FormatError:
     """What is wrong with a Parquet table, and what to do."""
-    return FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} makes it from tracks.csv")
+    what, advice = str(error).strip(), "copy it again, or track the video again"  # some end in a new line
+    if (path.parent / "tracks.csv").is_file():
+        advice = f"vidtrack repair {path.parent} makes it from tracks.csv"
+    return FormatError(f"{path} is damaged: {what}; {advice}")
 
 
 def numbers(table: pa.Table, name: str) -> Floats:

@@ -12,6 +12,9 @@ from vidtrack.traffic.measures.staying import STANDING_PAUSE_S, Stays
 _UNKNOWN_M = 4.5
 """m; length of vehicles whose length is not known"""
 
+_LEAST_S = 0.2
+"""s; who stands for less only seems to: a row or two of a vehicle that drives are below the speed of one that stands"""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Queues:
@@ -38,7 +41,7 @@ def queues_of(standing: Stays, leg: Ints, length: Floats) -> Queues:
     length  (E,) m
     """
     order = np.lexsort((standing.begin, leg))
-    order = order[leg[order] >= 0]
+    order = order[(leg[order] >= 0) & ((standing.end - standing.begin)[order] >= _LEAST_S)]
     leg, begin, end = leg[order], standing.begin[order], standing.end[order]
     xy, half = standing.xy[order], np.nan_to_num(length[order], nan=_UNKNOWN_M) / 2
     if len(leg) == 0:

@@ -15,7 +15,7 @@ from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.boxes import partly_hidden, uncut
+from vidtrack.traffic.boxes import cut, partly_hidden, uncut
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint
 from vidtrack.traffic.lines import foot_of
@@ -61,6 +61,8 @@ class Rows:
     spread   (N, 3) m2; variances of its own position error, in x and in y, and their covariance
     edge     (N, 4) px of the picture; left, top, right and lower edges that were seen of the vehicle alone; NaN where
              the border cuts them, in runs of earlier versions, and without a calibration
+    cut      (N, 4) px; left, top, width and height of boxes that the border cuts; NaN of others, and without a
+             calibration
     """
 
     track: Ints
@@ -81,6 +83,7 @@ class Rows:
     ahead: Floats
     spread: Floats
     edge: Floats
+    cut: Floats
 
     def __len__(self) -> int:
         return len(self.t)
@@ -96,9 +99,9 @@ class Rows:
 
 
 def off_road(count: int) -> tuple[Floats, ...]:
-    """The last nine columns of rows (count,) of which nothing is known on the road: NaN."""
+    """The last ten columns of rows (count,) of which nothing is known on the road: NaN."""
     nothing = np.full((count, 4), np.nan)
-    return *(nothing[:, 0] for _ in range(6)), nothing[:, :2], nothing[:, :3], nothing
+    return *(nothing[:, 0] for _ in range(6)), nothing[:, :2], nothing[:, :3], nothing, nothing
 
 
 _MARGIN = 0.15
@@ -162,7 +165,9 @@ class Reader:
         edge = edges(column, recording.size)
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
-        rows = _on_road(ground, column, track, t, seen, merged, edge)
+        box = _box(column)
+        at_border = np.where(cut(box, recording.size)[:, None], box, np.nan)
+        rows = _on_road(ground, column, track, t, seen, merged, edge, at_border)
         make_room(self._latest, len(self._numbers), np.nan)
         _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
         return rows
@@ -177,7 +182,7 @@ class Reader:
 class LiveReader:
     """Reads the tables of vehicles that are still tracked, with ROAD_COLUMNS, one after the other in order of time.
 
-    The numbers of tracks are their ids, and no edges are known.
+    The numbers of tracks are their ids, and no edges are known, nor which boxes the border cuts.
     """
 
     def __init__(self, ground: Ground) -> None:
@@ -187,13 +192,13 @@ class LiveReader:
     def read(self, table: pa.Table) -> Rows:
         """The rows of the next table; vehicles without a place are carried as in `Reader`."""
         column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
-        track, t, edge = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
-        rows = _on_road(self._ground, column, track, t, *states(table), edge)
+        track, t, unknown = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
+        rows = _on_road(self._ground, column, track, t, *states(table), unknown, unknown)
         if len(t) == 0:
             return rows
         ids, number = np.unique(track, return_inverse=True)
-        unknown = np.full(5, np.nan)
-        latest = np.array([self._latest.get(one, unknown) for one in ids.tolist()])
+        nothing = np.full(5, np.nan)
+        latest = np.array([self._latest.get(one, nothing) for one in ids.tolist()])
         _go_on(number, t, np.isnan(column["x_m"]), rows.seen & ~rows.merged, rows.v, rows.xy, latest)
         known = self._latest | dict(zip(ids.tolist(), latest, strict=True))
         self._latest = {one: last for one, last in known.items() if t[-1] - last[0] < _ONWARD_S}
@@ -210,7 +215,14 @@ def states(table: pa.Table) -> tuple[Mask, Mask]:
 
 
 def _on_road(
-    ground: Ground, column: dict[str, Floats], track: Ints, t: Floats, seen: Mask, merged: Mask, edge: Floats
+    ground: Ground,
+    column: dict[str, Floats],
+    track: Ints,
+    t: Floats,
+    seen: Mask,
+    merged: Mask,
+    edge: Floats,
+    at_border: Floats,
 ) -> Rows:
     """Rows with a calibration, from the columns of the road."""
     speed, own, shared = (column[name] / 3.6 for name in ("speed_kmh", "speed_sigma_kmh", "speed_shared_sigma_kmh"))
@@ -218,11 +230,16 @@ def _on_road(
         *(column[name] for name in ("x_m", "y_m", "sigma_x_m", "sigma_y_m", "corr_xy_m", "heading_deg", "length_m")),
         speed,
     )
-    box = np.column_stack([column[name] for name in BOX])
+    box = _box(column)
     _place_roughly(ground, box, xy, sigma)
     hidden, state = partly_hidden(t, box, merged), (xy, sigma, margin, v, speed, own, shared)
     sides = column["length_m"], column["length_sigma_m"], column["width_m"]
-    return Rows(track, t, seen, merged, hidden, *state, *sides, ahead, spread, edge)
+    return Rows(track, t, seen, merged, hidden, *state, *sides, ahead, spread, edge, at_border)
+
+
+def _box(column: dict[str, Floats]) -> Floats:
+    """(N, 4) left, top, width, height [px]."""
+    return np.column_stack([column[name] for name in BOX])
 
 
 @kernel
@@ -324,7 +341,7 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
         corr[:, i, j] = corr[:, j, i] = column[f"corr_{name}"]
     P = corr * sigma[:, :, None] * sigma[:, None, :]
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
-    box = np.column_stack([column[name] for name in BOX])
+    box = _box(column)
     edge = np.column_stack([column[name] for name in EDGE_COLUMNS]) if EDGE_COLUMNS[0] in column else None
     stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim_px)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))

@@ -20,6 +20,8 @@ ZONE_PAUSE_S, STANDING_PAUSE_S = 1.0, 2.0
 """s; two stays of a vehicle with less between them are one"""
 _STILL_S = 1.0
 """s; a vehicle whose speed is not known stands when it has not moved for so long by more than one at STANDS_M_S does"""
+_EDGE_SHARE = 0.5
+"""Of the shorter side of a box that the border cuts: while it stands none of its edges moves by more"""
 _LENS_STEPS = 8
 BEGIN, END, STOOD, X, Y = range(5)
 TRACK, ZONE, CAME, LEFT = range(4)
@@ -33,7 +35,7 @@ class Stays:
     begin, end      (E,) s
     stood           (E,) s of it that the vehicle stood; NaN without a calibration
     came, left      (E,) whether it was seen before and afterwards; else it was there before, or still is
-    xy              (E, 2) where it was at the beginning, in the unit of positions; NaN where that is not sure
+    xy              (E, 2) where it was as soon as that was sure, in the unit of positions; NaN where it never was
     """
 
     zone: Ints
@@ -58,7 +60,7 @@ class Staying:
         closed = [np.column_stack([outline, np.roll(outline, -1, axis=0)]) for outline in outlines]
         self._side = np.concatenate([*closed, np.empty((0, 4))])
         self._first = np.cumsum([0, *map(len, closed)])
-        self._last_t, self._still = np.full(0, np.nan), np.full((0, 3), np.nan)
+        self._last_t, self._still = np.full(0, np.nan), np.full((0, 7), np.nan)
         self._open = np.full((0, self._zones + 1), -1)
         self._real, self._whole, self._count = np.zeros((0, 5)), np.zeros((0, 4), np.int64), 0
 
@@ -75,8 +77,8 @@ class Staying:
             make_room(self._real, self._count + 64 * (self._zones + 1), 0.0)
             make_room(self._whole, self._count + 64 * (self._zones + 1), 0)
             row, self._count = _look(
-                row, self._count, rows.t, rows.xy, rows.v, rows.track, self._metres, self._side, self._first,
-                self._last_t, self._still, self._open, self._real, self._whole,
+                row, self._count, rows.t, rows.xy, np.isfinite(rows.spread[:, 0]), rows.v, rows.cut, rows.track,
+                self._metres, self._side, self._first, self._last_t, self._still, self._open, self._real, self._whole,
             )  # fmt: skip
 
     def in_zones(self, vehicle: Ints) -> Stays:
@@ -99,9 +101,11 @@ class Staying:
         first = np.flatnonzero(np.append(True, ~same)[: len(who)])
         last = np.append(first[1:], len(who))[: len(first)] - 1
         end = np.maximum.reduceat(real[:, END], first) if len(first) else np.empty(0)
+        placed = np.where(np.isfinite(real[:, X]), np.arange(len(who)), len(who))
+        placed = np.minimum(np.minimum.reduceat(placed, first), last) if len(first) else first
         stood = np.add.reduceat(real[:, STOOD], first) if len(first) else np.empty(0)
         sorted_ = np.argsort(real[first, BEGIN], kind="stable")
-        first, last = first[sorted_], last[sorted_]
+        first, last, placed = first[sorted_], last[sorted_], placed[sorted_]
         return Stays(
             zone=whole[first, ZONE],
             vehicle=who[first],
@@ -110,7 +114,7 @@ class Staying:
             stood=stood[sorted_],
             came=whole[first, CAME] > 0,
             left=whole[last, LEFT] > 0,
-            xy=real[first][:, [X, Y]],
+            xy=real[placed][:, [X, Y]],
         )
 
 
@@ -133,13 +137,14 @@ def outlines_of(site: Site, ground: Ground | None) -> list[Floats]:
 
 @kernel
 def _look(
-    row: int, count: int, t: Floats, xy: Floats, v: Floats, track: Ints, metres: bool, side: Floats, first: Ints,
-    last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
+    row: int, count: int, t: Floats, xy: Floats, sure: Mask, v: Floats, cut: Floats, track: Ints, metres: bool,
+    side: Floats, first: Ints, last_t: Floats, still: Floats, open_: Ints, real: Floats, whole: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Look at rows from `row` on until all are done or the stays need more room; the next row and stay.
 
+    sure    (N,) whether the calibration knows the place
     last_t  (T,) s; of each track; open_ (T, Z + 1) its stay in each zone, the last one for standing; -1: none
-    still   (T, 3) since when [s] a track whose speed is not known is near x, y
+    still   (T, 7) since when [s] a track whose speed is not known is near x, y, and its box as it was then, cut
     real, whole   the stays: columns BEGIN... and TRACK...
     """
     zones = len(first) - 1
@@ -151,13 +156,16 @@ def _look(
             continue
         new = np.isnan(last_t[k])
         dt = 0.0 if new else t[i] - last_t[k]
-        square, sure, since = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], True, t[i] - dt / 2
+        square, since, stood = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1], t[i] - dt / 2, dt
         stands = metres and square < STANDS_M_S**2
         if metres and np.isnan(square):
             far = STANDS_M_S * _STILL_S
-            if not (x - still[k, 1]) ** 2 + (y - still[k, 2]) ** 2 <= far * far:
-                still[k, 0], still[k, 1], still[k, 2] = t[i], x, y
-            stands, sure, since = t[i] - still[k, 0] >= _STILL_S, False, still[k, 0]
+            near = (x - still[k, 1]) ** 2 + (y - still[k, 2]) ** 2 <= far * far
+            if not near or _drives_in(cut[i], still[k, 3:]):
+                still[k, 0], still[k, 1], still[k, 2], still[k, 3:] = t[i], x, y, cut[i]
+            stands, since = t[i] - still[k, 0] >= _STILL_S, still[k, 0]
+            if stands and open_[k, zones] < 0:
+                stood = t[i] - since
         else:
             still[k, 1] = np.nan
         for z in range(zones + 1):
@@ -167,18 +175,33 @@ def _look(
                 real[count, BEGIN], real[count, END], real[count, STOOD] = since, t[i], 0.0
                 if z < zones:
                     real[count, BEGIN] = t[i] - dt / 2
-                real[count, X], real[count, Y] = (x, y) if sure else (np.nan, np.nan)
+                real[count, X], real[count, Y] = (x, y) if sure[i] else (np.nan, np.nan)
                 whole[count, TRACK], whole[count, ZONE], whole[count, CAME], whole[count, LEFT] = k, z, not new, 0
                 open_[k, z] = count
                 count += 1
             elif here:
                 real[stay, END] = t[i]
-                real[stay, STOOD] += dt if stands else 0.0
+                if sure[i] and np.isnan(real[stay, X]):
+                    real[stay, X], real[stay, Y] = x, y
+                real[stay, STOOD] += min(stood, t[i] - real[stay, BEGIN]) if stands else 0.0
             elif stay >= 0:
                 real[stay, END], whole[stay, LEFT] = t[i] - dt / 2, 1
                 open_[k, z] = -1
         last_t[k] = t[i]
     return len(t), count
+
+
+@kernel
+def _drives_in(box: Floats, before: Floats) -> bool:
+    """Whether an edge of a box (4,) that the border cuts has moved since before; the border holds one in its place."""
+    if np.isnan(box[0]) or np.isnan(before[0]):
+        return False
+    most = _EDGE_SHARE * min(before[2], before[3])
+    for side in range(2):
+        moved = box[side] - before[side]
+        if abs(moved) > most or abs(moved + box[side + 2] - before[side + 2]) > most:
+            return True
+    return False
 
 
 @kernel

@@ -1,6 +1,7 @@
 """The normal equations of a track's fit: a band matrix of its path, bordered by the few numbers of the whole track.
 
-By Cholesky's factor of the band; the numbers of the whole track are eliminated first (Schur complement).
+By Cholesky's factor of the band: the path is eliminated first, and the numbers of the whole track follow from what is
+left of their equations (Schur complement).
 """
 
 from __future__ import annotations
@@ -64,23 +65,23 @@ def invert(whole: Floats, inverse: Floats) -> None:
             inverse[p, c] *= pivot
         for r in range(SIZE):
             if r != p:
-                factor, inverse[r, p] = inverse[r, p], 0.0
+                share, inverse[r, p] = inverse[r, p], 0.0
                 for c in range(SIZE):
-                    inverse[r, c] -= factor * inverse[p, c]
+                    inverse[r, c] -= share * inverse[p, c]
 
 
 @kernel
-def times(matrix: Floats, vector: Floats) -> Floats:
-    """(SIZE,) product of a matrix (SIZE, SIZE) and a vector (SIZE,)."""
-    product = np.zeros(SIZE)
+def product(matrix: Floats, vector: Floats) -> Floats:
+    """(SIZE,) of a matrix (SIZE, SIZE) and a vector (SIZE,)."""
+    result = np.zeros(SIZE)
     for s in range(SIZE):
         for r in range(SIZE):
-            product[s] += matrix[s, r] * vector[r]
-    return product
+            result[s] += matrix[s, r] * vector[r]
+    return result
 
 
 @kernel
-def move(band: Floats, right: Floats, step: Floats, path: Floats) -> float:
+def move_path(band: Floats, right: Floats, step: Floats, path: Floats) -> float:
     """Move the path (K, 2) as far as it goes with a step of the size (SIZE,); returns how far at most."""
     n, most = len(band), 0.0
     for r in range(n - 1, -1, -1):

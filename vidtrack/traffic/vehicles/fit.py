@@ -7,8 +7,9 @@ the vehicle and by how much its boxes are too wide (px). The sum of squares has,
     (p_k+1 - p_k) / h_k - (p_k - p_k-1) / h_k-1          the velocity is a random walk, with variance JOLT per second
     size - what vehicles are like                        wide: classes are told apart afterwards
 
-By Gauss and Newton: the p_k are coupled to two neighbours on either side, so their normal matrix is a band; the four
-numbers of the whole track are eliminated first (Schur complement). The vehicle heads along its path.
+By Gauss and Newton: the p_k are coupled to two neighbours on either side, so their normal matrix is a band; they
+are eliminated first, from the equations of the four numbers of the whole track (`band`). The vehicle heads along its
+path.
 """
 
 from __future__ import annotations
@@ -17,7 +18,17 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.compiled import inlined, kernel
-from vidtrack.traffic.vehicles.band import BAND, SIZE, eliminate, factor, invert, move, solve_back, solve_one, times
+from vidtrack.traffic.vehicles.band import (
+    BAND,
+    SIZE,
+    eliminate,
+    factor,
+    invert,
+    move_path,
+    product,
+    solve_back,
+    solve_one,
+)
 from vidtrack.traffic.vehicles.cuboid import box_edges
 
 MEAN, SIGMA = np.array([4.6, 1.9, 1.9, 0.0]), np.array([4.0, 1.0, 1.2, 1.0])
@@ -95,9 +106,9 @@ def fit(
             factor(band[:n], right[:n])
             eliminate(right[:n], whole, rest)
             invert(whole, cov[i])
-            step = np.maximum(times(cov[i], rest), _LEAST - size[i])
+            step = np.maximum(product(cov[i], rest), _LEAST - size[i])
             size[i] += step
-            moved = max(np.abs(step).max(), move(band[:n], right[:n], step, path[a:b]))
+            moved = max(np.abs(step).max(), move_path(band[:n], right[:n], step, path[a:b]))
             if coarse == 1.0 and moved < _STILL_M:
                 break
         quality[i] = max(misfit, _LEAST_MISFIT)
@@ -213,7 +224,7 @@ def _respond(band: Floats, right: Floats, cov: Floats, a: Floats) -> None:
         for s in range(SIZE):
             by_size[s] -= a[r] * right[r, s]
     solve_one(band, a)
-    size = times(cov, by_size)
+    size = product(cov, by_size)
     for r in range(len(a)):
         for s in range(SIZE):
             a[r] -= right[r, s] * size[s]
