@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
+from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Ints
 from vidtrack.traffic.boxes import partly_hidden
 from vidtrack.traffic.calibration.calibrate import calibrated
@@ -34,8 +35,7 @@ class WholeTracks:
         track, t = table["track_id"].to_numpy(), column["time_s"]
         box = np.column_stack([column[name] for name in BOX])
         hidden = partly_hidden(t, box, states(table)[1])
-        more = max(0, int(track.max(initial=-1)) + 1 - len(self._sums))
-        self._sums = np.vstack([self._sums, np.zeros((more, 4))])
+        make_room(self._sums, int(track.max(initial=-1)) + 1, 0.0)
         add_lengths(self._sums, track, column["length_m"], column["length_sigma_m"], hidden)
         if EDGE_COLUMNS[0] in column:
             xy = np.column_stack([column["x_m"], column["y_m"]])
