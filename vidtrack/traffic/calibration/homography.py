@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from vidtrack.arrays.types import Floats
 
@@ -104,6 +103,8 @@ def fitted(X: Floats, p: Floats, plane_cov: Floats, picture_cov: Floats) -> Fit:
     plane_cov, picture_cov   (N, 2, 2) covariances. The residual in the picture has picture_cov + J plane_cov J', with
     J from the fit before: over the error of a point the map from the plane to the picture is nearly straight.
     """
+    from scipy.optimize import least_squares  # slow to import, and few runs need it
+
     k = start(X, p)
     for _ in range(_REWEIGHTINGS):
         root = _whitening(k, X, plane_cov, picture_cov)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from vidtrack.arrays.types import Floats, Mask
 
 
 def hull(points: Floats) -> Floats:
     """(M, 3) half planes a x + b y + c <= 0, (a, b) of unit length, that hold the points (N, 2); NaN if on one line."""
+    from scipy.spatial import ConvexHull, QhullError  # slow to import, and few runs need it
+
     try:
         return np.asarray(ConvexHull(points).equations)
     except QhullError:
