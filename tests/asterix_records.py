@@ -1,7 +1,14 @@
 """ASTERIX for the tests, encoded by libasterix."""
 
 import numpy as np
-from asterix.generated import Cat_034_1_29, Cat_048_1_32, Cat_062_1_20
+
+
+def layout(name):
+    """A layout of libasterix, by its name in `asterix.generated`: slow to import, and not for who collects tests."""
+    from asterix import generated
+
+    return getattr(generated, name)
+
 
 RADAR = (("SAC", 25), ("SIC", 201))
 
@@ -9,7 +16,7 @@ RADAR = (("SAC", 25), ("SIC", 201))
 def plot(time_s, range_m, azimuth_deg, radar=RADAR, **items):
     """A record of CAT 048."""
     place = (("RHO", (range_m / 1852, "NM")), ("THETA", (azimuth_deg % 360, "°")))
-    return Cat_048_1_32.cv_record.create(
+    return layout("Cat_048_1_32").cv_record.create(
         {"010": radar, "140": (time_s % 86400, "s"), "020": ((1, 0, 0, 0, 0, None),), "040": place, **items}
     )
 
@@ -21,12 +28,13 @@ def mark(time_s, azimuth_deg=0.0, turn_s=None, radar=RADAR):
         items["020"] = (azimuth_deg, "°")
     if turn_s:
         items["041"] = (turn_s, "s")
-    return Cat_034_1_29.create([Cat_034_1_29.cv_record.create(items)]).unparse().to_bytes()
+    category = layout("Cat_034_1_29")
+    return category.create([category.cv_record.create(items)]).unparse().to_bytes()
 
 
 def block(*records):
     """A block of records of CAT 048."""
-    return Cat_048_1_32.create(list(records)).unparse().to_bytes()
+    return layout("Cat_048_1_32").create(list(records)).unparse().to_bytes()
 
 
 def track(time_s, latitude, longitude, number, radar=RADAR):
@@ -35,7 +43,8 @@ def track(time_s, latitude, longitude, number, radar=RADAR):
         "010": radar, "070": (time_s, "s"), "040": number,
         "105": (("LAT", (latitude, "°")), ("LON", (longitude, "°"))),
     }  # fmt: skip
-    return Cat_062_1_20.create([Cat_062_1_20.cv_record.create(items)]).unparse().to_bytes()
+    category = layout("Cat_062_1_20")
+    return category.create([category.cv_record.create(items)]).unparse().to_bytes()
 
 
 def sweeps(table, turn_s=4.0, begin_s=0.0):

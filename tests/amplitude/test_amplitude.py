@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+import scipy  # its parts are imported when they are asked for
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
 
 from vidtrack.amplitude.densities import (
     RAYLEIGH,
@@ -21,7 +21,7 @@ LAWS = (RAYLEIGH, swerling1(10.0), Weibull(1.5, np.log(2)), Weibull(1.0, 1.0), W
 @pytest.mark.parametrize("law", LAWS)
 def test_the_density_is_minus_the_derivative_of_the_survival_function(law):
     for a in (0.3, 1.0, 2.5):
-        assert quad(law.pdf, a, np.inf)[0] == pytest.approx(float(law.survival(a)), rel=1e-9)
+        assert scipy.integrate.quad(law.pdf, a, np.inf)[0] == pytest.approx(float(law.survival(a)), rel=1e-9)
 
 
 @pytest.mark.parametrize("law", LAWS)

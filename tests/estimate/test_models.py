@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import scipy  # its parts are imported when they are asked for
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad_vec
 
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
@@ -49,7 +49,7 @@ def test_singer_noise_is_the_integral_of_its_white_noise():
         F = transition(model, s)
         return F[:, 2:] @ F[:, 2:].T * 2 * 3.0**2 / 2.0
 
-    np.testing.assert_allclose(noise(model, dt), quad_vec(contribution, 0, dt)[0], rtol=1e-9)
+    np.testing.assert_allclose(noise(model, dt), scipy.integrate.quad_vec(contribution, 0, dt)[0], rtol=1e-9)
 
 
 def test_singer_lies_between_constant_velocity_and_constant_acceleration():

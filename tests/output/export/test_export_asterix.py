@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from asterix.base import Bits, RawDatablock
-from asterix.generated import Cat_062_1_20
+from asterix_records import layout
 from click.testing import CliRunner
 
 from vidtrack.cli.export import command
@@ -33,10 +32,12 @@ def run(tmp_path_factory):
 def exported(run, tmp_path, *options):
     done = CliRunner().invoke(command, [str(run), "--as", "asterix", "-o", str(tmp_path / "out"), *options])
     assert done.exit_code == 0, done.output
+    from asterix.base import Bits, RawDatablock
+
     blocks = RawDatablock.parse(Bits.from_bytes((tmp_path / "out" / "tracks.ast").read_bytes()))
     assert all(block.get_category() == 62 for block in blocks)
     assert max(len(block.unparse()) // 8 for block in blocks) <= 1400
-    return [record for block in blocks for record in Cat_062_1_20.cv_uap.parse(block.get_raw_records())]
+    return [record for block in blocks for record in layout("Cat_062_1_20").cv_uap.parse(block.get_raw_records())]
 
 
 def value(record, item, part=None, unit=None):

@@ -5,8 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from asterix.generated import Cat_021_2_7
-from asterix_records import sweeps, track
+from asterix_records import layout, sweeps, track
 
 from vidtrack import formats, score
 from vidtrack.config.settings import Settings
@@ -23,7 +22,8 @@ def adsb(time_s, latitude, longitude, address):
         "010": (("SAC", 1), ("SIC", 1)), "073": (time_s, "s"), "080": address,
         "131": (("LAT", (latitude, "°")), ("LON", (longitude, "°"))),
     }  # fmt: skip
-    return Cat_021_2_7.create([Cat_021_2_7.cv_record.create(items)]).unparse().to_bytes()
+    category = layout("Cat_021_2_7")
+    return category.create([category.cv_record.create(items)]).unparse().to_bytes()
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,11 @@ from places import batch_of, do, small_videos
 from vidtrack.errors import ConfigError, StoppedEarly
 from vidtrack.run.batch import engines
 
-pytest.importorskip("distributed", reason="dask[distributed] is not installed: pip install 'vidtrack[dask]'")
+
+@pytest.fixture(scope="module", autouse=True)
+def _installed():
+    """Not while tests are collected: it is slow to import."""
+    pytest.importorskip("distributed", reason="dask[distributed] is not installed: pip install 'vidtrack[dask]'")
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,12 @@ from vidtrack.run.batch.index import DONE
 from vidtrack.run.batch.place import place_of
 from vidtrack.run.batch.sources import listed
 
-pytest.importorskip("s3fs", reason="s3fs is not installed: pip install 'vidtrack[s3]'")
-pytest.importorskip("moto.server", reason="moto[server] is not installed: pip install 'vidtrack[test]'")
+
+@pytest.fixture(scope="module", autouse=True)
+def _installed():
+    """Not while tests are collected: they are slow to import."""
+    pytest.importorskip("s3fs", reason="s3fs is not installed: pip install 'vidtrack[s3]'")
+    pytest.importorskip("moto.server", reason="moto[server] is not installed: pip install 'vidtrack[test]'")
 
 
 @pytest.fixture(scope="module")

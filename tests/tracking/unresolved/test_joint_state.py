@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import scipy  # its parts are imported when they are asked for
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import multivariate_normal, truncnorm
 
 from vidtrack.decision import Decision
 from vidtrack.estimate.kalman import KalmanBank
@@ -31,9 +31,9 @@ def test_an_interval_gives_the_moments_of_the_truncated_normal(mean, sigma, limi
     joint = Joint(np.array([mean, 0.0]), np.diag([sigma**2, 1.0]), 1)
     found = joint.within(np.array([1.0, 0.0]), limit)
     low, high = (-limit - mean) / sigma, (limit - mean) / sigma
-    if multivariate_normal().cdf(high) - multivariate_normal().cdf(low) < 1e-4:
+    if scipy.stats.multivariate_normal().cdf(high) - scipy.stats.multivariate_normal().cdf(low) < 1e-4:
         return
-    expected = truncnorm.stats(low, high, mean, sigma)
+    expected = scipy.stats.truncnorm.stats(low, high, mean, sigma)
     np.testing.assert_allclose([found.x[0], found.P[0, 0]], expected, rtol=1e-5, atol=1e-7)
     assert found.P[1, 1] == 1.0
 
@@ -69,7 +69,9 @@ def test_one_target_is_updated_as_by_a_kalman_filter():
     np.testing.assert_allclose(found.x, bank.x[0])
     np.testing.assert_allclose(found.P, bank.P[0])
     S = P[::2, ::2] + R
-    assert joint.log_likelihood(z[None], R[None])[0] == pytest.approx(multivariate_normal(x[::2], S).logpdf(z))
+    assert joint.log_likelihood(z[None], R[None])[0] == pytest.approx(
+        scipy.stats.multivariate_normal(x[::2], S).logpdf(z)
+    )
 
 
 @pytest.mark.parametrize("count", [2, 3])
@@ -84,7 +86,7 @@ def test_the_shared_measurement_has_the_moments_of_the_centre_of_power(count):
     R = np.eye(2)
     certain = Joint(state.ravel(), 1e-9 * np.eye(4 * count), 2)
     at = certain.middle + np.array([1.0, -2.0])
-    expected = multivariate_normal(centre.mean(axis=0), np.cov(centre.T) + R).logpdf(at)
+    expected = scipy.stats.multivariate_normal(centre.mean(axis=0), np.cov(centre.T) + R).logpdf(at)
     assert certain.log_likelihood(at[None], R[None])[0] == pytest.approx(expected, abs=0.02)
 
 
@@ -129,7 +131,9 @@ def test_both_orders_of_an_exchange_sum_to_one(seed):
     assert exchange_probability(joint, z, R) + exchange_probability(joint, z[::-1], R) == pytest.approx(1)
     one = np.array([z[0], [np.nan, np.nan]])
     both = [
-        multivariate_normal(joint.x[k : k + 4 : 2], joint.P[k : k + 4 : 2, k : k + 4 : 2] + np.eye(2)).pdf(z[0])
+        scipy.stats.multivariate_normal(joint.x[k : k + 4 : 2], joint.P[k : k + 4 : 2, k : k + 4 : 2] + np.eye(2)).pdf(
+            z[0]
+        )
         for k in (0, 4)
     ]
     assert exchange_probability(joint, one, R) == pytest.approx(both[1] / sum(both), abs=1e-9)
