@@ -26,6 +26,13 @@ def report(folder, scene=None):
     return made
 
 
+@pytest.fixture
+def unpainted(monkeypatch):
+    """For what words and tables say: pictures are laid out, and not painted."""
+    for part in ("charts", "pictures"):
+        monkeypatch.setattr(f"vidtrack.output.report.{part}.png", lambda figure: b"")
+
+
 def table(path):
     with path.open(encoding="utf-8-sig", newline="") as file:
         return list(csv.DictReader(file))
@@ -66,7 +73,7 @@ def test_the_page_needs_nothing_from_elsewhere(made):
     assert set(sources) == {"data:image/png;base64,"}
 
 
-def test_the_page_says_what_contradicts_the_calibration(tmp_path, made):
+def test_the_page_says_what_contradicts_the_calibration(tmp_path, made, unpainted):
     assert "calibration is contradicted" not in words(made[1])
     scale = {"factor": 1.26, "sigma": 0.05, "vehicles": 20, "off": True}
     sections = ["sections.main.length_m = 24, but by the calibration the gates are 31 m apart"]
@@ -78,7 +85,7 @@ def test_the_page_says_what_contradicts_the_calibration(tmp_path, made):
         assert told < page.index(reason) < page.index("Turning movements")
 
 
-def test_the_page_says_where_an_earlier_version_did_not_tell_of_the_calibration(tmp_path, made):
+def test_the_page_says_where_an_earlier_version_did_not_tell_of_the_calibration(tmp_path, made, unpainted):
     doubt = "does not tell whether the points of the calibration agree: measure it again"
     assert doubt not in words(made[1])
     folder = write_day(tmp_path / "day", [[3], [5]])
@@ -88,7 +95,7 @@ def test_the_page_says_where_an_earlier_version_did_not_tell_of_the_calibration(
     assert doubt in words(report(folder))
 
 
-def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made):
+def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made, unpainted):
     assert "Conflicts" not in words(made[1])
     assert not (made[1] / "conflicts.csv").exists()
     nothing = np.nan
@@ -119,7 +126,7 @@ def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made):
     assert times == sorted(times)  # the closest first
 
 
-def test_no_conflicts_is_said(tmp_path):
+def test_no_conflicts_is_said(tmp_path, unpainted):
     assert "No two vehicles came so close" in words(report(write_day(tmp_path / "day", [4], close=[])))
 
 
@@ -142,14 +149,14 @@ def test_what_there_is_no_data_for_is_left_out_in_words(made):
     assert not (made[1] / "heat_map.png").exists()
 
 
-def test_a_site_without_metres_has_no_queues_and_no_speeds(tmp_path):
+def test_a_site_without_metres_has_no_queues_and_no_speeds(tmp_path, unpainted):
     text = words(report(write_day(tmp_path / "day", [4, 5, 6, 7], metres=False)))
     assert "Left out: no speed was measured" in text
     assert "Left out: without a calibration nobody knows whether a vehicle stands." in text
     assert "The angles are those of the picture" in text
 
 
-def test_less_than_an_hour_has_no_peak_hour(tmp_path):
+def test_less_than_an_hour_has_no_peak_hour(tmp_path, unpainted):
     made = report(write_day(tmp_path / "day", [4, 5, 6]))
     assert "Left out: no hour of whole intervals was watched." in words(made)
     assert not (made / "peak_hour.csv").exists()
