@@ -1,5 +1,7 @@
 """Weather and light change the picture in the stated way, and the truth not at all."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -22,6 +24,7 @@ KNOBS = [
 FRAME = 70
 
 
+@cache
 def picture(**knobs):
     return simulate("junction", seed=6, noise=0, **knobs).frame(FRAME).astype(int)
 
@@ -42,9 +45,14 @@ def test_the_same_seed_gives_the_same_frames_in_any_order(knobs):
     assert (later == two.frame(90)).all()
 
 
+@pytest.fixture(scope="module")
+def clear():
+    return simulate("junction", seed=6).truth
+
+
 @pytest.mark.parametrize("knobs", KNOBS, ids=str)
-def test_the_truth_is_that_of_a_clear_day(knobs):
-    clear, other = simulate("junction", seed=6).truth, simulate("junction", seed=6, **knobs).truth
+def test_the_truth_is_that_of_a_clear_day(clear, knobs):
+    other = simulate("junction", seed=6, **knobs).truth
     assert (clear.box == other.box).all()
     assert (clear.visibility == other.visibility).all()
     assert (clear.id == other.id).all()
