@@ -262,6 +262,24 @@ def test_modes_can_be_forgotten_but_not_the_kind_of_target():
     np.testing.assert_allclose(bank.mode, [unseen, told])
 
 
+def test_a_manoeuvre_is_heeded_in_gates_and_weights_and_not_in_what_is_stated():
+    """The odds of the second model are doubled where plots are gated; states, errors and NIS are as without."""
+    heedful, plain = IMMBank([QUIET, BRISK], [20.0, 5.0], heed=[1.0, 2.0]), IMMBank([QUIET, BRISK], [20.0, 5.0])
+    z = np.cumsum(np.random.default_rng(5).normal(size=(20, 2)), axis=0)
+    np.testing.assert_array_equal(run(heedful, z, 0.5, 1.0), run(plain, z, 0.5, 1.0))
+    np.testing.assert_array_equal(heedful.P, plain.P)
+    for one, other in zip(heedful.predicted_measurement(POSITION), plain.predicted_measurement(POSITION), strict=True):
+        np.testing.assert_array_equal(one, other)
+    usual, agile = plain.modes(POSITION).weight
+    np.testing.assert_allclose(heedful.modes(POSITION).weight[1], 2 * agile / (usual + 2 * agile), rtol=1e-12)
+
+
+@pytest.mark.parametrize("heed", [[1.0], [1.0, 0.0], [1.0, np.nan]])
+def test_heed_that_is_none_is_refused(heed):
+    with pytest.raises(ConfigError, match="heed"):
+        IMMBank([QUIET, BRISK], [20.0, 5.0], heed=heed)
+
+
 @pytest.mark.parametrize("rates", [np.zeros((2, 2)), -np.ones((2, 2)), np.ones((3, 3))])
 def test_rates_that_are_none_are_refused(rates):
     with pytest.raises(ConfigError, match="rate"):

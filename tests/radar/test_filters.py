@@ -98,3 +98,13 @@ def test_plots_tell_which_targets_manoeuvre_all_the_time(swing_m, agile):
         bank.predict(4.0)
         bank.update(Decision(one, one, one, np.ones(1), np.zeros(1)), Scan(time_s, plot[None], found.R[:1]), POSITION)
     assert (bank.mode[0, 2:].sum() > 0.9) if agile else (bank.mode[0, 2:].sum() < 0.05)
+
+
+@pytest.mark.parametrize("agile", [0.0, 0.01])
+def test_a_manoeuvre_counts_twice_where_plots_are_gated(agile):
+    settings, R = RadarSettings(agile=agile), 2500 * np.eye(2)[None]
+    bank = estimator(settings, SimpleNamespace(dim=2, R=R))(motion(settings, 2))
+    bank.append(np.zeros((1, 2)), R, np.ones(1))
+    gated = bank.modes(POSITION).weight[:, 0]
+    assert gated[1] / gated[0] == pytest.approx(2 * bank.mode[0, 1] / bank.mode[0, 0])
+    assert gated[1] / gated[0] == pytest.approx(2 * settings.manoeuvre_s / settings.quiet_s)

@@ -56,7 +56,7 @@ class RadarSettings(Group):
     """s; correlation time of the acceleration"""
     quiet_accel: float = Field(0.3, gt=0)
     """m/s^2; standard deviation of the acceleration in imm's quiet mode; its other mode is radar.model"""
-    quiet_s: float = Field(500.0, gt=0)
+    quiet_s: float = Field(900.0, gt=0)
     """s; mean time that imm's quiet mode lasts"""
     manoeuvre_s: float = Field(20.0, gt=0)
     """s; mean time that imm's other mode lasts"""

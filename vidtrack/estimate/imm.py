@@ -44,6 +44,7 @@ class IMMBank:
     rates   (r, r) instead of stay_s: rates [1/s] of switching from the model of a row to that of a column
     prior   (r,) probabilities of the models for new targets; None: in proportion to the sojourn times
     kinds   (r,) number of the kind of target that each model is of; None: all are of one
+    heed    (r,) factors on the models' probabilities where measurements are gated and weighed; None: all are 1
 
     Models may have components beyond position and velocity. In the mixing, a component that the other model lacks
     keeps its own moments. x (T, n), P (T, n, n) are moments of position and velocity; mode (T, r) probabilities.
@@ -59,6 +60,7 @@ class IMMBank:
         rates: Floats | None = None,
         prior: Floats | None = None,
         kinds: Sequence[int] | None = None,
+        heed: Sequence[float] | None = None,
     ) -> None:
         r = len(models)
         if r < 2 or (stay_s is not None and len(stay_s) != r):
@@ -85,6 +87,9 @@ class IMMBank:
         together = (kind == kind[:, None]).astype(float)
         evenly, usual = (each / each.sum(axis=1, keepdims=True) for each in (together, together / self.left.T))
         self._unseen = USUAL * usual + (1 - USUAL) * evenly
+        self.heed = np.ones(r) if heed is None else np.asarray(heed, float)
+        if self.heed.shape != (r,) or not self.heed.min() > 0:
+            raise ConfigError(f"IMM: heed must be {r} factors above zero")
         self.model = models[0]
         self.banks = tuple(KalmanBank(model) for model in models)
         self.mode = np.empty((0, r))
@@ -116,15 +121,15 @@ class IMMBank:
 
     def predicted_measurement(self, sensor: Sensor) -> tuple[Floats, Floats]:
         """zhat (T, m) and its covariance (T, m, m) over all modes; the innovation covariance is that plus R."""
-        weight, zhat, cov = self.modes(sensor)
+        zhat, cov = self._each(sensor)
         off = np.stack([wrapped(mean - zhat[0], sensor.angles) for mean in zhat])
-        mean, over_all = _mixture(weight, off, cov)
+        mean, over_all = _mixture(self.mode.T, off, cov)
         return wrapped(zhat[0] + mean, sensor.angles), over_all
 
     def modes(self, sensor: Sensor) -> Modes:
         """The predicted measurement of each mode, by which a measurement is gated and weighed."""
-        each = [bank.predicted_measurement(sensor) for bank in self.banks]
-        return Modes(self.mode.T, np.stack([zhat for zhat, _ in each]), np.stack([cov for _, cov in each]))
+        heeded = self.mode * self.heed
+        return Modes((heeded / heeded.sum(axis=1, keepdims=True)).T, *self._each(sensor))
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
         """Update each mode with its own weights, and the probabilities of the modes.
@@ -194,6 +199,11 @@ class IMMBank:
             bank.put(rows, theirs, at)
         for name in ("mode", "hits", "scale", "x", "P"):
             setattr(self, name, replaced(getattr(self, name), rows, getattr(other, name), at))
+
+    def _each(self, sensor: Sensor) -> tuple[Floats, Floats]:
+        """zhat (r, T, m) and its covariance (r, T, m, m) of each mode."""
+        each = [bank.predicted_measurement(sensor) for bank in self.banks]
+        return np.stack([zhat for zhat, _ in each]), np.stack([cov for _, cov in each])
 
     def _enter(self, count: int, scale: Floats) -> None:
         self.mode = np.concatenate([self.mode, np.tile(self.prior, (count, 1))])

@@ -28,6 +28,8 @@ HARDER = 1.5
 """Acceleration of agile targets, over that of others."""
 BECOMES_S, REMAINS_S = 5000.0, 1000.0
 """s; mean times after which a target becomes agile, and after which it is so no longer."""
+HEED = 2.0
+"""By how much the odds of a manoeuvre are raised in gates and weights: a plot too many costs less than a lost track."""
 
 
 def motion(settings: RadarSettings, dim: int) -> Motion:
@@ -68,7 +70,7 @@ def _imm(model: Motion, quiet: Motion, settings: RadarSettings) -> IMMBank:
     """
     rest, turn, share = settings.quiet_s, settings.manoeuvre_s, settings.agile
     if share == 0:
-        return IMMBank([quiet, model], [rest, turn])
+        return IMMBank([quiet, model], [rest, turn], heed=[1, HEED])
     harder = motion(settings.model_copy(update={"accel": HARDER * settings.accel}), model.dim)
     rates = np.array([
         [0, 1 / rest, 1 / BECOMES_S, 0],
@@ -78,7 +80,7 @@ def _imm(model: Motion, quiet: Motion, settings: RadarSettings) -> IMMBank:
     ])  # fmt: skip
     usual = (1 - share) / (rest + turn)
     prior = np.array([usual * rest, usual * turn, share / 2, share / 2])
-    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior, kinds=[0, 0, 1, 1])
+    return IMMBank([quiet, model, quiet, harder], rates=rates, prior=prior, kinds=[0, 0, 1, 1], heed=[1, HEED, 1, 1])
 
 
 def _particles(model: Motion, settings: RadarSettings, seed: int) -> ParticleBank:
