@@ -18,10 +18,10 @@ def radar_life(settings: Settings, feeds: Sequence[Measurements], stations: Sequ
     """How tracks of these radars are confirmed, and end: no later than at a pause of all.
 
     A miss by a station that may not see a target hardly counts, so with one the time without a plot is bounded, too:
-    by radar.coast_s, else UNSEEN_S, or so many scans of the slowest radar as end a track if that is longer.
+    by radar.unseen_s, else UNSEEN_S, or so many scans of the slowest radar as end a track if that is longer.
     """
     common, radar = settings.tracker, settings.radar
-    bound_s = radar.coast_s
+    bound_s = radar.unseen_s
     if bound_s is None and any(station.may_not_see for station in stations):
         bound_s = max([UNSEEN_S, *(radar.coast_scans * found.rhythm.scan_s for found in feeds)])
     longest_s = longest_coast(feeds)
