@@ -25,8 +25,6 @@ from vidtrack.simulate.roads.radar import TrafficRadar, write_road_plots
 from vidtrack.tracks import TENTATIVE
 
 FPS, SIZE, WARM_S, CUTOFF_M = 10.0, (640, 360), 4.0, 5.0
-FAST = 1e3
-"""m/s; the part of the road that both cover is that of fast vehicles."""
 RADAR = TrafficRadar()
 CASES = {
     "day": ({}, RADAR),
@@ -105,7 +103,7 @@ def main() -> None:
                 both = [picture, sector[0].coverage]
 
                 def covers(xy, both=both):
-                    return np.prod([one.share(xy, FAST * np.ones_like(xy)) for one in both], axis=0) > 0.01
+                    return np.prod([one.share(xy) for one in both], axis=0) > 0.01
 
                 for sensors, rows in found.items():
                     rows.append(scored(clip, covers, tracked(folder, settings, sensors)))

@@ -22,6 +22,7 @@ class Decision:
     spread     whether the spread of the weighted measurements is added to P; generalized nearest neighbour uses
                their mean as one measurement
     approximate  (K,) rows with approximate weights, in clusters too large for exact ones; None: no row
+    shows      whether the measurements show the targets; else they are what a miss tells, and no row is hit
     """
 
     parent: Ints
@@ -32,6 +33,12 @@ class Decision:
     inflation: Floats | None = None
     spread: bool = True
     approximate: Mask | None = None
+    shows: bool = True
+
+    @property
+    def hit(self) -> Mask:
+        """(K,) rows that are rather detected than not."""
+        return np.logical_and(self.shows, self.beta0 < 0.5)
 
     def without(self, rows: Mask) -> Decision:
         """The same decision with a plain miss, without inflation, in these rows (K,)."""

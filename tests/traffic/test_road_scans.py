@@ -57,6 +57,6 @@ def test_a_blob_that_two_tracks_share_is_left_out(ground):
 def test_the_picture_covers_the_calibrated_road_in_it(ground):
     covered = InPicture(ground, (WIDTH, HEIGHT))
     xy = np.array([[0.0, 20.0], [0.0, 200.0], [0.0, -20.0], [40.0, 20.0]])
-    np.testing.assert_array_equal(covered.share(xy, 0 * xy), [1, 0, 0, 0])
+    np.testing.assert_array_equal(covered.share(xy), [1, 0, 0, 0])
     hull_m2 = (12 + 16) / 2 * 13 + (16 + 24) / 2 * 23  # of the points, a trapezium upon a trapezium
     assert covered.area() == pytest.approx(hull_m2, rel=0.1)

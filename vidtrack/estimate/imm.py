@@ -152,7 +152,7 @@ class IMMBank:
             bank.update(own, scan, sensor)
         self.mode = (mode / mode.sum(axis=0)).T
         self._expected = before.T
-        self.hits = self.hits[parent] + (decision.beta0 < 0.5)
+        self.hits = self.hits[parent] + decision.hit
         self.scale = self.scale[parent]
         self.x, self.P = self._moments(self.banks, self.mode)
 

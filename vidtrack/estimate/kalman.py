@@ -98,7 +98,7 @@ class KalmanBank:
             decision.parent, decision.row, decision.measurement, decision.beta, decision.beta0,
             inflation, decision.spread, scan.noise if known else _no_excess(m)[0],
         )  # fmt: skip
-        self.hits = self.hits.take(decision.parent) + (decision.beta0 < 0.5)
+        self.hits = self.hits.take(decision.parent) + decision.hit
         self.scale = self.scale.take(decision.parent)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:

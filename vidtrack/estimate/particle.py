@@ -132,7 +132,7 @@ class ParticleBank:
         self.particles = self._chosen(decision, start, scan, sensor, seen, weight, log_weight)
         self.log_weight = log_weight
         self._moments = x, P
-        self.hits = self.hits[parent] + (decision.beta0 < 0.5)
+        self.hits = self.hits[parent] + decision.hit
         self.scale = self.scale[parent]
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:

@@ -55,7 +55,7 @@ class UniformBinsBank(KalmanBank):
             + _summed(row, beta[:, None, None] * second, len(parent))
             - mean[:, :, None] * mean[:, None]
         )
-        self.hits = self.hits[parent] + (decision.beta0 < 0.5)
+        self.hits = self.hits[parent] + decision.hit
         self.scale = self.scale[parent]
 
     def _estimate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.errors import ScanError
 from vidtrack.radar.coordinates import to_polar, unbiased
 
 NEAREST_M = 1e-6
@@ -87,6 +88,28 @@ class PositionRangeRate:
         """The measured positions (M, d) and their covariances (M, d, d)."""
         dim = z.shape[1] - 1
         return z[:, :dim], R[:, :dim, :dim]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeRate:
+    """z = range rate [m/s] from `origin` alone, as what a Doppler filter does not pass tells it."""
+
+    angles: ClassVar[tuple[int, ...]] = ()
+    origin: tuple[float, ...] = (0.0, 0.0)
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, 1) expected range rates."""
+        return _range_rate(*_relative(x, position, self.origin))[:, None]
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(T, 1, n) Jacobians of h."""
+        H = np.zeros((len(x), 1, x.shape[1]))
+        _range_rate_jacobian(H[:, 0], *_relative(x, position, self.origin), position)
+        return H
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """Raises ScanError: it has no place."""
+        raise ScanError("a range rate alone tells no position, so no track begins with one")
 
 
 def _relative(x: Floats, position: tuple[int, ...], origin: tuple[float, ...]) -> tuple[Floats, Floats]:

@@ -37,15 +37,16 @@ class Groups:
         if settings.output.smooth or common.redundant is not None:
             raise ConfigError("groups go without --smooth and tracker.redundant; leave these out")
         merge = radar.group_link_m if radar.group_merge_m is None else radar.group_merge_m
+        stations = [Station(rates)]
         self.tracker = GroupTracker(
             Formation(radar.group_link_m, merge),
             model=motion(radar, found.dim),
             estimator=estimator(radar, found, seed),
             associate=associate,
             gate=gate(common, radar.euclidean_radius_m, adaptive=True),
-            life=radar_life(settings, [found]),
+            life=radar_life(settings, [found], stations),
             picture=NoPicture(),
-            stations=[Station(rates)],
+            stations=stations,
         )
         self.last: GroupTracks | None = None
 

@@ -146,4 +146,4 @@ def build_network_tracker(settings: Settings, network: Network, *, explain: bool
 def _station(feed: Feed, settings: RadarSettings) -> Station:
     own = feed.placed.radar.detection_probability
     detection = settings.detection_probability if own is None else own
-    return Station(rates(settings, feed.found, detection), feed.coverage)
+    return Station(rates(settings, feed.found, detection), feed.coverage, blind=feed.blind)

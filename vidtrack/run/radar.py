@@ -191,7 +191,7 @@ def build_point_tracker(
         associate=rule(common, unresolved=isinstance(sharing, Unresolved)),
         gate=admits,
         threshold=threshold,
-        life=radar_life(settings, found),
+        life=radar_life(settings, found, stations),
         picture=NoPicture(),
         sharing=sharing,
         stations=stations,

@@ -11,8 +11,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
@@ -145,7 +143,7 @@ def open_camera(video: str, site: Path, settings: Settings) -> Iterator[Camera]:
 
 def is_shown(feed: Feed, coverage: InPicture) -> bool:
     """Whether any plot of a radar is in the picture."""
-    return bool(coverage.share(feed.xy, np.zeros_like(feed.xy)).any())
+    return bool(coverage.share(feed.xy).any())
 
 
 def told_if_apart(steps: Iterable[Step], radars: int, within_s: float) -> Iterator[Step]:
@@ -200,6 +198,7 @@ def build_road_tracker(
             ),
             feed.coverage,
             BY_RADAR,
+            blind=feed.blind,
         )
         for feed in feeds
     ]
@@ -214,7 +213,7 @@ def build_road_tracker(
         estimator=estimator(radar, feeds[0].found, seed) if feeds else KalmanBank,
         associate=rule(common),
         gate=gate(common, radar.euclidean_radius_m, adaptive=True),
-        life=radar_life(settings, [feed.found for feed in feeds]),
+        life=radar_life(settings, [feed.found for feed in feeds], stations),
         picture=NoPicture(),
         stations=stations,
         explain=explain,

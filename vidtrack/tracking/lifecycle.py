@@ -20,11 +20,15 @@ class Life(Protocol):
     """Rules of confirmation and deletion for the rows of a register.
 
     birth            log-odds that a measurement which belongs to no track is a target's
+    coast_s          s; no track that is alone outlives its last evidence by more; None: no limit
     confirms, ends   the reason that the events of a confirmation, and of a hopeless track's deletion, give
     """
 
     @property
     def birth(self) -> float: ...
+
+    @property
+    def coast_s(self) -> float | None: ...
 
     @property
     def confirms(self) -> str: ...

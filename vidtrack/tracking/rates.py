@@ -88,10 +88,12 @@ class Rates:
 
     def of(self, run: Ints, zhat: Floats) -> tuple[float | Floats, float | Floats]:
         """P_D and clutter density for rows (T,) of these runs, at their predicted measurements (T, m)."""
-        return (
-            self._detection[run] if isinstance(self._detection, np.ndarray) else self.detection_probability,
-            self._clutter[run] if isinstance(self._clutter, np.ndarray) else self.clutter_density * self.where.at(zhat),
-        )
+        clutter = self._clutter[run] if isinstance(self._clutter, np.ndarray) else None
+        return self.detection(run), self.clutter_density * self.where.at(zhat) if clutter is None else clutter
+
+    def detection(self, run: Ints) -> float | Floats:
+        """P_D for rows (T,) of these runs."""
+        return self._detection[run] if isinstance(self._detection, np.ndarray) else self.detection_probability
 
     def look(self, scan: Scan) -> None:
         """Extend the surveyed space by this scan's measurements, unless it was given without a box."""

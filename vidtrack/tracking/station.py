@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isnan
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Mask
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, ScanError
+from vidtrack.estimate.bank import Estimator
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
+from vidtrack.tracking.blind import BlindZone
 from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracks import MERGED, TENTATIVE
@@ -22,8 +24,28 @@ from vidtrack.tracks import MERGED, TENTATIVE
 class Coverage(Protocol):
     """Where a station can detect a target."""
 
-    def share(self, xy: Floats, v: Floats) -> Floats:
-        """(T,) share of the detection probability at positions and velocities (T, d): from 0, nothing is seen, to 1."""
+    def share(self, xy: Floats) -> Floats:
+        """(T,) share of the detection probability at positions (T, d): from 0, nothing is seen, to 1."""
+
+
+class Sight(NamedTuple):
+    """What a station can see of the rows before they are updated.
+
+    covered  (T,) share of P_D by the coverage of their places
+    hidden   (T,) share of that which is lost, because the station does not detect them as they move
+    """
+
+    covered: Floats
+    hidden: Floats
+
+    @property
+    def share(self) -> Floats:
+        """(T,) share of P_D that is left."""
+        return self.covered * (1 - self.hidden)
+
+    def of(self, rows: Ints) -> Sight:
+        """The sight of these rows (K,), which may repeat."""
+        return Sight(self.covered[rows], self.hidden[rows])
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +83,7 @@ class Station:
                 one. 0: each scan counts
     lasting_m   m or px; the same for travel: of a tentative track, scans within this distance are together the evidence
                 of one, with `lasting_s` only. 0: its travel does not count
+    blind       what it does not detect inside; a miss then tells how a target may move. None: nothing
     """
 
     rates: Rates = field(default_factory=Rates)
@@ -68,6 +91,7 @@ class Station:
     visibility: Visibility | None = None
     lasting_s: float = 0.0
     lasting_m: float = 0.0
+    blind: BlindZone | None = None
 
     STATE = ("rates",)
 
@@ -78,12 +102,18 @@ class Station:
         if self.lasting_m > 0 and self.lasting_s == 0:
             raise ConfigError("lasting_m has no effect without lasting_s")
 
+    @property
+    def may_not_see(self) -> bool:
+        """Whether it may not see a target inside its coverage for long, so that misses say little."""
+        return self.visibility is not None or self.blind is not None
+
 
 class Stations:
     """The stations of a tracker by number, and when each made its last scan.
 
     last_s    (S,) s; NaN before the first
     estimate  whether the rates of any of them are estimated
+    unseeing  whether any of them may not see a target inside its coverage
     """
 
     STATE = ("last_s", "each")
@@ -92,6 +122,7 @@ class Stations:
         self.each = tuple(each)
         self.last_s = np.full(len(self.each), np.nan)
         self.estimate = any(station.rates.estimated for station in self.each)
+        self.unseeing = any(station.may_not_see for station in self.each)
 
     def __len__(self) -> int:
         return len(self.each)
@@ -116,14 +147,12 @@ class Stations:
             weight[new] = np.minimum(weight[new], speed * since / station.lasting_m)
         return np.asarray(np.clip(log_ratio, -BELIEF, BELIEF) * weight)
 
-    def share(self, scan: Scan, x: Floats, model: Motion) -> float | Floats:
-        """Share of its detection probability with which the scan's station covers states x (T, n) of a model: (T,), or
-        one for all.
-        """
-        coverage = self.each[scan.station].coverage
-        if coverage is None:
-            return 1.0
-        return coverage.share(x.take(model.position, axis=1), x.take(model.velocity, axis=1))
+    def sight(self, scan: Scan, bank: Estimator) -> Sight:
+        """What the scan's station can see of the predicted rows of a bank."""
+        station = self.each[scan.station]
+        xy = bank.x.take(bank.model.position, axis=1)
+        covered = np.ones(len(bank)) if station.coverage is None else station.coverage.share(xy)
+        return Sight(covered, np.zeros(len(bank)) if station.blind is None else station.blind.hidden(bank))
 
     def take(self, scan: Scan) -> float:
         """Seconds since the last scan of the same station; 0 for the first. Raises ScanError for an unknown station."""
@@ -134,9 +163,9 @@ class Stations:
         return 0.0 if isnan(before) else scan.t - before
 
     def expected(
-        self, scan: Scan, zhat: Floats, register: Register, share: float | Floats, since: float
+        self, scan: Scan, zhat: Floats, register: Register, sight: Sight, since: float
     ) -> tuple[float | Floats, float | Floats]:
-        """P_D of the rows of which the station covers a share, and its clutter density there.
+        """P_D of the rows of which the station has this sight, and its clutter density there.
 
         zhat (T, m) predicted measurements; since: seconds after the station's last scan
         """
@@ -148,19 +177,39 @@ class Stations:
             before = np.where(np.isnan(known), station.visibility.usual, known)
             register.visible[:, number] = station.visibility.predicted(before, since)
             detection = detection * register.visible[:, number]
-        return detection * share, clutter
+        return detection * sight.share, clutter
+
+    def miss(
+        self, scan: Scan, found: Association, sight: Sight, register: Register, bank: Estimator, since: float
+    ) -> None:
+        """Update the rows of a bank that the scan rather did not show by what that tells of them.
+
+        sight: of the successors of the predicted rows; since: seconds after the station's last scan
+        """
+        station = self.each[scan.station]
+        if station.blind is None:
+            return
+        visible = 1.0 if station.visibility is None else register.visible[:, scan.station]
+        detection = station.rates.detection(register.run) * sight.covered * visible
+        missed = np.where(found.shared < 0, found.decision.beta0, 0.0)
+        station.blind.update(bank, scan.t, missed, detection, sight.hidden, since)
 
     def record(
-        self, scan: Scan, register: Register, share: float | Floats, hit: Mask, sure: Mask, detection: Floats, dt: float
+        self, scan: Scan, register: Register, sight: Sight, hit: Mask, sure: Mask, detection: Floats, dt: float
     ) -> Mask:
-        """Note which rows (T,) the scan shows, of a covered share and an expected P_D; returns those looked at."""
+        """Note which rows (T,) of which the station has this sight the scan shows, of an expected P_D (T,).
+
+        Returns those that it looked at: it showed them, or was rather to see them than not. Whether a target is
+        visible or hidden counts for confirmed rows only.
+        """
         number = scan.station
-        looked = hit | (share >= 0.5)
-        register.record_hits(hit, sure, looked, number, scan.t, dt)
+        looked = hit | (sight.share >= 0.5)
         if self.each[number].visibility is not None:
-            known = register.visible[:, number]
+            known = register.visible[:, number].copy()
             missed = np.maximum(known - detection, 0.0) / np.maximum(1 - detection, 1e-9)
             register.visible[:, number] = np.where(hit, 1.0, np.where(looked, missed, known))
+            looked &= hit | (sight.share * known >= 0.5) | (register.status == TENTATIVE)
+        register.record_hits(hit, sure, looked, number, scan.t, dt)
         return looked
 
     def learn(self, found: Association, register: Register, alone: Mask, looked: Mask, dt: float) -> None:

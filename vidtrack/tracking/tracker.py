@@ -40,7 +40,7 @@ from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.rates import Rate, Rates
 from vidtrack.tracking.register import BELIEF, Register
 from vidtrack.tracking.snapshot import snapshot
-from vidtrack.tracking.station import Station, Stations
+from vidtrack.tracking.station import Sight, Station, Stations
 from vidtrack.tracks import CONFIRMED, TENTATIVE, Tracks
 
 
@@ -90,7 +90,7 @@ class Tracker:
     smooth     keep in the snapshot what a smoother needs
 
     Raises ConfigError for numbers out of range, an association rule that is not an instance, or one that does not go
-    with the sharing.
+    with the sharing, and for tracks that might never end.
     """
 
     STATE = ("t", "bank", "register", "timing", "sharing", "stations", "picture")
@@ -125,6 +125,8 @@ class Tracker:
         self.threshold = threshold
         space = self.picture.area if surveyed is None else surveyed
         self.stations = Stations(stations or [Station(Rates(detection_probability, clutter_density, space))])
+        if self.stations.unseeing and self.life.coast_s is None:
+            raise ConfigError("a station may not see a target, whose track would never end: give the life coast_s")
         self.explain = explain
         self.smooth = smooth
         self.bank = estimator(self.model)
@@ -142,9 +144,10 @@ class Tracker:
         events: list[Event] = []
         dt, since = self._predict(scan, events), self.stations.take(scan)
         view = self.picture.view(scan, self.register, self.bank)
-        problem = self._gate(scan, view, since)
+        sight = self.stations.sight(scan, self.bank)
+        problem = self._gate(scan, view, sight, since)
         found = self._associate(problem, view, dt, events)
-        outcome = self._update(found, scan, view, dt, since)
+        outcome = self._update(found, scan, view, sight.of(found.decision.parent), dt, since)
         kept = self._delete(found, scan.t, events)
         born = self._register(found, scan, view, dt, events)
         return self._tracks(scan.t, outcome.after(kept, born), events)
@@ -237,12 +240,11 @@ class Tracker:
             raise ScanError(f"{t:.6g} s is before the last scan at {self.t:.6g} s; sort the scans by time")
         return dt
 
-    def _gate(self, scan: Scan, view: View | None, since: float) -> Problem:
+    def _gate(self, scan: Scan, view: View | None, sight: Sight, since: float) -> Problem:
         """Which measurements each track may take, and how likely each is."""
         sensor = scan.sensor or POSITION
         zhat, cov = self.bank.predicted_measurement(sensor)
-        share = self.stations.share(scan, self.bank.x, self.model)
-        detection, clutter = self.stations.expected(scan, zhat, self.register, share, since)
+        detection, clutter = self.stations.expected(scan, zhat, self.register, sight, since)
         problem = Problem.gated(
             self.gate, zhat, cov, scan, detection * self.picture.in_view(self.bank.x, self.bank.P), clutter,
             run=self.register.run, label=self.register.label, angles=sensor.angles,
@@ -258,16 +260,19 @@ class Tracker:
         shared = self.sharing.unresolved(problem, shown, self.register, self.bank, dt)
         return self.timing.associate(problem, shared, view, self.register, events)
 
-    def _update(self, found: Association, scan: Scan, view: View | None, dt: float, since: float) -> Outcome:
+    def _update(
+        self, found: Association, scan: Scan, view: View | None, sight: Sight, dt: float, since: float
+    ) -> Outcome:
         """Update states, boxes and existence with the measurements that the tracks took.
 
+        sight      of the rows' successors
         dt, since  seconds since the last scan, and since the last one of the same station
         """
         register = self.register
         self.bank.update(found.decision, for_update(scan, since), scan.sensor or POSITION)
         hit, sure = found.taken >= 0, self.two_stage.surely(scan, found.taken)
-        share = self.stations.share(scan, self.bank.x, self.model)
-        looked = self.stations.record(scan, register, share, hit, sure, found.problem.detection, dt)
+        self.stations.miss(scan, found, sight, register, self.bank, since)
+        looked = self.stations.record(scan, register, sight, hit, sure, found.problem.detection, dt)
         if scan.label is not None:
             rows = hit.nonzero()[0]
             told = scan.label[found.taken[rows]]

@@ -31,8 +31,8 @@ class InPicture:
     ground: Ground
     size: tuple[int, int]
 
-    def share(self, xy: Floats, v: Floats) -> Floats:
-        """(T,) 1 at positions (T, 2) [m] in the picture, 0 at others; velocities v (T, 2) do not count."""
+    def share(self, xy: Floats) -> Floats:
+        """(T,) 1 at positions (T, 2) [m] in the picture, 0 at others."""
         with np.errstate(invalid="ignore", divide="ignore"):
             pixels = self.ground.pixels(xy)
             ahead = self.ground.depth(xy) * self._sign() > 0

@@ -1,4 +1,4 @@
-"""Where a radar detects targets: up to a range, in a sector, and if they are fast enough for its Doppler filter."""
+"""Where a radar detects targets: up to a range, in a sector, and which are too slow for its Doppler filter."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats
 from vidtrack.radar.coordinates import to_polar, wrap
-
-BLIND = 0.02
-"""Share of P_D that is left for a target too slow for Doppler, because its velocity is not known exactly."""
+from vidtrack.radar.sensors import RangeRate
+from vidtrack.tracking.blind import BlindZone
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,21 +20,23 @@ class Sector:
     farthest  m; largest range
     middle    rad; azimuth of the sector's middle
     width     rad; 2 pi: all round
-    slowest   m/s; below twice this range rate the detection probability falls, to BLIND of it
     """
 
     origin: tuple[float, float]
     farthest: float
     middle: float = 0.0
     width: float = 2 * np.pi
-    slowest: float = 0.0
 
-    def share(self, xy: Floats, v: Floats) -> Floats:
-        """(T,) share at positions and velocities (T, 2): 0 outside, 1 inside, less for slow ones."""
+    def share(self, xy: Floats) -> Floats:
+        """(T,) 1 at positions (T, 2) inside, 0 at others."""
         polar = to_polar(xy - self.origin)
         off = np.abs(wrap(polar[:, 1] - self.middle))
-        inside = (polar[:, 0] <= self.farthest) & (off <= self.width / 2)
-        if self.slowest == 0:
-            return inside.astype(float)
-        rate = np.abs(np.sum((xy - self.origin) * v, axis=1)) / np.maximum(polar[:, 0], 1.0)
-        return inside * np.clip(rate / self.slowest - 1, BLIND, 1.0)
+        return ((polar[:, 0] <= self.farthest) & (off <= self.width / 2)).astype(float)
+
+
+def too_slow(origin: tuple[float, float], slowest: float) -> BlindZone | None:
+    """The range rates that the Doppler filter of a radar at (x, y) [m] does not pass; None: it passes all.
+
+    slowest  m/s; range rate at which P_D is half; 0: all are detected
+    """
+    return BlindZone(RangeRate(origin), slowest / np.sqrt(2 * np.log(2))) if slowest > 0 else None

@@ -19,13 +19,14 @@ from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.feeds.plots import Code
 from vidtrack.radar.feeds.recording import is_feed, senders
 from vidtrack.radar.network.copies import Measured, copies
-from vidtrack.radar.network.coverage import Sector
+from vidtrack.radar.network.coverage import Sector, too_slow
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.reading import read_any
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
 from vidtrack.scan import Scan
+from vidtrack.tracking.blind import BlindZone
 from vidtrack.tracks import TENTATIVE, Tracks
 
 _log = logging.getLogger(__name__)
@@ -57,9 +58,12 @@ class Feed:
         """What the radar covers, by its table; without a range in it, up to its farthest plot."""
         radar = self.placed.radar
         farthest = float(self.plots.z[:, 0].max()) if radar.farthest_m is None else radar.farthest_m
-        return Sector(
-            self.placed.xyz[:2], farthest, self.placed.turned, np.radians(radar.sector_deg), radar.slowest_m_s
-        )
+        return Sector(self.placed.xyz[:2], farthest, self.placed.turned, np.radians(radar.sector_deg))
+
+    @property
+    def blind(self) -> BlindZone | None:
+        """The range rates at which the radar sees no target."""
+        return too_slow(self.placed.xyz[:2], self.placed.radar.slowest_m_s)
 
     @property
     def xy(self) -> Floats:
@@ -221,7 +225,7 @@ def _at_one_time(one: Feed, other: Feed) -> bool:
 
 def _at_one_place(one: Feed, other: Feed) -> bool:
     """Whether one of two radars has plots in the other's coverage, or as near its plots as a track coasts."""
-    if any((b.coverage.share(a.xy, np.zeros_like(a.xy)) > 0).any() for a, b in ((one, other), (other, one))):
+    if any((b.coverage.share(a.xy) > 0).any() for a, b in ((one, other), (other, one))):
         return True
     farthest_m = max(feed.settings.max_speed * feed.coast_s for feed in (one, other))
     apart_m, _ = cKDTree(one.xy).query(other.xy, distance_upper_bound=farthest_m)
