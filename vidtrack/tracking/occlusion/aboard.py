@@ -16,11 +16,12 @@ LARGER = 2.0
 
 @kernel
 def go_along(
-    box: Floats, name: Ints, born_s: Floats, host: Ints, seat: Floats, t: float, least_s: float, share: float
-) -> Mask:
-    """(T,) tracks that go along with a larger vehicle, for at least least_s [s] and this share of their lives.
+    box: Floats, name: Ints, confirmed: Mask, seen: Mask, born_s: Floats, host: Ints, seat: Floats, t: float,
+    least_s: float, share: float,
+) -> Mask:  # fmt: skip
+    """(T,) confirmed tracks that go along with a larger one that is seen, for at least least_s [s] and this share of their lives.
 
-    box   (T, 4) in the picture at time t [s], of tracks with a name (T,), born at born_s (T,) [s]
+    box   (T, 4) in the picture at time t [s], of tracks with a name (T,), `confirmed` (T,), `seen` in this scan (T,), born at born_s (T,) [s]
     host  (T,) name of the vehicle whose box holds FRAGMENT of the track's; -1: none. Changed in place
     seat  (T, 5) since when [s] the track has not moved by REST of its size in that box; where in the box its middle
           was then, as shares of the sides; where in the picture the middle of the box was. Changed in place
@@ -50,7 +51,7 @@ def go_along(
             continue
         sat = t - seat[i, 0]
         far = np.sqrt(driven) > REST * max(box[i, 2], box[i, 3])
-        along[i] = far and sat > least_s and sat > share * (t - born_s[i])
+        along[i] = confirmed[i] and seen[k] and far and sat > least_s and sat > share * (t - born_s[i])
     return along
 
 

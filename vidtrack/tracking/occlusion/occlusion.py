@@ -151,9 +151,9 @@ class Occlusion:
         Merged ones that were hardly ever seen alone and do not split off, and those that go along with a larger one.
         """
         along = go_along(
-            around(bank.x, register.box), register.id, register.born_s, register.host, register.seat,
-            t, self.along_s, self.along_share,
-        ) & (register.status != TENTATIVE)  # fmt: skip
+            around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
+            register.born_s, register.host, register.seat, t, self.along_s, self.along_share,
+        )  # fmt: skip
         strange = (register.merged >= 0) & (register.alone_s < self.known_s)
         if not np.count_nonzero(strange):
             return along
