@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
+from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import overlapping
+from vidtrack.tracking.occlusion.aboard import go_along
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.picture.border import Border
@@ -230,3 +232,81 @@ def test_a_piece_that_was_hardly_ever_alone_is_no_vehicle_of_its_own(seed):
 def test_who_was_alone_for_long_stays_a_vehicle_in_the_group(seed):
     seen = play(default_tracker(), in_two_pieces(1.0), 3.5, jitter=0.3, seed=seed)
     assert len(seen[-1]) == len(confirmed_ids(seen)) == 2
+
+
+def passing(t):
+    """A lorry, and in front of it in the picture a car that passes it."""
+    x = 20 + SPEED * t
+    return [centred(x, 120, 60, 40), centred(x - 15 + 0.5 * SPEED * t, 130, 16, 12)]
+
+
+def queue(t):
+    """A lorry and a motorcycle before it, which stand after 1 s."""
+    x = 20 + SPEED * min(t, 1.0)
+    return [centred(x, 120, 60, 40), centred(x + 22, 132, 10, 14)]
+
+
+def go(boxes, seconds, names=(7, 8), seen=True, fps=25.0):
+    """Time [s] from which on each track goes along with a larger one, NaN: never; boxes(t) are of a row each."""
+    count = len(names)
+    host, seat, since = np.full(count, -1), np.full((count, 5), np.nan), np.full(count, np.nan)
+    every = np.ones(count, bool)
+    for t in np.arange(round(seconds * fps)) / fps:
+        box = np.array(boxes(t), float)
+        along = go_along(box, np.array(names), every, every & seen, np.zeros(count), host, seat, t, 0.6, 0.3)
+        since[along & np.isnan(since)] = t
+    return since
+
+
+def test_a_track_that_keeps_its_place_in_a_larger_one_which_drives_goes_along_with_it():
+    lorry, cab = go(lambda t: [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)], 2.0)
+    assert np.isnan(lorry)
+    assert 0.6 < cab < 0.7
+
+
+def test_a_track_also_goes_along_with_one_that_comes_nearer_and_grows():
+    def boxes(t):
+        grown = 1 + 0.4 * t
+        return [centred(50 * t, 20 * t, 60 * grown, 40 * grown), centred(50 * t + 20 * grown, 20 * t, 15, 12)]
+
+    assert 0.6 < go(boxes, 2.0)[1] < 0.7
+
+
+@pytest.mark.parametrize(
+    "boxes",
+    [
+        pytest.param(passing, id="passes"),
+        pytest.param(lambda t: queue(1.0), id="stands in a queue"),
+        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(50 * t, 0, 40, 40)], id="is nearly as large"),
+        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(34 + 50 * t, 0, 16, 20)], id="is outside by half"),
+    ],
+)
+def test_who_passes_stands_or_is_no_smaller_goes_by_itself(boxes):
+    assert np.isnan(go(boxes, 3.0)).all()
+
+
+def test_a_larger_one_that_is_not_seen_carries_nobody():
+    assert np.isnan(go(lambda t: [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)], 2.0, seen=False)).all()
+
+
+@pytest.mark.parametrize("alone_s", [0.5, 3.0])
+def test_who_drove_alone_for_most_of_its_life_is_no_part(alone_s):
+    def boxes(t):
+        return [centred(50 * t, 0 if t >= alone_s else 200, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
+
+    assert np.isnan(go(boxes, alone_s + 1.2)[1]) == (alone_s == 3.0)
+
+
+@pytest.mark.parametrize("parts", [True, False])
+def test_a_cab_that_was_tracked_first_ends_when_its_lorry_is_a_track(parts):
+    tracker = default_tracker(parts=parts)
+    snapshots = []
+    for t in np.arange(60) / 25:
+        x = 20 + SPEED * t
+        boxes = np.array([centred(x + 20, 124, 14, 20), centred(x, 120, 60, 40)][: 2 if t >= 0.5 else 1])
+        middle = np.column_stack([-boxes[:, 2:] / 2, boxes[:, 2:]])
+        R = np.broadcast_to(np.eye(2), (len(boxes), 2, 2))
+        snapshots.append(tracker.step(Scan(t, boxes[:, :2] + boxes[:, 2:] / 2, R, box=middle)))
+    assert len(snapshots[-1]) == (1 if parts else 2)
+    gone = [(e.track_id, e.reason) for tracks in snapshots for e in tracks.events if e.kind == "delete"]
+    assert gone == ([(1, "part of the vehicle that it never left")] if parts else [])

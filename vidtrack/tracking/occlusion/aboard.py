@@ -1,4 +1,4 @@
-"""Tracks that are parts of a larger vehicle, because they stand still in its box while it drives."""
+"""Tracks that are parts of a larger vehicle, because they keep their place in its box while it drives."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ def go_along(
     box: Floats, name: Ints, confirmed: Mask, seen: Mask, born_s: Floats, host: Ints, seat: Floats, t: float,
     least_s: float, share: float,
 ) -> Mask:  # fmt: skip
-    """(T,) confirmed tracks that go along with a larger one that is seen, for at least least_s [s] and this share of their lives.
+    """(T,) confirmed tracks that go along with a larger one, for least_s [s] and this share of their lives or longer.
 
-    box   (T, 4) in the picture at time t [s], of tracks with a name (T,), `confirmed` (T,), `seen` in this scan (T,), born at born_s (T,) [s]
-    host  (T,) name of the vehicle whose box holds FRAGMENT of the track's; -1: none. Changed in place
+    box   (T, 4) in the picture at time t [s], of tracks with a name (T,)
+    confirmed, seen, born_s   (T,) whether each is confirmed, whether the scan shows it, when it began [s]
+    host  (T,) name of the larger track whose box holds FRAGMENT of each; -1: none. Changed in place
     seat  (T, 5) since when [s] the track has not moved by REST of its size in that box; where in the box its middle
           was then, as shares of the sides; where in the picture the middle of the box was. Changed in place
 
-    A track goes along only where the vehicle has driven by REST of the track's size meanwhile: those who stand in a
-    queue do not.
+    Nobody goes along unless the host is seen, and has driven by REST of the track's size: those who stand in a queue
+    keep their places, too.
     """
     along = np.zeros(len(box), np.bool_)
     for i in range(len(box)):
@@ -37,17 +38,13 @@ def go_along(
             continue
         moved = driven = 0.0
         for axis in range(2):
-            side, larger = box[i, 2 + axis], box[k, 2 + axis]
-            middle = box[k, axis] + larger / 2
-            place = (box[i, axis] + side / 2 - middle) / larger
-            moved = max(moved, abs(place - seat[i, 1 + axis]) * larger / side)
+            middle, place = _seat(box, i, k, axis)
+            moved = max(moved, abs(place - seat[i, 1 + axis]) * box[k, 2 + axis] / box[i, 2 + axis])
             driven += (middle - seat[i, 3 + axis]) ** 2
         if host[i] != name[k] or not moved <= REST:
             host[i], seat[i, 0] = name[k], t
             for axis in range(2):
-                middle = box[k, axis] + box[k, 2 + axis] / 2
-                seat[i, 1 + axis] = (box[i, axis] + box[i, 2 + axis] / 2 - middle) / box[k, 2 + axis]
-                seat[i, 3 + axis] = middle
+                seat[i, 3 + axis], seat[i, 1 + axis] = _seat(box, i, k, axis)
             continue
         sat = t - seat[i, 0]
         far = np.sqrt(driven) > REST * max(box[i, 2], box[i, 3])
@@ -67,3 +64,10 @@ def _host(box: Floats, i: int) -> int:
         if inside > most:
             best, most = k, inside
     return best
+
+
+@inlined
+def _seat(box: Floats, i: int, k: int, axis: int) -> tuple[float, float]:
+    """Along an axis: the middle of box k, and how far from it that of box i is, as a share of k's side."""
+    middle = box[k, axis] + box[k, 2 + axis] / 2
+    return middle, (box[i, axis] + box[i, 2 + axis] / 2 - middle) / box[k, 2 + axis]

@@ -53,7 +53,8 @@ class Occlusion:
            is not the vehicle alone or not all of it
     known_s, part_s   a track seen alone for less than known_s that stays merged for part_s was never a vehicle
            but a part of one
-    along_s, along_share   so is a track that goes along with a larger one for along_s and this share of its life
+    carries   whether a track that goes along with a larger one is a part of it
+    along_s, along_share   s, and share of its life, for which it does so
     overlap least intersection over union of a track with a blob that it continues on, whatever its shape
 
     Raises ConfigError for a cover out of range.
@@ -65,6 +66,7 @@ class Occlusion:
     growth: float = 2.5
     known_s: float = 0.4
     part_s: float = 1.0
+    carries: bool = True
     along_s: float = 0.6
     along_share: float = 0.3
     overlap: float = 0.3
@@ -150,17 +152,24 @@ class Occlusion:
 
         Merged ones that were hardly ever seen alone and do not split off, and those that go along with a larger one.
         """
-        along = go_along(
-            around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
-            register.born_s, register.host, register.seat, t, self.along_s, self.along_share,
-        )  # fmt: skip
+        return self._never_alone(register, t) | self._go_along(register, bank, t)
+
+    def _never_alone(self, register: Register, t: float) -> Mask:
         strange = (register.merged >= 0) & (register.alone_s < self.known_s)
         if not np.count_nonzero(strange):
-            return along
+            return strange
         for number in np.unique(register.merged[strange]):
             together = np.flatnonzero(register.merged == number)
             strange[together[register.alone_s[together].argmax()]] = False
-        return along | strange & (t - register.merged_since_s > self.part_s)
+        return strange & (t - register.merged_since_s > self.part_s)
+
+    def _go_along(self, register: Register, bank: Estimator, t: float) -> Mask:
+        if not self.carries or len(register) < 2:
+            return np.zeros(len(register), bool)
+        return go_along(
+            around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
+            register.born_s, register.host, register.seat, t, self.along_s, self.along_share,
+        )  # fmt: skip
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """Merged tracks keep their common number and its start for as long as any of them stay together."""
