@@ -75,7 +75,7 @@ def build_blob_tracker(
 
 
 def _occlusion(settings: TrackerSettings) -> Occlusion:
-    return Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap, carries=settings.parts)
+    return Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap, along=settings.parts)
 
 
 def build_box_tracker(

@@ -234,34 +234,33 @@ def test_who_was_alone_for_long_stays_a_vehicle_in_the_group(seed):
     assert len(seen[-1]) == len(confirmed_ids(seen)) == 2
 
 
-def passing(t):
-    """A lorry, and in front of it in the picture a car that passes it."""
-    x = 20 + SPEED * t
-    return [centred(x, 120, 60, 40), centred(x - 15 + 0.5 * SPEED * t, 130, 16, 12)]
+def passing(faster):
+    """A lorry, and in front of it in the picture a car that passes it, by so many px/s."""
+    return lambda t: [centred(SPEED * t, 120, 60, 40), centred(SPEED * t - 15 + faster * t, 130, 16, 12)]
 
 
 def queue(t):
-    """A lorry and a motorcycle before it, which stand after 1 s."""
-    x = 20 + SPEED * min(t, 1.0)
-    return [centred(x, 120, 60, 40), centred(x + 22, 132, 10, 14)]
+    """A lorry that came to a motorcycle at 1 s, stands behind it for 4 s, and follows it, which starts faster."""
+    x = SPEED * (min(t, 1.0) + max(t - 5.0, 0.0))
+    bike = SPEED + 25 + 1.6 * SPEED * max(t - 5.0, 0.0)
+    return [centred(x, 120, 60, 40), centred(bike, 132, 10, 14)]
 
 
-def go(boxes, seconds, names=(7, 8), seen=True, fps=25.0):
-    """Time [s] from which on each track goes along with a larger one, NaN: never; boxes(t) are of a row each."""
-    count = len(names)
-    host, seat, since = np.full(count, -1), np.full((count, 5), np.nan), np.full(count, np.nan)
-    every = np.ones(count, bool)
+def go(boxes, seconds, confirmed=(True, True), seen=(True, True), fps=25.0):
+    """Time [s] from which on each of two tracks goes along with the other, NaN: never; boxes(t) are of a row each."""
+    host, seat, since = np.full(2, -1), np.full((2, 5), np.nan), np.full(2, np.nan)
+    confirmed, seen = np.array(confirmed), np.array(seen)
     for t in np.arange(round(seconds * fps)) / fps:
         box = np.array(boxes(t), float)
-        along = go_along(box, np.array(names), every, every & seen, np.zeros(count), host, seat, t, 0.6, 0.3)
+        along = go_along(box, np.array([7, 8]), confirmed, seen, np.zeros(2), host, seat, t, 0.6, 0.3)
         since[along & np.isnan(since)] = t
     return since
 
 
 def test_a_track_that_keeps_its_place_in_a_larger_one_which_drives_goes_along_with_it():
-    lorry, cab = go(lambda t: [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)], 2.0)
+    lorry, part = go(cab, 2.0)
     assert np.isnan(lorry)
-    assert 0.6 < cab < 0.7
+    assert 0.6 < part < 0.7
 
 
 def test_a_track_also_goes_along_with_one_that_comes_nearer_and_grows():
@@ -275,18 +274,35 @@ def test_a_track_also_goes_along_with_one_that_comes_nearer_and_grows():
 @pytest.mark.parametrize(
     "boxes",
     [
-        pytest.param(passing, id="passes"),
-        pytest.param(lambda t: queue(1.0), id="stands in a queue"),
-        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(50 * t, 0, 40, 40)], id="is nearly as large"),
+        pytest.param(passing(30), id="passes"),
+        pytest.param(passing(-16), id="is passed"),
+        pytest.param(queue, id="stands in a queue and starts"),
+        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(50 * t, 0, 24, 32)], id="is a third as large"),
+        pytest.param(lambda t: [centred(12 * t, 0, 60, 40), centred(10 + 12 * t, 0, 16, 20)], id="hardly drives"),
         pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(34 + 50 * t, 0, 16, 20)], id="is outside by half"),
     ],
 )
 def test_who_passes_stands_or_is_no_smaller_goes_by_itself(boxes):
-    assert np.isnan(go(boxes, 3.0)).all()
+    assert np.isnan(go(boxes, 7.0)).all()
 
 
-def test_a_larger_one_that_is_not_seen_carries_nobody():
-    assert np.isnan(go(lambda t: [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)], 2.0, seen=False)).all()
+def cab(t):
+    """A lorry and its cab."""
+    return [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
+
+
+def test_only_the_larger_one_need_be_seen_and_only_the_part_confirmed():
+    assert np.isnan(go(cab, 2.0, seen=(False, True))[1])
+    assert np.isnan(go(cab, 2.0, confirmed=(True, False))[1])
+    assert 0.6 < go(cab, 2.0, seen=(True, False), confirmed=(False, True))[1] < 0.7
+
+
+def test_who_was_outside_meanwhile_begins_anew():
+    def boxes(t):
+        lorry, part = cab(t)
+        return [lorry, part if not 0.4 < t < 0.5 else centred(50 * t, 90, 16, 20)]
+
+    assert 1.1 < go(boxes, 2.0)[1] < 1.2
 
 
 @pytest.mark.parametrize("alone_s", [0.5, 3.0])

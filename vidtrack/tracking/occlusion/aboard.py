@@ -6,12 +6,9 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import inlined, kernel
-from vidtrack.tracking.births import FRAGMENT
+from vidtrack.tracking.births import FRAGMENT, SMALL
 from vidtrack.tracking.boxes import common
 from vidtrack.tracking.register import REST
-
-LARGER = 2.0
-"""A vehicle that another track is aboard is at least so many times as large."""
 
 
 @kernel
@@ -23,12 +20,12 @@ def go_along(
 
     box   (T, 4) in the picture at time t [s], of tracks with a name (T,)
     confirmed, seen, born_s   (T,) whether each is confirmed, whether the scan shows it, when it began [s]
-    host  (T,) name of the larger track whose box holds FRAGMENT of each; -1: none. Changed in place
+    host  (T,) name of the track whose box holds FRAGMENT of each, which is SMALL beside it; -1: none. Changed in place
     seat  (T, 5) since when [s] the track has not moved by REST of its size in that box; where in the box its middle
           was then, as shares of the sides; where in the picture the middle of the box was. Changed in place
 
-    Nobody goes along unless the host is seen, and has driven by REST of the track's size: those who stand in a queue
-    keep their places, too.
+    Those who stand in a queue keep their places, too: as long as the host has not driven by REST of the track's size
+    within least_s, the time begins anew.
     """
     along = np.zeros(len(box), np.bool_)
     for i in range(len(box)):
@@ -41,24 +38,24 @@ def go_along(
             middle, place = _seat(box, i, k, axis)
             moved = max(moved, abs(place - seat[i, 1 + axis]) * box[k, 2 + axis] / box[i, 2 + axis])
             driven += (middle - seat[i, 3 + axis]) ** 2
-        if host[i] != name[k] or not moved <= REST:
+        sat = t - seat[i, 0]
+        stood = np.sqrt(driven) <= REST * max(box[i, 2], box[i, 3])
+        if host[i] != name[k] or not moved <= REST or (stood and sat > least_s):
             host[i], seat[i, 0] = name[k], t
             for axis in range(2):
                 seat[i, 3 + axis], seat[i, 1 + axis] = _seat(box, i, k, axis)
             continue
-        sat = t - seat[i, 0]
-        far = np.sqrt(driven) > REST * max(box[i, 2], box[i, 3])
-        along[i] = confirmed[i] and seen[k] and far and sat > least_s and sat > share * (t - born_s[i])
+        along[i] = confirmed[i] and seen[k] and not stood and sat > least_s and sat > share * (t - born_s[i])
     return along
 
 
 @inlined
 def _host(box: Floats, i: int) -> int:
-    """The box that holds the most of box i, of those that are LARGER; -1: none holds FRAGMENT of it."""
+    """The box that holds the most of box i, of those beside which it is SMALL; -1: none holds FRAGMENT of it."""
     area = box[i, 2] * box[i, 3]
     best, most = -1, FRAGMENT * area
     for k in range(len(box)):
-        if box[k, 2] * box[k, 3] < LARGER * area:
+        if not area < SMALL * box[k, 2] * box[k, 3]:
             continue
         inside = common(box[i], box[k])
         if inside > most:

@@ -53,8 +53,8 @@ class Occlusion:
            is not the vehicle alone or not all of it
     known_s, part_s   a track seen alone for less than known_s that stays merged for part_s was never a vehicle
            but a part of one
-    carries   whether a track that goes along with a larger one is a part of it
-    along_s, along_share   s, and share of its life, for which it does so
+    along     whether a track that goes along with a larger one is a part of it, if it does so for along_s and for
+           along_share of its life
     overlap least intersection over union of a track with a blob that it continues on, whatever its shape
 
     Raises ConfigError for a cover out of range.
@@ -66,7 +66,7 @@ class Occlusion:
     growth: float = 2.5
     known_s: float = 0.4
     part_s: float = 1.0
-    carries: bool = True
+    along: bool = True
     along_s: float = 0.6
     along_share: float = 0.3
     overlap: float = 0.3
@@ -164,7 +164,7 @@ class Occlusion:
         return strange & (t - register.merged_since_s > self.part_s)
 
     def _go_along(self, register: Register, bank: Estimator, t: float) -> Mask:
-        if not self.carries or len(register) < 2:
+        if not self.along or len(register) < 2:
             return np.zeros(len(register), bool)
         return go_along(
             around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
