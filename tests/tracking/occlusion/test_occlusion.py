@@ -252,7 +252,7 @@ def go(boxes, seconds, confirmed=(True, True), seen=(True, True), fps=25.0):
     confirmed, seen = np.array(confirmed), np.array(seen)
     for t in np.arange(round(seconds * fps)) / fps:
         box = np.array(boxes(t), float)
-        along = go_along(box, np.array([7, 8]), confirmed, seen, np.zeros(2), host, seat, t, 0.6, 0.3)
+        along = go_along(box, np.array([7, 8]), confirmed, seen, np.zeros(2), host, seat, t, 0.6, 0.5)
         since[along & np.isnan(since)] = t
     return since
 
@@ -277,7 +277,7 @@ def test_a_track_also_goes_along_with_one_that_comes_nearer_and_grows():
         pytest.param(passing(30), id="passes"),
         pytest.param(passing(-16), id="is passed"),
         pytest.param(queue, id="stands in a queue and starts"),
-        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(50 * t, 0, 24, 32)], id="is a third as large"),
+        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(50 * t, 0, 32, 40)], id="is half as large"),
         pytest.param(lambda t: [centred(12 * t, 0, 60, 40), centred(10 + 12 * t, 0, 16, 20)], id="hardly drives"),
         pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(34 + 50 * t, 0, 16, 20)], id="is outside by half"),
     ],
@@ -305,12 +305,12 @@ def test_who_was_outside_meanwhile_begins_anew():
     assert 1.1 < go(boxes, 2.0)[1] < 1.2
 
 
-@pytest.mark.parametrize("alone_s", [0.5, 3.0])
+@pytest.mark.parametrize("alone_s", [0.5, 1.5])
 def test_who_drove_alone_for_most_of_its_life_is_no_part(alone_s):
     def boxes(t):
         return [centred(50 * t, 0 if t >= alone_s else 200, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
 
-    assert np.isnan(go(boxes, alone_s + 1.2)[1]) == (alone_s == 3.0)
+    assert np.isnan(go(boxes, alone_s + 1.2)[1]) == (alone_s == 1.5)
 
 
 @pytest.mark.parametrize("parts", [True, False])

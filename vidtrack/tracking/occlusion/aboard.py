@@ -6,9 +6,12 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import inlined, kernel
-from vidtrack.tracking.births import FRAGMENT, SMALL
+from vidtrack.tracking.births import FRAGMENT
 from vidtrack.tracking.boxes import common
 from vidtrack.tracking.register import REST
+
+LARGER = 2.0
+"""A track that another one is a part of is at least so many times as large."""
 
 
 @kernel
@@ -20,7 +23,7 @@ def go_along(
 
     box   (T, 4) in the picture at time t [s], of tracks with a name (T,)
     confirmed, seen, born_s   (T,) whether each is confirmed, whether the scan shows it, when it began [s]
-    host  (T,) name of the track whose box holds FRAGMENT of each, which is SMALL beside it; -1: none. Changed in place
+    host  (T,) name of the track whose box holds FRAGMENT of each, which is LARGER; -1: none. Changed in place
     seat  (T, 5) since when [s] the track has not moved by REST of its size in that box; where in the box its middle
           was then, as shares of the sides; where in the picture the middle of the box was. Changed in place
 
@@ -51,11 +54,11 @@ def go_along(
 
 @inlined
 def _host(box: Floats, i: int) -> int:
-    """The box that holds the most of box i, of those beside which it is SMALL; -1: none holds FRAGMENT of it."""
+    """The box that holds the most of box i, of those that are LARGER; -1: none holds FRAGMENT of it."""
     area = box[i, 2] * box[i, 3]
     best, most = -1, FRAGMENT * area
     for k in range(len(box)):
-        if not area < SMALL * box[k, 2] * box[k, 3]:
+        if not box[k, 2] * box[k, 3] >= LARGER * area:
             continue
         inside = common(box[i], box[k])
         if inside > most:

@@ -68,7 +68,7 @@ class Occlusion:
     part_s: float = 1.0
     along: bool = True
     along_s: float = 0.6
-    along_share: float = 0.3
+    along_share: float = 0.5
     overlap: float = 0.3
     _made: int = field(default=0, init=False)
 
