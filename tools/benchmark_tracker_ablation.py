@@ -35,6 +35,7 @@ WITHOUT: dict[str, tuple[str, ...]] = {
     "hidden no longer than coasting": ("tracker.hidden_s=0.6",),
     "looks do not count": ("tracker.look=false",),
     "tracks are not relieved at the border": ("tracker.relieve=false",),
+    "parts of vehicles stay tracks": ("tracker.parts=false",),
     "boxes not smoothed": ("tracker.box_s=0.001",),
     "pieces not linked by weak foreground": ("detector.disturbance.weak=1",),
     "what is dark amid a vehicle is vehicle": ("detector.disturbance.amid=true",),

@@ -27,7 +27,7 @@ _OWN = {
 _OF_PICTURES = (
     *("tracker.box_s", "tracker.confirm_s", "tracker.confirm_travel", "tracker.detection_probability"),
     *("tracker.idle_s", "tracker.idle_travel", "tracker.restless", "tracker.look", "tracker.relieve"),
-    *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s"),
+    *("tracker.blob_overlap", "tracker.merged_blobs", "tracker.group_cover", "tracker.hidden_s", "tracker.parts"),
     *("source.scale", "source.mask", "source.decoder", "output.video_crf", "output.jpeg_quality"),
 )
 _UNREAD = {
@@ -94,6 +94,7 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "tracker.missed_track": ("tracker.life", ("llr",)),
     "tracker.blob_overlap": ("tracker.merged_blobs", (True,)),
     "tracker.group_cover": ("tracker.merged_blobs", (True,)),
+    "tracker.parts": ("tracker.merged_blobs", (True,)),
     "tracker.hidden_s": ("tracker.merged_blobs", (True,)),
     "detections.confirm_hits": ("tracker.life", ("m-of-n",)),
     "detections.confirm_window": ("tracker.life", ("m-of-n",)),

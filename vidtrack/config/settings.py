@@ -116,6 +116,8 @@ class TrackerSettings(Group):
     """vehicles that share one blob stay separate tracks"""
     group_cover: float = Field(0.5, gt=0, le=1)
     """share of a vehicle's predicted box that a shared blob must cover"""
+    parts: bool = True
+    """a track that keeps its place in the box of a larger one, which drives, ends: it is a part of that vehicle"""
     box_s: float = Field(0.3, gt=0)
     """s; time constant with which a track's box follows the blobs' boxes"""
     look: bool = True

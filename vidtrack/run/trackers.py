@@ -66,12 +66,16 @@ def build_blob_tracker(
             box_s=settings.box_s,
             relieve=settings.relieve,
         ),
-        sharing=Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap) if merging else Exclusive(),
+        sharing=_occlusion(settings) if merging else Exclusive(),
         detection_probability=settings.detection_probability,
         clutter_density=settings.clutter_density,
         explain=explain,
         smooth=smooth,
     )
+
+
+def _occlusion(settings: TrackerSettings) -> Occlusion:
+    return Occlusion(cover=settings.group_cover, overlap=settings.blob_overlap, along=settings.parts)
 
 
 def build_box_tracker(

@@ -32,13 +32,15 @@ class Register:
     travelled (farthest it ever was from its start), rest (T, d) and rest_s (where and when it last moved on by REST of
     its size), missed (T, S) scans of each station without it since it was last seen, visible (T, S) probability that
     each station could see it, NaN while nothing is known, look (T, 3) mean luminance and chroma, NaN unknown, shown (T,
-    4, 2) where the inner edge of each was inside the sides of the picture that cut it, at most and at least since.
+    4, 2) where the inner edge of each was inside the sides of the picture that cut it, at most and at least since, host
+    (the larger track whose box it is in, -1 none) and seat (T, 5) (see `occlusion.aboard`).
     Where a smoother needs them also prior_x, prior_P and gain (see Tracks), made anew in every scan.
     """
 
     STATE = ("next_id", "id", "status", "born_s", "updated_s", "history", "start", "box", "merged", "merged_since_s",
              "exchange", "score", "best", "run", "label", "alone_s", "outside", "entered", "inward", "beside",
-             "towed", "travelled", "rest", "rest_s", "missed", "visible", "look", "shown")  # fmt: skip
+             "towed", "travelled", "rest", "rest_s", "missed", "visible", "look", "shown",
+             "host", "seat")  # fmt: skip
 
     ADDED: ClassVar = {
         name: lambda register: np.zeros(len(register), bool) for name in ("outside", "entered", "beside")
@@ -47,6 +49,8 @@ class Register:
         "towed": lambda register: register.start.copy(),
         "look": lambda register: np.full((len(register), 3), np.nan),
         "shown": lambda register: np.full((len(register), 4, 2), np.nan),
+        "host": lambda register: np.full(len(register), -1),
+        "seat": lambda register: np.full((len(register), 5), np.nan),
     }
 
     LINKS = ("prior_x", "prior_P", "gain")
@@ -81,6 +85,8 @@ class Register:
         self.visible = np.empty((0, stations))
         self.look = np.empty((0, 3))
         self.shown = np.empty((0, 4, 2))
+        self.host = np.empty(0, np.int64)
+        self.seat = np.empty((0, 5))
         self.link(np.empty((0, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)), np.empty((0, 2 * dim, 2 * dim)))
         self._columns = self.STATE[1:] + (self.LINKS if smooth else ())
 
@@ -193,6 +199,7 @@ class Register:
             "rest": position,
             "rest_s": t,
             "missed": 0,
+            "host": -1,
         }
         first = len(self)
         for name in self._columns:

@@ -318,7 +318,7 @@ class Tracker:
         register.move(xy, t)
         register.come_in(xy, self.picture.sides(around(self.bank.x, register.box)))
         idle = self.life.idle(register, t)
-        parts = self.sharing.parts(register, t)
+        parts = self.sharing.parts(register, self.bank, t)
         going = hopeless | left | relieved | parts | idle
         shared = found.shared
         if np.count_nonzero(going):

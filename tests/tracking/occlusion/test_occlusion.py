@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
+from vidtrack.scan import Scan
 from vidtrack.tracking.boxes import overlapping
+from vidtrack.tracking.occlusion.aboard import go_along
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.occlusion import Occlusion
 from vidtrack.tracking.picture.border import Border
@@ -230,3 +232,97 @@ def test_a_piece_that_was_hardly_ever_alone_is_no_vehicle_of_its_own(seed):
 def test_who_was_alone_for_long_stays_a_vehicle_in_the_group(seed):
     seen = play(default_tracker(), in_two_pieces(1.0), 3.5, jitter=0.3, seed=seed)
     assert len(seen[-1]) == len(confirmed_ids(seen)) == 2
+
+
+def passing(faster):
+    """A lorry, and in front of it in the picture a car that passes it, by so many px/s."""
+    return lambda t: [centred(SPEED * t, 120, 60, 40), centred(SPEED * t - 15 + faster * t, 130, 16, 12)]
+
+
+def queue(t):
+    """A lorry that came to a motorcycle at 1 s, stands behind it for 4 s, and follows it, which starts faster."""
+    x = SPEED * (min(t, 1.0) + max(t - 5.0, 0.0))
+    bike = SPEED + 25 + 1.6 * SPEED * max(t - 5.0, 0.0)
+    return [centred(x, 120, 60, 40), centred(bike, 132, 10, 14)]
+
+
+def go(boxes, seconds, confirmed=(True, True), seen=(True, True), fps=25.0):
+    """Time [s] from which on each of two tracks goes along with the other, NaN: never; boxes(t) are of a row each."""
+    host, seat, since = np.full(2, -1), np.full((2, 5), np.nan), np.full(2, np.nan)
+    confirmed, seen = np.array(confirmed), np.array(seen)
+    for t in np.arange(round(seconds * fps)) / fps:
+        box = np.array(boxes(t), float)
+        along = go_along(box, np.array([7, 8]), confirmed, seen, np.zeros(2), host, seat, t, 0.6, 0.5)
+        since[along & np.isnan(since)] = t
+    return since
+
+
+def test_a_track_that_keeps_its_place_in_a_larger_one_which_drives_goes_along_with_it():
+    lorry, part = go(cab, 2.0)
+    assert np.isnan(lorry)
+    assert 0.6 < part < 0.7
+
+
+def test_a_track_also_goes_along_with_one_that_comes_nearer_and_grows():
+    def boxes(t):
+        grown = 1 + 0.4 * t
+        return [centred(50 * t, 20 * t, 60 * grown, 40 * grown), centred(50 * t + 20 * grown, 20 * t, 15, 12)]
+
+    assert 0.6 < go(boxes, 2.0)[1] < 0.7
+
+
+@pytest.mark.parametrize(
+    "boxes",
+    [
+        pytest.param(passing(30), id="passes"),
+        pytest.param(passing(-16), id="is passed"),
+        pytest.param(queue, id="stands in a queue and starts"),
+        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(50 * t, 0, 32, 40)], id="is half as large"),
+        pytest.param(lambda t: [centred(12 * t, 0, 60, 40), centred(10 + 12 * t, 0, 16, 20)], id="hardly drives"),
+        pytest.param(lambda t: [centred(50 * t, 0, 60, 40), centred(34 + 50 * t, 0, 16, 20)], id="is outside by half"),
+    ],
+)
+def test_who_passes_stands_or_is_no_smaller_goes_by_itself(boxes):
+    assert np.isnan(go(boxes, 7.0)).all()
+
+
+def cab(t):
+    """A lorry and its cab."""
+    return [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
+
+
+def test_only_the_larger_one_need_be_seen_and_only_the_part_confirmed():
+    assert np.isnan(go(cab, 2.0, seen=(False, True))[1])
+    assert np.isnan(go(cab, 2.0, confirmed=(True, False))[1])
+    assert 0.6 < go(cab, 2.0, seen=(True, False), confirmed=(False, True))[1] < 0.7
+
+
+def test_who_was_outside_meanwhile_begins_anew():
+    def boxes(t):
+        lorry, part = cab(t)
+        return [lorry, part if not 0.4 < t < 0.5 else centred(50 * t, 90, 16, 20)]
+
+    assert 1.1 < go(boxes, 2.0)[1] < 1.2
+
+
+@pytest.mark.parametrize("alone_s", [0.5, 1.5])
+def test_who_drove_alone_for_most_of_its_life_is_no_part(alone_s):
+    def boxes(t):
+        return [centred(50 * t, 0 if t >= alone_s else 200, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
+
+    assert np.isnan(go(boxes, alone_s + 1.2)[1]) == (alone_s == 1.5)
+
+
+@pytest.mark.parametrize("parts", [True, False])
+def test_a_cab_that_was_tracked_first_ends_when_its_lorry_is_a_track(parts):
+    tracker = default_tracker(parts=parts)
+    snapshots = []
+    for t in np.arange(60) / 25:
+        x = 20 + SPEED * t
+        boxes = np.array([centred(x + 20, 124, 14, 20), centred(x, 120, 60, 40)][: 2 if t >= 0.5 else 1])
+        middle = np.column_stack([-boxes[:, 2:] / 2, boxes[:, 2:]])
+        R = np.broadcast_to(np.eye(2), (len(boxes), 2, 2))
+        snapshots.append(tracker.step(Scan(t, boxes[:, :2] + boxes[:, 2:] / 2, R, box=middle)))
+    assert len(snapshots[-1]) == (1 if parts else 2)
+    gone = [(e.track_id, e.reason) for tracks in snapshots for e in tracks.events if e.kind == "delete"]
+    assert gone == ([(1, "part of the vehicle that it never left")] if parts else [])

@@ -24,6 +24,7 @@ from vidtrack.scan import Scan
 from vidtrack.tracking.association import Association
 from vidtrack.tracking.births import NEAR, SMALL, pieces
 from vidtrack.tracking.boxes import absolute, area, around, overlapping
+from vidtrack.tracking.occlusion.aboard import go_along
 from vidtrack.tracking.occlusion.claims import claims
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.sharing import Exclusive
@@ -52,6 +53,8 @@ class Occlusion:
            is not the vehicle alone or not all of it
     known_s, part_s   a track seen alone for less than known_s that stays merged for part_s was never a vehicle
            but a part of one
+    along     whether a track that goes along with a larger one is a part of it, if it does so for along_s and for
+           along_share of its life
     overlap least intersection over union of a track with a blob that it continues on, whatever its shape
 
     Raises ConfigError for a cover out of range.
@@ -63,6 +66,9 @@ class Occlusion:
     growth: float = 2.5
     known_s: float = 0.4
     part_s: float = 1.0
+    along: bool = True
+    along_s: float = 0.6
+    along_share: float = 0.5
     overlap: float = 0.3
     _made: int = field(default=0, init=False)
 
@@ -141,8 +147,14 @@ class Occlusion:
         box[alone] += -np.expm1(-dt / (SLOW * view.box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box
 
-    def parts(self, register: Register, t: float) -> Mask:
-        """(T,) merged tracks that were hardly ever seen alone and do not split off: parts of another one's vehicle."""
+    def parts(self, register: Register, bank: Estimator, t: float) -> Mask:
+        """(T,) tracks that are parts of another one's vehicle.
+
+        Merged ones that were hardly ever seen alone and do not split off, and those that go along with a larger one.
+        """
+        return self._never_alone(register, t) | self._go_along(register, bank, t)
+
+    def _never_alone(self, register: Register, t: float) -> Mask:
         strange = (register.merged >= 0) & (register.alone_s < self.known_s)
         if not np.count_nonzero(strange):
             return strange
@@ -150,6 +162,14 @@ class Occlusion:
             together = np.flatnonzero(register.merged == number)
             strange[together[register.alone_s[together].argmax()]] = False
         return strange & (t - register.merged_since_s > self.part_s)
+
+    def _go_along(self, register: Register, bank: Estimator, t: float) -> Mask:
+        if not self.along or len(register) < 2:
+            return np.zeros(len(register), bool)
+        return go_along(
+            around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
+            register.born_s, register.host, register.seat, t, self.along_s, self.along_share,
+        )  # fmt: skip
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """Merged tracks keep their common number and its start for as long as any of them stay together."""
