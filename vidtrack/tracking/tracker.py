@@ -328,7 +328,7 @@ class Tracker:
                 (left, "left the picture"),
                 (relieved & ~left & ~hopeless, "another vehicle comes in where it left"),
                 (idle & ~left & ~relieved & ~hopeless, "never travelled and stands still"),
-                (parts & ~left & ~relieved, "part of the vehicle that it never left"),
+                (parts & ~left & ~relieved & ~hopeless & ~idle, "part of another vehicle"),
             ):
                 if np.count_nonzero(gone):
                     events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))

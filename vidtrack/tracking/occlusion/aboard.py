@@ -16,19 +16,20 @@ LARGER = 2.0
 
 @kernel
 def go_along(
-    box: Floats, name: Ints, confirmed: Mask, seen: Mask, born_s: Floats, host: Ints, seat: Floats, t: float,
-    least_s: float, share: float,
+    box: Floats, name: Ints, confirmed: Mask, seen: Mask, born_s: Floats, rest_s: Floats, host: Ints, seat: Floats,
+    t: float, least_s: float, share: float,
 ) -> Mask:  # fmt: skip
     """(T,) confirmed tracks that go along with a larger one, for least_s [s] and this share of their lives or longer.
 
     box   (T, 4) in the picture at time t [s], of tracks with a name (T,)
-    confirmed, seen, born_s   (T,) whether each is confirmed, whether the scan shows it, when it began [s]
+    confirmed, seen, born_s, rest_s   (T,) whether each is confirmed, whether the scan shows it, when it began [s], and
+          when it last moved on by REST of its size
     host  (T,) name of the track whose box holds FRAGMENT of each, which is LARGER; -1: none. Changed in place
     seat  (T, 5) since when [s] the track has not moved by REST of its size in that box; where in the box its middle
           was then, as shares of the sides; where in the picture the middle of the box was. Changed in place
 
-    Those who stand in a queue keep their places, too: as long as the host has not driven by REST of the track's size
-    within least_s, the time begins anew.
+    The share is that of the whole life. Those who stand in a queue keep their places, too: the time begins anew for who
+    has not moved on for twice least_s, and nobody goes along until the host has driven by REST of the track's size.
     """
     along = np.zeros(len(box), np.bool_)
     for i in range(len(box)):
@@ -43,7 +44,7 @@ def go_along(
             driven += (middle - seat[i, 3 + axis]) ** 2
         sat = t - seat[i, 0]
         stood = np.sqrt(driven) <= REST * max(box[i, 2], box[i, 3])
-        if host[i] != name[k] or not moved <= REST or (stood and sat > least_s):
+        if host[i] != name[k] or not moved <= REST or t - rest_s[i] > 2 * least_s:
             host[i], seat[i, 0] = name[k], t
             for axis in range(2):
                 seat[i, 3 + axis], seat[i, 1 + axis] = _seat(box, i, k, axis)

@@ -168,7 +168,7 @@ class Occlusion:
             return np.zeros(len(register), bool)
         return go_along(
             around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
-            register.born_s, register.host, register.seat, t, self.along_s, self.along_share,
+            register.born_s, register.rest_s, register.host, register.seat, t, self.along_s, self.along_share,
         )  # fmt: skip
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
