@@ -91,6 +91,6 @@ class RadarSettings(Group):
     coast_scans: int = Field(5, ge=1, le=62)
     """a track ends after this many scans without a plot"""
     unseen_s: float | None = Field(None, gt=0)
-    """s; nor later than so long after its last plot; None: 10 s where a sensor may not see it, else until a pause"""
+    """s; nor later than so long after its last plot; None: 10 s or coast_scans where a sensor may not see it"""
     trail_s: float = Field(60.0, ge=0)
     """s; length of a target's trail in rerun"""

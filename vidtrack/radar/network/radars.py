@@ -47,7 +47,7 @@ class Radar(Group):
     sector_deg: float = Field(360.0, gt=0, le=360)
     """degrees; width of the sector about azimuth zero that the radar covers"""
     slowest_m_s: float = Field(0.0, ge=0)
-    """m/s; range rate below which targets are not told from the ground"""
+    """m/s; range rate below which targets are not told from the ground; P_D is half there"""
     detection_probability: float | None = Field(None, gt=0, lt=1)
     """probability that a scan detects a target in range; None: radar.detection_probability"""
     bias_range_m: float = Field(30.0, ge=0)
