@@ -149,9 +149,9 @@ class Stations:
 
     def sight(self, scan: Scan, bank: Estimator) -> Sight:
         """What the scan's station can see of the predicted rows of a bank."""
-        station = self.each[scan.station]
-        xy = bank.x.take(bank.model.position, axis=1)
-        covered = np.ones(len(bank)) if station.coverage is None else station.coverage.share(xy)
+        station, covered = self.each[scan.station], np.ones(len(bank))
+        if station.coverage is not None:
+            covered = station.coverage.share(bank.x.take(bank.model.position, axis=1))
         return Sight(covered, np.zeros(len(bank)) if station.blind is None else station.blind.hidden(bank))
 
     def take(self, scan: Scan) -> float:

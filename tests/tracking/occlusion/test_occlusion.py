@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
-from vidtrack.scan import Scan
-from vidtrack.tracking.boxes import overlapping
+from vidtrack.tracking.boxes import box_scan, overlapping
 from vidtrack.tracking.occlusion.aboard import go_along
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.occlusion import Occlusion
@@ -252,6 +251,11 @@ def rolling(t):
     return [centred(x, 120, 60, 40), centred(x - 10, 130 - 80 * max(2.0 - t, 0.0), 16, 12)]
 
 
+def cab(t):
+    """A lorry and its cab."""
+    return [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
+
+
 def go(boxes, seconds, confirmed=(True, True), seen=(True, True), fps=25.0):
     """Time [s] from which on each of two tracks goes along with the other, NaN: never; boxes(t) are of a row each."""
     host, seat, since = np.full(2, -1), np.full((2, 5), np.nan), np.full(2, np.nan)
@@ -296,11 +300,6 @@ def test_who_passes_stands_or_is_no_smaller_goes_by_itself(boxes):
     assert np.isnan(go(boxes, 7.0)).all()
 
 
-def cab(t):
-    """A lorry and its cab."""
-    return [centred(50 * t, 0, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
-
-
 def test_only_the_larger_one_need_be_seen_and_only_the_part_confirmed():
     assert np.isnan(go(cab, 2.0, seen=(False, True))[1])
     assert np.isnan(go(cab, 2.0, confirmed=(True, False))[1])
@@ -318,7 +317,8 @@ def test_who_was_outside_meanwhile_begins_anew():
 @pytest.mark.parametrize("alone_s", [0.5, 1.5])
 def test_who_drove_alone_for_most_of_its_life_is_no_part(alone_s):
     def boxes(t):
-        return [centred(50 * t, 0 if t >= alone_s else 200, 60, 40), centred(20 + 50 * t, 5, 16, 20)]
+        lorry, part = cab(t)
+        return [lorry if t >= alone_s else centred(50 * t, 200, 60, 40), part]
 
     assert np.isnan(go(boxes, alone_s + 1.2)[1]) == (alone_s == 1.5)
 
@@ -330,9 +330,7 @@ def test_a_cab_that_was_tracked_first_ends_when_its_lorry_is_a_track(parts):
     for t in np.arange(60) / 25:
         x = 20 + SPEED * t
         boxes = np.array([centred(x + 20, 124, 14, 20), centred(x, 120, 60, 40)][: 2 if t >= 0.5 else 1])
-        middle = np.column_stack([-boxes[:, 2:] / 2, boxes[:, 2:]])
-        R = np.broadcast_to(np.eye(2), (len(boxes), 2, 2))
-        snapshots.append(tracker.step(Scan(t, boxes[:, :2] + boxes[:, 2:] / 2, R, box=middle)))
+        snapshots.append(tracker.step(box_scan(t, boxes)))
     assert len(snapshots[-1]) == (1 if parts else 2)
     gone = [(e.track_id, e.reason) for tracks in snapshots for e in tracks.events if e.kind == "delete"]
     assert gone == ([(1, "part of another vehicle")] if parts else [])
