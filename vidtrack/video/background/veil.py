@@ -67,7 +67,7 @@ class VeilByPlace:
         self._darkest = np.full((_ROWS, _COLUMNS), 255.0)
         self._seen_s = np.zeros((_ROWS, _COLUMNS))
         self._since_s = 0.0
-        self._last: tuple[Floats, Haze, Air] | None = None  # what the last air was made of, and it
+        self._last: tuple[Floats, Haze, Air] | None = None  # levels and haze that the last air was made of, and it
 
     def learn(self, luma: Image, mask: Image, dt: float) -> None:
         """Take a picture (h, w) and where it shows traffic, dt [s] after the last one."""
@@ -83,24 +83,28 @@ class VeilByPlace:
 
     def air(self, haze: Haze, shape: tuple[int, int]) -> Air:
         """The air at each place of a picture (h, w): that of `haze` where it is not known that more is added."""
+        level, known = self._levels(haze)
         if self._last is not None:
-            darkest, base, air = self._last
-            if darkest is self._darkest and base == haze and air.black.shape == shape:
+            before, base, air = self._last
+            if base == haze and air.black.shape == shape and np.array_equal(before, level):
                 return air
-        black = self._black(haze, shape)
-        air = Air(black, _spread(black, haze))
-        self._last = self._darkest, haze, air
+        air = _between(level, known, haze, shape) if (level > haze.black).any() else even(haze, shape)
+        self._last = level, haze, air
         return air
 
-    def _black(self, haze: Haze, shape: tuple[int, int]) -> Levels:
+    def _levels(self, haze: Haze) -> tuple[Floats, Mask]:
+        """Luminance of black in each cell, and whether it is known."""
         known = self._seen_s > _SEEN_S
         room = max(float(haze.light) - _DARK, 1.0)
         behind = 1 - haze.share * np.clip((self._darkest - _DARK) / room, 0, 1)  # share of the light that comes through
-        level = np.where(known, np.maximum(self._darkest - _DARK * behind, haze.black), haze.black)
-        if not (level > haze.black).any():
-            return np.full(shape, haze.black)
-        cells = _filled(level, known).astype(np.float32)
-        return np.asarray(cv2.resize(cells, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+        return np.where(known, np.maximum(self._darkest - _DARK * behind, haze.black), haze.black), known
+
+
+def _between(level: Floats, known: Mask, haze: Haze, shape: tuple[int, int]) -> Air:
+    """The air of a picture (h, w) between cells with these levels of black, some of which are known."""
+    cells = _filled(level, known).astype(np.float32)
+    black = np.asarray(cv2.resize(cells, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+    return Air(black, _spread(black, haze) if haze.share else np.zeros(shape, np.float32))
 
 
 def _spread(black: Levels | np.float32, haze: Haze) -> Levels:
