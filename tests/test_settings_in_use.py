@@ -105,6 +105,18 @@ def test_a_setting_that_another_one_switches_off_is_refused():
     assert "detector.kind=disturbance" in refused(Input.VIDEO, "detector.kind=mog2", "detector.disturbance.holes=false")
     assert "output.link=true" in refused(Input.VIDEO, "output.link_s=2")
     assert load(assignments=["output.link_s=2"], kind=Input.DETECTIONS).output.link_s == 2
+    assert "preview_s=a number above zero" in refused(
+        Input.VIDEO, "detector.disturbance.patches=true", "detector.disturbance.preview_s=0"
+    )
+
+
+@pytest.mark.parametrize("name", ["merged_blobs=false", "parts=false", "group_cover=0.5", "blob_overlap=0.4"])
+@pytest.mark.parametrize("method", ["mht", "split"])
+def test_settings_of_shared_blobs_are_refused_where_decisions_are_made_later(name, method):
+    """Methods that decide some scans later know no shared blobs."""
+    said = refused(Input.VIDEO, f"tracker.{name}", f"tracker.method={method}")
+    assert f"no effect with tracker.method={method}" in said
+    assert load(assignments=[f"tracker.{name}", "tracker.method=jpda"], kind=Input.VIDEO)
 
 
 def test_only_stored_detections_are_smoothed_by_default():

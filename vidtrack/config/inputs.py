@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from enum import StrEnum
-from typing import Any
+from typing import Any, get_args
+
+from vidtrack.config.names import Method
 
 
 class Input(StrEnum):
@@ -62,19 +64,25 @@ _UNREAD = {
 """Groups and settings without effect on an input."""
 
 
-class _Given:
-    """Equal to every value but None."""
+class _Such:
+    """Equal to every value of which something holds, which messages call by a name."""
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __init__(self, holds: Callable[[Any], bool], name: str) -> None:
+        self._holds, self._name = holds, name
+
     def __eq__(self, other: object) -> bool:
-        return other is not None
+        return self._holds(other)
 
     def __str__(self) -> str:
-        return "NUMBER"
+        return self._name
 
 
-GIVEN = _Given()
+GIVEN = _Such(lambda value: value is not None, "NUMBER")
+_ABOVE_ZERO = _Such(lambda value: value > 0, "a number above zero")
+_LATER = ("split", "mht")
+_AT_ONCE = tuple(method for method in get_args(Method) if method not in _LATER)
 
 _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "detector.disturbance": ("detector.kind", ("disturbance",)),
@@ -84,8 +92,10 @@ _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {
     "detector.disturbance.guard_px": ("detector.disturbance.selective", (True,)),
     "detector.disturbance.ghost_s": ("detector.disturbance.ghosts", (True,)),
     "detector.disturbance.still_s": ("detector.disturbance.registration", (True,)),
+    "detector.disturbance.patches": ("detector.disturbance.preview_s", (_ABOVE_ZERO,)),
     "detector.paper": ("detector.kind", ("paper",)),
-    "tracker.n_scan": ("tracker.method", ("split", "mht")),
+    "tracker.n_scan": ("tracker.method", _LATER),
+    "tracker.merged_blobs": ("tracker.method", _AT_ONCE),
     "tracker.euclidean_radius_px": ("tracker.distance", ("euclidean",)),
     "tracker.confirm_hits": ("tracker.life", ("m-of-n",)),
     "tracker.confirm_window": ("tracker.life", ("m-of-n",)),
@@ -150,6 +160,7 @@ def needs(kind: Input, name: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     for part, (other, values) in _NEEDS.items():
         if _is_within(name, part):
             yield _OTHER_LIFE.get(kind, other) if other == "tracker.life" else other, values
+            yield from needs(kind, other)
 
 
 def needs_one_of(name: str) -> tuple[tuple[str, Any], ...]:
