@@ -318,8 +318,9 @@ class Tracker:
         register.move(xy, t)
         register.come_in(xy, self.picture.sides(around(self.bank.x, register.box)))
         idle = self.life.idle(register, t)
-        parts = self.sharing.parts(register, self.bank, t)
-        going = hopeless | left | relieved | parts | idle
+        ending = hopeless | left | relieved | idle
+        parts = self.sharing.parts(register, self.bank, t, ending)
+        going = ending | parts
         shared = found.shared
         if np.count_nonzero(going):
             shared = shared[~going]
@@ -328,7 +329,7 @@ class Tracker:
                 (left, "left the picture"),
                 (relieved & ~left & ~hopeless, "another vehicle comes in where it left"),
                 (idle & ~left & ~relieved & ~hopeless, "never travelled and stands still"),
-                (parts & ~left & ~relieved & ~hopeless & ~idle, "part of another vehicle"),
+                (parts & ~ending, "part of another vehicle"),
             ):
                 if np.count_nonzero(gone):
                     events.extend(Event.each(t, self.timing.ended(register.id, going, gone), "delete", why))

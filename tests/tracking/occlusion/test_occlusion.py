@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError
 from vidtrack.tracking.boxes import box_scan, overlapping
+from vidtrack.tracking.lifecycle import LifeCycle
 from vidtrack.tracking.occlusion.aboard import go_along
 from vidtrack.tracking.occlusion.edges import from_edges
 from vidtrack.tracking.occlusion.occlusion import Occlusion
@@ -334,3 +335,23 @@ def test_a_cab_that_was_tracked_first_ends_when_its_lorry_is_a_track(parts):
     assert len(snapshots[-1]) == (1 if parts else 2)
     gone = [(e.track_id, e.reason) for tracks in snapshots for e in tracks.events if e.kind == "delete"]
     assert gone == ([(1, "part of another vehicle")] if parts else [])
+
+
+class LorryEnds(LifeCycle):
+    """Ends the second track in the scan in which it would take the first one with it."""
+
+    def hopeless(self, register):
+        return (register.id == 2) & (register.updated_s > 1.19)
+
+
+def test_nobody_is_a_part_of_a_track_that_ends_in_the_same_scan():
+    def ended(life):
+        tracker = default_tracker()
+        tracker.life = life(3, 5, confirm_travel=0.5)
+        for t in np.arange(31) / 25:
+            boxes = np.array([centred(40 + SPEED * t, 124, 14, 20), centred(20 + SPEED * t, 120, 60, 40)])
+            tracks = tracker.step(box_scan(t, boxes[: 2 if t >= 0.5 else 1]))
+            yield from ((t, event.track_id) for event in tracks.events if event.kind == "delete")
+
+    assert list(ended(LifeCycle)) == [(1.2, 1)]
+    assert list(ended(LorryEnds)) == [(1.2, 2)]

@@ -147,12 +147,13 @@ class Occlusion:
         box[alone] += -np.expm1(-dt / (SLOW * view.box_s)) * (absolute(blobs[on[alone]], -xy[alone]) - box[alone])
         register.box[rows] = box
 
-    def parts(self, register: Register, bank: Estimator, t: float) -> Mask:
+    def parts(self, register: Register, bank: Estimator, t: float, ending: Mask) -> Mask:
         """(T,) tracks that are parts of another one's vehicle.
 
-        Merged ones that were hardly ever seen alone and do not split off, and those that go along with a larger one.
+        Merged ones that were hardly ever seen alone and do not split off, and those that go along with a larger one
+        that does not end.
         """
-        return self._never_alone(register, t) | self._go_along(register, bank, t)
+        return self._never_alone(register, t) | self._go_along(register, bank, t, ending)
 
     def _never_alone(self, register: Register, t: float) -> Mask:
         strange = (register.merged >= 0) & (register.alone_s < self.known_s)
@@ -163,11 +164,12 @@ class Occlusion:
             strange[together[register.alone_s[together].argmax()]] = False
         return strange & (t - register.merged_since_s > self.part_s)
 
-    def _go_along(self, register: Register, bank: Estimator, t: float) -> Mask:
+    def _go_along(self, register: Register, bank: Estimator, t: float, ending: Mask) -> Mask:
         if not self.along or len(register) < 2:
             return np.zeros(len(register), bool)
+        stays = (register.history & 1 == 1) & ~ending
         return go_along(
-            around(bank.x, register.box), register.id, register.status != TENTATIVE, register.history & 1 == 1,
+            around(bank.x, register.box), register.id, register.status != TENTATIVE, stays,
             register.born_s, register.rest_s, register.host, register.seat, t, self.along_s, self.along_share,
         )  # fmt: skip
 

@@ -42,8 +42,8 @@ class Sharing(Protocol):
     def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
         """Update the tracks on shared measurements by the edges they can claim, dt seconds after the last scan."""
 
-    def parts(self, register: Register, bank: Estimator, t: float) -> Mask:
-        """(T,) tracks that are no targets but parts of one that they share measurements with."""
+    def parts(self, register: Register, bank: Estimator, t: float, ending: Mask) -> Mask:
+        """(T,) tracks that are no targets but parts of another one, which is none of those ending (T,) in this scan."""
 
     def merge(self, shared: Ints, register: Register, t: float, events: list[Event]) -> None:
         """Update the groups of tracks on the same shared (T,) measurement, with events."""
@@ -76,7 +76,7 @@ class Exclusive:
     def update(self, found: Association, view: View | None, register: Register, bank: Estimator, dt: float) -> None:
         """Nothing is shared."""
 
-    def parts(self, register: Register, bank: Estimator, t: float) -> Mask:
+    def parts(self, register: Register, bank: Estimator, t: float, ending: Mask) -> Mask:
         """(T,) none."""
         return np.zeros(len(register), bool)
 
