@@ -99,6 +99,14 @@ class Gates:
         s, n = np.argmin(far, axis=1), np.arange(len(xy))
         return owner[s], self.begin[s] + share[n, s] * np.linalg.norm(step[s], axis=1), far[n, s]
 
+    def far(self, gate: Ints, xy: Floats) -> Floats:
+        """(N,) how far points (N, 2) are from gates (N,); NaN for the gate -1, which is none."""
+        far = np.full(len(gate), np.nan)
+        for one in range(len(self)):
+            at = gate == one
+            far[at] = self.nearest(xy[at], np.arange(len(self)) == one)[2]
+        return far
+
     def ways(self, gate: Ints, side: Ints) -> tuple[Mask, Mask]:
         """(N,) whether passings of gates (N,) to a side (N,) enter, and whether they leave."""
         both, inwards = self.role("both")[gate], self.inward[gate] == side
