@@ -12,8 +12,17 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, AwareDatetime, BaseModel, Field, PrivateAttr, ValidationError, ValidationInfo
-from pydantic import field_validator
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
+
 from pydantic import model_validator as whole
 
 from vidtrack.config.group import Group, parse_toml, read_toml_text

@@ -77,7 +77,12 @@ def events(clip: RoadClip) -> list[Event]:
     """All events in order of time. `target_id` is as in gt.txt."""
     moved, ids = motion(clip), clip.truth.ids(len(clip.fleet.length))
     crossed = list(_crossings(clip, moved, ids))
-    found = [*crossed, *_movements(clip, crossed), *_queues(clip, motion(clip, parts=True)), *_conflicts(clip, moved, ids)]
+    found = [
+        *crossed,
+        *_movements(clip, crossed),
+        *_queues(clip, motion(clip, parts=True)),
+        *_conflicts(clip, moved, ids),
+    ]
     return sorted(found, key=lambda event: event.time_s)
 
 

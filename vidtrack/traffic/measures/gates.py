@@ -113,14 +113,6 @@ class Gates:
         (dx, dy), (x, y) = (end - start).T, (xy - start).T
         return (dx * y - dy * x >= 0).astype(np.int64)
 
-    def far(self, gate: Ints, xy: Floats) -> Floats:
-        """(N,) how far points (N, 2) are from gates (N,); NaN for the gate -1, which is none."""
-        far = np.full(len(gate), np.nan)
-        for one in range(len(self)):
-            at = gate == one
-            far[at] = self.nearest(xy[at], np.arange(len(self)) == one)[2]
-        return far
-
     def ways(self, gate: Ints, side: Ints) -> tuple[Mask, Mask]:
         """(N,) whether passings of gates (N,) to a side (N,) enter, and whether they leave."""
         both, inwards = self.role("both")[gate], self.inward[gate] == side

@@ -302,7 +302,7 @@ class _Figures:
 
     def _queues(self) -> pa.Table:
         standing, legs = self.staying.standing(self.vehicle), self.site.legs
-        gate = approaches(standing, self.gates, self.passed, self.trips, self.lives, self.length)
+        gate = approaches(standing, self.gates, self.passed, self.trips, self.lives)
         leg = np.array([*map(legs.index, self.gates.legs), -1])[gate]
         found = queues_of(standing, leg, self.length[standing.vehicle])
         return table(
