@@ -22,7 +22,6 @@ from pydantic import (
     ValidationInfo,
     field_validator,
 )
-
 from pydantic import model_validator as whole
 
 from vidtrack.config.group import Group, parse_toml, read_toml_text
