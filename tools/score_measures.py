@@ -14,8 +14,8 @@ same legs whose two times are within 1 s; a conflict by one within 1 s whose pla
 Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
 
 A queue is found by those of the same leg at an overlapping time; that with most vehicles tells how many there were. One
-that overlaps with none is false. In the events only vehicles before the stop line queue, in the measures all that stand
-on their way in from a leg. Vehicles that stand in the first picture are not seen before they move, so queues are also
+that overlaps with none is false. In the events vehicles before the stop line queue, in the measures all that stand on
+their way in from a leg. Vehicles that stand in the first picture are not seen before they move, so queues are also
 told without those that begin there.
 """
 

@@ -218,7 +218,10 @@ def test_calibrate_says_which_pair_is_wrong(road, vidtrack):
     ("text", "words"),
     [
         ('[site]\nname = "a"\nwidth = 9\nheight = 9\n', "has no section [calibration]"),
-        (site_text(CAMERA.picture(POINTS), POINTS * [1, -1]), "the points are mirrored"),
+        (
+            site_text(CAMERA.picture(POINTS), POINTS * [1, -1]),
+            "vidtrack: site.toml: calibration: the points are mirrored",
+        ),
         ("[site", "is not valid TOML"),
     ],
 )

@@ -5,13 +5,23 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, AwareDatetime, BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic import model_validator as whole
 
 from vidtrack.config.group import Group, parse_toml, read_toml_text
@@ -213,6 +223,7 @@ class Site(Group):
     movements: Movements = Movements()
     classes: Annotated[dict[Name, Bounds], AfterValidator(apart)] = Field({})
     report: Report = Report()
+    _file: Path | None = PrivateAttr(None)
 
     @property
     def legs(self) -> tuple[str, ...]:
@@ -283,7 +294,19 @@ class Site(Group):
             for name in ("sigma_picture_px", "focal_px"):
                 value = getattr(self.calibration, name)
                 tree["calibration"][name] = None if value is None else fx * value
-        return Site.model_validate(tree)
+        return Site.model_validate(tree)._of(self._file)
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """A ConfigError about the site, raised inside, names the file that the site was read from."""
+        try:
+            yield
+        except ConfigError as error:
+            raise error if self._file is None else ConfigError(f"{self._file}: {error}") from None
+
+    def _of(self, file: Path | None) -> Site:
+        self._file = file
+        return self
 
 
 _SECTIONS: dict[str, type[BaseModel]] = {
@@ -310,7 +333,7 @@ def parse_site(text: str, path: Path) -> Site:
     """The site in a file with this text. Raises ConfigError as `read_site` does."""
     tree = parse_toml(text, path)
     try:
-        return Site.model_validate(tree)
+        return Site.model_validate(tree)._of(path)
     except ValidationError as error:
         raise ConfigError("\n".join(f"{path}: {fault.words}" for fault in faults_of(error))) from None
 

@@ -80,7 +80,8 @@ def test_a_queue_is_as_long_as_what_stands_before_the_line():
         mine = np.array([c.layout.network.routes[r].start == event.from_leg for r in now.route])
         half = c.fleet.length[now.vehicle] / 2
         stop = c.layout.network.stop[now.route]
-        waits = mine & (3.6 * now.speed < 5) & (now.s + half <= stop) & c.eye.shows(now.xy, c.size)
+        seen = c.truth.vehicle[c.truth.boxes.frame == round(time * c.fps)]
+        waits = mine & (3.6 * now.speed < 5) & (now.s + half <= stop) & np.isin(now.vehicle, seen)
         most = max(most, int(waits.sum()))
         back = max([back, *(stop - now.s + half)[waits]])
     assert event.vehicles == most

@@ -99,6 +99,14 @@ def test_who_comes_to_stand_without_a_place_has_it_from_when_it_is_known(tmp_pat
     assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(14 + 4, abs=0.2))
 
 
+def test_who_waits_when_the_watching_ends_is_in_the_queue_of_the_nearest_entry(tmp_path):
+    t = np.arange(400) / 25
+    tracks = [along(n, t, x + 20 * np.clip(t, 0, 2), y) for n, x, y in ((1, 30, 240), (2, 560, 240), (3, 300, 240))]
+    run = write_run(tmp_path / "run", tracks, metres=True)  # before the entry, behind the exit, and between both
+    rows = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()
+    assert [(row["leg"], row["vehicles"], row["end_s"]) for row in rows] == [("west", 1, pytest.approx(t[-1]))]
+
+
 def test_a_row_that_seems_to_stand_makes_no_queue():
     begin, xy, yes = np.array([0.0, 10.0]), np.zeros((2, 2)), np.ones(2, bool)
     stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy)

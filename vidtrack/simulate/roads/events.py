@@ -1,6 +1,7 @@
 """What happened, by geometry from the exact states: crossings of gates, movements, queues, conflicts.
 
-Only what happens in the picture counts: a state whose footprint centre the camera does not show is left out.
+Only what happens in the picture counts: a state whose footprint centre the camera does not show is left out. Those that
+stand in a queue count as long as the picture shows a part of them.
 """
 
 from __future__ import annotations
@@ -54,15 +55,18 @@ class Motion:
     route: Ints
 
 
-def motion(clip: RoadClip) -> Motion:
-    """The motion of the fleet at steps of SAMPLE_S while the video lasts."""
+def motion(clip: RoadClip, *, parts: bool = False) -> Motion:
+    """The motion of the fleet at steps of SAMPLE_S while the video lasts; parts: also of those at the border."""
     time = np.arange(0, clip.times[-1] + 1e-9, SAMPLE_S)
     shape = len(time), len(clip.fleet.length)
+    seen = np.zeros((len(clip.times), shape[1]), bool)
+    seen[clip.truth.boxes.frame, clip.truth.vehicle] = True
+    frame = np.rint(time * clip.fps).astype(int).clip(max=len(seen) - 1)
     xy, route = np.full((*shape, 2), np.nan), np.full(shape, -1)
     speed, heading, s = (np.full(shape, np.nan) for _ in range(3))
     for k, t in enumerate(time):
         now = clip.history.at(float(t))
-        shown = clip.eye.shows(now.xy, clip.size)
+        shown = seen[frame[k], now.vehicle] if parts else clip.eye.shows(now.xy, clip.size)
         who = now.vehicle[shown]
         xy[k, who], speed[k, who], heading[k, who] = now.xy[shown], now.speed[shown], now.heading[shown]
         s[k, who], route[k, who] = now.s[shown], now.route[shown]
@@ -73,7 +77,12 @@ def events(clip: RoadClip) -> list[Event]:
     """All events in order of time. `target_id` is as in gt.txt."""
     moved, ids = motion(clip), clip.truth.ids(len(clip.fleet.length))
     crossed = list(_crossings(clip, moved, ids))
-    found = [*crossed, *_movements(clip, crossed), *_queues(clip, moved), *_conflicts(clip, moved, ids)]
+    found = [
+        *crossed,
+        *_movements(clip, crossed),
+        *_queues(clip, motion(clip, parts=True)),
+        *_conflicts(clip, moved, ids),
+    ]
     return sorted(found, key=lambda event: event.time_s)
 
 

@@ -42,8 +42,9 @@ def examined(site: Site) -> Account:
     assert calibration is not None
     if not calibration.picture:
         return _without_map(site)
-    pairs = pairs_of(site)
-    fit = solved(pairs)
+    with site.named():
+        pairs = pairs_of(site)
+        fit = solved(pairs)
     check = checked(pairs, fit)
     ground = road_plane(site, pairs, fit, check)
     picture = np.array(calibration.picture)
@@ -79,7 +80,8 @@ def _without_map(site: Site) -> Account:
     """The account of a calibration by segments of a straight road."""
     calibration = site.calibration
     assert calibration is not None
-    fit = straight_road(site)
+    with site.named():
+        fit = straight_road(site)
     found = camera(fit.ground)
     height = height_doubt(found, calibration.camera_height_m)
     picture = np.array([point for _, point in calibration.points()])

@@ -120,12 +120,14 @@ def calibrated(site: Site) -> Ground:
     """
     assert site.calibration is not None
     if not site.calibration.picture:
-        found = straight_road(site)
+        with site.named():
+            found = straight_road(site)
         for line in found.doubts():
             _log.warning("%s", line)
         return found.ground
-    pairs = pairs_of(site)
-    fit = solved(pairs)
+    with site.named():
+        pairs = pairs_of(site)
+        fit = solved(pairs)
     check = checked(pairs, fit)
     for line in doubts(site, check):
         _log.warning("%s", line)

@@ -99,7 +99,7 @@ def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Pa
     who = np.flatnonzero(free & moves)
     span = np.clip(np.searchsorted(spans[:, 0], end.t[who], side="right") - 1, 0, None)
     room = np.abs(spans[span, 0 if way < 0 else 1] - end.t[who])
-    known = End(end.t[who], end.xy[who], end.v[who], end.spread[who])
+    known = end.only(who)
     far = known.after(way * np.minimum(REACH_S, room))
     passing = Passing(gates, REACH_M)
     passing.add(step_rows(far, known) if way < 0 else step_rows(known, far))

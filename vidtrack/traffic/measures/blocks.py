@@ -84,7 +84,7 @@ def _csv_blocks(path: Path, columns: tuple[str, ...]) -> Iterator[pa.Table]:
             for batch in reader:
                 yield pa.Table.from_batches([batch])
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {path.parent} may help") from None
+        raise damaged(path, error) from None
 
 
 def _whole_lines(path: Path) -> int:
@@ -108,15 +108,17 @@ def column_names(folder: Path) -> set[str]:
         with path.open(encoding="utf-8") as file:
             return set(file.readline().strip().split(","))
     except UnicodeDecodeError as error:
-        raise FormatError(f"{path} is damaged: {error}; vidtrack repair {folder} may help") from None
+        raise damaged(path, error) from None
 
 
 def damaged(path: Path, error: Exception) -> FormatError:
-    """What is wrong with a Parquet table, and what to do."""
-    what, advice = str(error).strip(), "copy it again, or track the video again"  # some end in a new line
-    if (path.parent / "tracks.csv").is_file():
-        advice = f"vidtrack repair {path.parent} makes it from tracks.csv"
-    return FormatError(f"{path} is damaged: {what}; {advice}")
+    """What is wrong with a table of tracks, and what to do."""
+    folder, advice = path.parent, "copy it again, or track the video again"
+    if path.suffix == ".csv":
+        advice = f"vidtrack repair {folder} may help"
+    elif (folder / "tracks.csv").is_file():
+        advice = f"vidtrack repair {folder} makes it from tracks.csv"
+    return FormatError(f"{path} is damaged: {str(error).strip()}; {advice}")  # some errors end in a new line
 
 
 def numbers(table: pa.Table, name: str) -> Floats:

@@ -49,11 +49,10 @@ class Gates:
     @property
     def inward(self) -> Ints:
         """(G,) the side of each gate on which the middle of all entries and exits lies, as `Passed` has it."""
-        ends = np.stack([self.segment[self.first[:-1], :2], self.segment[self.first[1:] - 1, 2:]])
-        within = self.role("entry", "exit", "both")
-        middle = ends[:, within].mean(axis=(0, 1)) if within.any() else np.zeros(2)
-        (dx, dy), (x, y) = (ends[1] - ends[0]).T, (middle - ends[0]).T
-        return (dx * y - dy * x >= 0).astype(np.int64)
+        gates, meant = np.arange(len(self)), self.role("entry", "exit", "both")
+        ends = self._ends[:, meant]
+        middle = ends.mean(axis=(0, 1)) if meant.any() else np.zeros(2)
+        return self._side(gates, np.broadcast_to(middle, (len(self), 2)))
 
     @property
     def length(self) -> Floats:
@@ -98,6 +97,21 @@ class Gates:
             far[:, ~among[owner]] = np.inf
         s, n = np.argmin(far, axis=1), np.arange(len(xy))
         return owner[s], self.begin[s] + share[n, s] * np.linalg.norm(step[s], axis=1), far[n, s]
+
+    def within(self, gate: Ints, xy: Floats) -> Mask:
+        """(N,) whether points (N, 2) lie on the inner side of gates (N,)."""
+        return np.asarray(self._side(gate, xy) == self.inward[gate])
+
+    @property
+    def _ends(self) -> Floats:
+        """(2, G, 2) the first and the last end of each gate."""
+        return np.stack([self.segment[self.first[:-1], :2], self.segment[self.first[1:] - 1, 2:]])
+
+    def _side(self, gate: Ints, xy: Floats) -> Ints:
+        """(N,) the side of the straight line between the ends of gates (N,) on which points (N, 2) lie."""
+        start, end = self._ends[:, gate]
+        (dx, dy), (x, y) = (end - start).T, (xy - start).T
+        return (dx * y - dy * x >= 0).astype(np.int64)
 
     def ways(self, gate: Ints, side: Ints) -> tuple[Mask, Mask]:
         """(N,) whether passings of gates (N,) to a side (N,) enter, and whether they leave."""

@@ -126,8 +126,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 def gap_rows(lives: Lives, joins: Joins) -> Rows:
     """(2 J,) rows that bridge the gaps: the end of the one stretch and the beginning of the other, `track` the join."""
-    tail, head = (_at(end, who) for end, who in ((lives.tail, joins.before), (lives.head, joins.after)))
-    return step_rows(tail, head)
+    return step_rows(lives.tail.only(joins.before), lives.head.only(joins.after))
 
 
 def step_rows(begin: End, end: End) -> Rows:
@@ -142,7 +141,3 @@ def step_rows(begin: End, end: End) -> Rows:
     sigma = np.sqrt(both(begin.spread[:, 0], end.spread[:, 0]))
     state = both(begin.xy, end.xy), sigma, np.zeros(rows), np.full((rows, 2), np.nan)
     return Rows(number, both(begin.t, end.t), yes, ~yes, ~yes, *state, *off_road(rows))
-
-
-def _at(end: End, who: Ints) -> End:
-    return End(end.t[who], end.xy[who], end.v[who], end.spread[who])

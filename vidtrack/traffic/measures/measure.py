@@ -19,6 +19,7 @@ from vidtrack.traffic.calibration.account import examined
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.calibration.sections import section_doubts
 from vidtrack.traffic.measures.ahead import compile_ahead
+from vidtrack.traffic.measures.approaches import approaches
 from vidtrack.traffic.measures.by_traffic import by_stretches, contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import KINDS, PET, TTC, Meeting
@@ -300,15 +301,10 @@ class _Figures:
         )
 
     def _queues(self) -> pa.Table:
-        """Queues of vehicles by the legs that their trips began on."""
         standing, legs = self.staying.standing(self.vehicle), self.site.legs
-        number = np.array([legs.index(name) for name in self.gates.legs])
-        entered = self.trips.entry >= 0
-        leg, left_s = np.full(len(self.vehicle), -1), np.full(len(self.vehicle), -np.inf)
-        leg[self.trips.vehicle[entered]] = number[self.passed.gate[self.trips.entry[entered]]]
-        left_s[self.trips.vehicle] = self.trips.to_s
-        inside = standing.begin < left_s[standing.vehicle]
-        found = queues_of(standing, np.where(inside, leg[standing.vehicle], -1), self.length[standing.vehicle])
+        gate = approaches(standing, self.gates, self.passed, self.trips, self.lives)
+        leg = np.array([*map(legs.index, self.gates.legs), -1])[gate]
+        found = queues_of(standing, leg, self.length[standing.vehicle])
         return table(
             {
                 "leg": ("", [legs[k] for k in found.leg.tolist()]),

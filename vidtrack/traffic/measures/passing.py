@@ -183,10 +183,11 @@ class Passing:
 
     def ways(self, tracks: int) -> Floats:
         """(T,) what each track has driven in all, with corners _CORNER apart; 0 for those of which nothing is known."""
-        self._make_room(tracks)
         way, state = self._way[:tracks], self._state[:tracks]
         rest = np.hypot(state[:, _X] - way[:, 0], state[:, _Y] - way[:, 1])
-        return np.asarray(np.nan_to_num(way[:, 2] + rest))
+        driven = np.zeros(tracks)
+        driven[: len(way)] = np.nan_to_num(way[:, 2] + rest)
+        return driven
 
 
 def lasting(track: Ints, gate: Ints, side: Ints, t: Floats) -> Mask:

@@ -1,4 +1,4 @@
-"""Queues: vehicles that stand on their way in from a leg, from when the first stands until none does."""
+"""Queues: vehicles that stand on the approach of a leg, from when the first stands until none does."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Queues:
 def queues_of(standing: Stays, leg: Ints, length: Floats) -> Queues:
     """Queues of vehicles that stand.
 
-    leg     (E,) number of the leg that each comes from; -1: not known, and in no queue
+    leg     (E,) number of the leg on whose approach each stands; -1: on none, and in no queue
     length  (E,) m
     """
     order = np.lexsort((standing.begin, leg))

@@ -57,6 +57,10 @@ class End:
     v: Floats
     spread: Floats
 
+    def only(self, who: Ints) -> End:
+        """The states of some stretches."""
+        return End(self.t[who], self.xy[who], self.v[who], self.spread[who])
+
     def after(self, seconds: Floats) -> End:
         """The state (T,) s later, or earlier where negative, at the same velocity."""
         xx, xv, vv = self.spread.T
