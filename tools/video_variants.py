@@ -31,6 +31,8 @@ START_SHARE = 0.25  # of a clip's length that is left out, at most
 ROOM = 0.12  # of the picture's sides, between a counting line and the edge of a part that is drawn
 WHOLE = (0.0, 0.0, 1.0, 1.0)
 OTHER_SIDE = {"left": "right", "right": "left"}
+FAULT_S, FAULT_LASTS_S = 5.0, 0.6  # when the camera fails, and for how long
+RECOVERY_S = 3.0  # after that a crossing counts again
 OTHER_WAY = OTHER_SIDE | {"up": "down", "down": "up"}
 
 
@@ -49,6 +51,7 @@ class Variant:
     view      changes one picture; called as view(picture, time_s, rng)
     coarse    encoded in H.264 at this constant rate factor first
     sway      standard deviation of the camera's displacement, px at a width of 640; None: the camera stands
+    fault     the camera fails at FAULT_S: who crosses in the RECOVERY_S after may be counted or not
     """
 
     every: int = 1
@@ -62,6 +65,7 @@ class Variant:
     view: Callable[[Picture, float, Generator], Picture] | None = None
     coarse: int | None = None
     sway: float | None = None
+    fault: bool = False
 
 
 def haze(picture: Picture, time_s: float, rng: Generator) -> Picture:
@@ -151,6 +155,46 @@ def night(picture: Picture, time_s: float, rng: Generator) -> Picture:
     return np.clip(photons * 2.5, 0, 255).astype(np.uint8)
 
 
+def black(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """No light for a while."""
+    return np.zeros_like(picture) if FAULT_S <= time_s < FAULT_S + FAULT_LASTS_S else picture
+
+
+def damaged(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """Blocks of wrong colours for a while, as after lost packets."""
+    if not FAULT_S <= time_s < FAULT_S + FAULT_LASTS_S:
+        return picture
+    height, width = picture.shape[:2]
+    wrong = picture.copy()
+    for left, top in zip(rng.integers(0, width - 48, 60), rng.integers(0, height - 16, 60), strict=True):
+        wrong[top : top + 16, left : left + 48] = rng.integers(0, 255, 3)
+    return wrong
+
+
+def lightning(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """A flash in two or three pictures."""
+    lit = FAULT_S <= time_s < FAULT_S + 0.1
+    return np.clip(1.5 * picture + 60, 0, 255).astype(np.uint8) if lit else picture
+
+
+def knocked(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """The camera is turned a little, and stays so."""
+    pixel = picture.shape[1] / 640
+    return _moved(picture, np.array([[1, 0, 7 * pixel], [0, 1, -5 * pixel]])) if time_s >= FAULT_S else picture
+
+
+def zoomed(picture: Picture, time_s: float, rng: Generator) -> Picture:
+    """The camera zooms in by 6 %, at once."""
+    height, width = picture.shape[:2]
+    zoom = cv2.getRotationMatrix2D((width / 2, height / 2), 0, 1.06)
+    return _moved(picture, zoom) if time_s >= FAULT_S else picture
+
+
+def _moved(picture: Picture, move: NDArray) -> Picture:
+    height, width = picture.shape[:2]
+    return np.asarray(cv2.warpAffine(picture, move, (width, height), borderMode=cv2.BORDER_REPLICATE), np.uint8)
+
+
 def flicker(time_s: float) -> float:
     """Light of lamps that beat with the camera, and an exposure that jumps every 3.7 s."""
     return 1 + 0.07 * float(np.sin(2 * np.pi * time_s / 2.3)) + 0.12 * (int(time_s / 3.7) % 2)
@@ -185,6 +229,13 @@ VARIANTS = {
     "sway-1": Variant(sway=1.0),
     "sway-3": Variant(sway=3.0),
 }
+FAULTS = {
+    "black": Variant(view=black, fault=True),
+    "damaged": Variant(view=damaged, fault=True),
+    "lightning": Variant(view=lightning, fault=True),
+    "knocked": Variant(view=knocked, fault=True),
+    "zoomed": Variant(view=zoomed, fault=True),
+}
 
 
 def drawn(clip: Clip, seed: int) -> Variant:
@@ -214,7 +265,7 @@ def drawn(clip: Clip, seed: int) -> Variant:
 
 def derive(clip: Clip, name: str, folder: Path, variant: Variant | None = None) -> Clip:
     """The variant `name` of a clip with crossings, made in `folder` where it is not there yet."""
-    variant = variant or VARIANTS[name]
+    variant = variant or (VARIANTS | FAULTS)[name]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{clip.name}-{name}.mkv"
     size, rate, _ = _stream(clip.video)
@@ -343,6 +394,8 @@ def _event(event: Event, variant: Variant, count: int, rate: Fraction) -> Event:
     direction = OTHER_SIDE.get(event.direction, event.direction) if variant.mirror else event.direction
     tolerance = event.tolerance if variant.every == 1 else max(event.tolerance / variant.every, SMALLEST_TOLERANCE)
     certain = event.certain and (variant.start_s == 0 or frame * variant.every >= SETTLE_S * rate)
+    if variant.fault:
+        certain &= not 0 <= frame + tolerance - FAULT_S * rate <= RECOVERY_S * rate + 2 * tolerance
     return replace(event, frame=frame, direction=direction, tolerance=tolerance, certain=certain)
 
 

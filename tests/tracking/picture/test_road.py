@@ -196,6 +196,18 @@ def test_a_picture_that_changes_all_at_once_is_no_swarm():
     assert road.swarm.size == 0.0
 
 
+def test_half_a_second_of_damaged_pictures_is_no_swarm_and_snow_that_begins_then_is():
+    """Lost packets leave blocks that begin by the hundred; who comes in after them is a vehicle."""
+    road, rng = Road(WIDTH, HEIGHT), np.random.default_rng(0)
+    fall(road.learn, 6, 8.0, seconds=5.0)
+    for k in range(15):
+        blocks = np.column_stack([rng.uniform(0, 200, (40, 2)), np.full((40, 2), 30.0)])
+        road.learn(tracks_of(5 + k / 25, blocks, status=TENTATIVE, age_s=0.0))
+        assert road.swarm.size == 0.0
+    fall(road.learn, 100, 8.0, first=6.0, seconds=5.0)
+    assert road.swarm.size > 8.0
+
+
 def test_flakes_that_drift_are_not_confirmed_and_a_vehicle_among_them_is():
     from blob_scene import confirmed_ids, default_tracker, play
 

@@ -20,6 +20,7 @@ _STEEP = 0.7  # most that is left of a pair half an octave on; traffic begins wh
 _FORGET_S = 10.0
 _SOON_S = 3.0  # shortest time that births are taken to have come in: few scans are no swarm
 _AT_ONCE = 30  # births of one scan that count: the picture may change all at once
+_LASTING = 0.25  # share of the remembered time that they take; damaged pictures are over sooner
 _LEAST_PX, _STEPS, _BINS = 1.0, 4, 48  # sizes from 1 px to 4096 px, four bins to a factor of two
 
 
@@ -29,19 +30,20 @@ class Swarm:
     births  (48,) remembered births, by the logarithm of the longer side
     """
 
-    STATE = ("births", "_time_s", "_watched_s")
-    ADDED: ClassVar = {"_watched_s": lambda swarm: _FORGET_S}
+    STATE = ("births", "_busy_s", "_time_s", "_watched_s")
+    ADDED: ClassVar = {"_watched_s": lambda swarm: _FORGET_S, "_busy_s": lambda swarm: swarm._watched_s}
 
     def __init__(self) -> None:
         self.births: Floats = np.zeros(_BINS)
         self._time_s = 0.0
         self._watched_s = 0.0  # remembered time
+        self._busy_s = 0.0  # that of scans in which so many began
 
     @property
     def size(self) -> float:
         """Longer side [px] up to which objects are of the swarm; larger ones begin seldom. Zero without a swarm."""
         seconds = max(self._watched_s, _SOON_S)
-        if self.births.sum() <= _SWARM_PER_S * seconds:
+        if self.births.sum() <= _SWARM_PER_S * seconds or self._busy_s < _LASTING * self._watched_s:
             return 0.0
         rate = self.births / seconds
         pair = rate[:-1] + rate[1:]  # of half an octave
@@ -57,7 +59,7 @@ class Swarm:
         dt = max(tracks.t - self._time_s, 0.0)
         kept = math.exp(-dt / _FORGET_S)
         self.births *= kept
-        self._watched_s = kept * self._watched_s + dt
+        self._watched_s, self._busy_s = kept * self._watched_s + dt, kept * self._busy_s
         self._time_s = tracks.t
         new = (tracks.age_s <= 0).nonzero()[0]
         if len(new):
@@ -65,4 +67,5 @@ class Swarm:
         if len(new):
             bins = _STEPS * np.log2(np.maximum(longer(tracks.box[new]), _LEAST_PX) / _LEAST_PX)
             share = min(1.0, _AT_ONCE / len(bins))
+            self._busy_s += dt * (len(new) >= _SWARM_PER_S * dt)
             np.add.at(self.births, np.minimum(bins.astype(np.int64), _BINS - 1), share)
