@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.measures.bodies import (
     EX,
     EY,
@@ -124,7 +124,7 @@ def _look(row: int, count: int, order: Ints, table: Floats, who: Ints, found: Fl
     return len(order), count
 
 
-@kernel
+@inlined
 def _touch(dx: float, dy: float, wx: float, wy: float, one: Floats, other: Floats) -> tuple[float, float, float]:
     """Time until two rectangles touch, inf if they never do or overlap already, and the normal along which they do."""
     begin, end, nx, ny = -np.inf, np.inf, 0.0, 0.0

@@ -24,7 +24,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import by_number
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.measures.bodies import EX, EY, LENGTH, WIDTH, Bodies, Encounters, T, X, Y, touching_place
 
 PET_S = 5.0
@@ -243,19 +243,19 @@ def _follows(first: Ints, second: Ints, track: Ints, rectangle: Floats) -> Mask:
     return follows
 
 
-@kernel
+@inlined
 def _before(row: int, track: Ints, rectangle: Floats, since: float) -> bool:
     """Whether there is a row of the same track before it, and after a time."""
     return row > 0 and track[row - 1] == track[row] and rectangle[row - 1, T] > since
 
 
-@kernel
+@inlined
 def _boxes_meet(one: Floats, other: Floats) -> bool:
     across = one[LEFT] <= other[RIGHT] and other[LEFT] <= one[RIGHT]
     return across and one[LOW] <= other[HIGH] and other[LOW] <= one[HIGH]
 
 
-@kernel
+@inlined
 def _in_box(one: Floats, leg: Floats) -> bool:
     """Whether a rectangle may meet those of a leg."""
     x, y, across, up = _extent(one)
@@ -263,7 +263,7 @@ def _in_box(one: Floats, leg: Floats) -> bool:
     return beside and leg[LOW] <= y + up and y - up <= leg[HIGH]
 
 
-@kernel
+@inlined
 def _crossing(one: Floats, other: Floats) -> bool:
     """Whether the headings of two legs may differ by CROSSING_RAD."""
     cos = one[COS_TURNED] * other[COS_TURNED] - one[SIN_TURNED] * other[SIN_TURNED]
@@ -274,7 +274,7 @@ def _crossing(one: Floats, other: Floats) -> bool:
     return cosine <= _FOLLOWS * cos + _ACROSS * sin
 
 
-@kernel
+@inlined
 def _extent(one: Floats) -> tuple[float, float, float, float]:
     """The middle of a rectangle, and how far it reaches from there along x and y."""
     along, across = abs(one[EX]), abs(one[EY])
@@ -285,23 +285,23 @@ def _extent(one: Floats) -> tuple[float, float, float, float]:
     )
 
 
-@kernel
+@inlined
 def _distance(one: Floats, other: Floats) -> float:
     return np.sqrt((one[X] - other[X]) ** 2 + (one[Y] - other[Y]) ** 2)
 
 
-@kernel
+@inlined
 def _cosine(one: Floats, other: Floats) -> float:
     """Of the angle between two headings."""
     return one[EX] * other[EX] + one[EY] * other[EY]
 
 
-@kernel
+@inlined
 def _aligned(one: Floats, other: Floats) -> bool:
     return _cosine(one, other) > _FOLLOWS
 
 
-@kernel
+@inlined
 def _overlap(one: Floats, other: Floats) -> bool:
     """Whether two rectangles overlap: along the normal of every edge."""
     dx, dy = other[X] - one[X], other[Y] - one[Y]

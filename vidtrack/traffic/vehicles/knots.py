@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import by_number, make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 
 STEP_S, STEP_M = 0.2, 0.5
 """A knot ends when it has lasted so long and the vehicle has moved so far: one that stands makes no knots."""
@@ -82,7 +82,7 @@ class Knotting:
         self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))
 
 
-@kernel
+@inlined
 def _mean(knot: Floats, done: Floats) -> None:
     """Write a knot (COLUMNS,) as mean time, four mean edges, rows (6,)."""
     done[0] = knot[_TIME] / knot[_ROWS]
