@@ -176,6 +176,7 @@ def inlined(function: Callable[..., Any]) -> Any:
     """Decorator: a function that only kernels call. It is compiled within each of them, under their rule of division.
 
     By itself it would be inferred, optimised and turned into machine code once more than is needed.
+    It would also count references to each of its arrays at every call; views of rows, table[i], still do.
     """
     return njit(nogil=True, inline="always", **_RULES)(function)
 

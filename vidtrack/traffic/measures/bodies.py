@@ -176,11 +176,12 @@ def _known(
         if not (seen[i] and np.isfinite(known) and sure and speed_sigma[i] < _SPEED_M_S):
             continue
         tracks[count], shared[count] = track[i], merged[i]
-        one = table[count]
-        one[T], one[X], one[Y], one[EX], one[EY] = t[i], xy[i, 0], xy[i, 1], ahead[i, 0], ahead[i, 1]
-        one[LENGTH], one[WIDTH], one[VX], one[VY] = length[i], width[i], v[i, 0], v[i, 1]
-        one[LENGTH_SIGMA], one[SPEED_SIGMA] = length_sigma[i], speed_sigma[i]
-        one[XX], one[YY], one[XY] = spread[i, 0], spread[i, 1], spread[i, 2]
+        table[count, T], table[count, X], table[count, Y] = t[i], xy[i, 0], xy[i, 1]
+        table[count, EX], table[count, EY] = ahead[i, 0], ahead[i, 1]
+        table[count, LENGTH], table[count, WIDTH] = length[i], width[i]
+        table[count, VX], table[count, VY] = v[i, 0], v[i, 1]
+        table[count, LENGTH_SIGMA], table[count, SPEED_SIGMA] = length_sigma[i], speed_sigma[i]
+        table[count, XX], table[count, YY], table[count, XY] = spread[i, 0], spread[i, 1], spread[i, 2]
         count += 1
     return count
 

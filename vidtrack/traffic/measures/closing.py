@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.measures.bodies import (
     EX,
     EY,
@@ -113,7 +113,7 @@ def _look(row: int, count: int, order: Ints, table: Floats, who: Ints, found: Fl
                 continue  # the circles around them never meet
             if nearing > TTC_S * w2 and far - 2 * TTC_S * nearing + TTC_S**2 * w2 > near:
                 continue  # they near each other still after TTC_S, and have not met
-            ttc, nx, ny = _touch(dx, dy, wx, wy, table[i], table[j])
+            ttc, nx, ny = _touch(dx, dy, wx, wy, table, i, j)
             if ttc > TTC_S or abs(nx * wx + ny * wy) < _SURE * np.hypot(table[i, SPEED_SIGMA], table[j, SPEED_SIGMA]):
                 continue
             if count == len(who):
@@ -124,18 +124,21 @@ def _look(row: int, count: int, order: Ints, table: Floats, who: Ints, found: Fl
     return len(order), count
 
 
-@kernel
-def _touch(dx: float, dy: float, wx: float, wy: float, one: Floats, other: Floats) -> tuple[float, float, float]:
-    """Time until two rectangles touch, inf if they never do or overlap already, and the normal along which they do."""
+@inlined
+def _touch(dx: float, dy: float, wx: float, wy: float, table: Floats, i: int, j: int) -> tuple[float, float, float]:
+    """Time until rectangles i and j touch, inf if they never do or overlap already, and the normal along which they do.
+
+    Between their middles lies (dx, dy), and j moves with (wx, wy) as i sees it.
+    """
     begin, end, nx, ny = -np.inf, np.inf, 0.0, 0.0
     apart = False
     for side in range(4):
-        e = one if side < 2 else other
-        x, y = (e[EX], e[EY]) if side % 2 == 0 else (-e[EY], e[EX])
+        own = i if side < 2 else j
+        x, y = (table[own, EX], table[own, EY]) if side % 2 == 0 else (-table[own, EY], table[own, EX])
         half = 0.0
-        for its in (one, other):
-            along, across = abs(its[EX] * x + its[EY] * y), abs(its[EX] * y - its[EY] * x)
-            half += along * its[LENGTH] / 2 + across * its[WIDTH] / 2
+        for its in (i, j):
+            ex, ey = table[its, EX], table[its, EY]
+            half += abs(ex * x + ey * y) * table[its, LENGTH] / 2 + abs(ex * y - ey * x) * table[its, WIDTH] / 2
         d, rate = dx * x + dy * y, wx * x + wy * y
         apart |= abs(d) > half
         if rate == 0:

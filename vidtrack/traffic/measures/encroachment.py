@@ -24,7 +24,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import by_number
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.measures.bodies import EX, EY, LENGTH, WIDTH, Bodies, Encounters, T, X, Y, touching_place
 
 PET_S = 5.0
@@ -139,16 +139,16 @@ def _legs(begin: Ints, rectangle: Floats) -> Floats:
     """(L, 10) boxes, times and headings of legs: columns LEFT..."""
     leg = np.empty((len(begin) - 1, SIN_TURNED + 1))
     for k in range(len(leg)):
-        now, first = leg[k], rectangle[begin[k]]
+        now, first = leg[k], begin[k]
         now[LEFT], now[LOW], now[RIGHT], now[HIGH] = np.inf, np.inf, -np.inf, -np.inf
-        now[BEGIN], now[END] = first[T], rectangle[begin[k + 1] - 1, T]
-        now[AHEAD_X], now[AHEAD_Y] = first[EX], first[EY]
+        now[BEGIN], now[END] = rectangle[first, T], rectangle[begin[k + 1] - 1, T]
+        now[AHEAD_X], now[AHEAD_Y] = rectangle[first, EX], rectangle[first, EY]
         least = 1.0
         for i in range(begin[k], begin[k + 1]):
-            x, y, across, up = _extent(rectangle[i])
+            x, y, across, up = _extent(rectangle, i)
             now[LEFT], now[RIGHT] = min(now[LEFT], x - across), max(now[RIGHT], x + across)
             now[LOW], now[HIGH] = min(now[LOW], y - up), max(now[HIGH], y + up)
-            least = min(least, _cosine(first, rectangle[i]))
+            least = min(least, _cosine(rectangle, first, i))
         now[COS_TURNED], now[SIN_TURNED] = least, np.sqrt(max(1 - least * least, 0.0))
     return leg
 
@@ -171,12 +171,12 @@ def look(
             other = order[b]
             if life[other, BEGIN] > life[one, END] + PET_S:
                 break
-            if not _boxes_meet(life[one], life[other]):
+            if not _boxes_meet(life, one, life, other):
                 continue
             if count == len(rows):
                 return a, before
             legs = first[one], first[one + 1], first[other], first[other + 1]
-            i, j = _nearest(*legs, life[one], leg, begin, rectangle, since, until)
+            i, j = _nearest(*legs, life, one, leg, begin, rectangle, since, until)
             if i >= 0:
                 rows[count, 0], rows[count, 1] = i, j
                 count += 1
@@ -185,16 +185,16 @@ def look(
 
 @kernel
 def _nearest(
-    one: int, one_end: int, other: int, other_end: int, hull: Floats, leg: Floats, begin: Ints, rectangle: Floats,
-    since: float, until: float,
+    one: int, one_end: int, other: int, other_end: int, life: Floats, whole: int, leg: Floats, begin: Ints,
+    rectangle: Floats, since: float, until: float,
 ) -> tuple[int, int]:  # fmt: skip
     """Of the legs of two tracks the rows, nearest in time, whose rectangles overlap; -1 where there are none.
 
-    The later row is not before `since`, and before `until`. `hull` is the box around all legs of the first track.
+    The later row is not before `since`, and before `until`. Row `whole` of life is the first track.
     """
     best, first, second = PET_S, -1, -1
     for b in range(other, other_end):
-        if not _boxes_meet(hull, leg[b]):
+        if not _boxes_meet(life, whole, leg, b):
             continue
         while one < one_end and leg[one, END] < leg[b, BEGIN] - best:
             one += 1
@@ -203,14 +203,14 @@ def _nearest(
                 break
             if max(leg[a, END], leg[b, END]) < since or max(leg[a, BEGIN], leg[b, BEGIN]) >= until:
                 continue
-            if not _boxes_meet(leg[a], leg[b]) or not _crossing(leg[a], leg[b]):
+            if not _boxes_meet(leg, a, leg, b) or not _crossing(leg, a, b):
                 continue
             low = begin[a]
             for j in range(begin[b], begin[b + 1]):
                 t = rectangle[j, T]
                 while low < begin[a + 1] and rectangle[low, T] < t - best:
                     low += 1
-                if not _in_box(rectangle[j], leg[a]):
+                if not _in_box(rectangle, j, leg, a):
                     continue
                 for i in range(low, begin[a + 1]):
                     if rectangle[i, T] > t + best:
@@ -220,7 +220,7 @@ def _nearest(
                         continue
                     if not since <= max(t, rectangle[i, T]) < until:
                         continue
-                    if not _aligned(rectangle[i], rectangle[j]) and _overlap(rectangle[i], rectangle[j]):
+                    if not _aligned(rectangle, i, j) and _overlap(rectangle, i, j):
                         best, first, second = wait, i, j
     return first, second
 
@@ -230,86 +230,84 @@ def _follows(first: Ints, second: Ints, track: Ints, rectangle: Floats) -> Mask:
     """(E,) whether the vehicle of row `second`, a length or PET_S earlier, is on the way of that of `first` already."""
     follows = np.zeros(len(first), np.bool_)
     for k in range(len(first)):
-        i, at, then = first[k], second[k], rectangle[second[k]]
-        while _distance(rectangle[at], then) < then[LENGTH] and _before(at, track, rectangle, then[T] - PET_S):
+        i, at = first[k], second[k]
+        x, y, length, since = rectangle[at, X], rectangle[at, Y], rectangle[at, LENGTH], rectangle[at, T] - PET_S
+        while at > 0 and track[at - 1] == track[at] and rectangle[at - 1, T] > since:
+            if np.sqrt((rectangle[at, X] - x) ** 2 + (rectangle[at, Y] - y) ** 2) >= length:
+                break
             at -= 1
-        while _before(i, track, rectangle, rectangle[at, T] - PET_S):
+        since, until = rectangle[at, T] - PET_S, rectangle[at, T] + PET_S
+        while i > 0 and track[i - 1] == track[i] and rectangle[i - 1, T] > since:
             i -= 1
-        while i < len(track) and track[i] == track[first[k]] and rectangle[i, T] < rectangle[at, T] + PET_S:
-            if _aligned(rectangle[i], rectangle[at]) and _overlap(rectangle[i], rectangle[at]):
+        ex, ey = rectangle[at, EX], rectangle[at, EY]
+        while i < len(track) and track[i] == track[first[k]] and rectangle[i, T] < until:
+            aligned = rectangle[i, EX] * ex + rectangle[i, EY] * ey > _FOLLOWS
+            if aligned and _overlap(rectangle, i, at):
                 follows[k] = True
                 break
             i += 1
     return follows
 
 
-@kernel
-def _before(row: int, track: Ints, rectangle: Floats, since: float) -> bool:
-    """Whether there is a row of the same track before it, and after a time."""
-    return row > 0 and track[row - 1] == track[row] and rectangle[row - 1, T] > since
+@inlined
+def _boxes_meet(one: Floats, a: int, other: Floats, b: int) -> bool:
+    across = one[a, LEFT] <= other[b, RIGHT] and other[b, LEFT] <= one[a, RIGHT]
+    return across and one[a, LOW] <= other[b, HIGH] and other[b, LOW] <= one[a, HIGH]
 
 
-@kernel
-def _boxes_meet(one: Floats, other: Floats) -> bool:
-    across = one[LEFT] <= other[RIGHT] and other[LEFT] <= one[RIGHT]
-    return across and one[LOW] <= other[HIGH] and other[LOW] <= one[HIGH]
+@inlined
+def _in_box(rectangle: Floats, i: int, leg: Floats, a: int) -> bool:
+    """Whether rectangle i may meet those of leg a."""
+    x, y, across, up = _extent(rectangle, i)
+    beside = leg[a, LEFT] <= x + across and x - across <= leg[a, RIGHT]
+    return beside and leg[a, LOW] <= y + up and y - up <= leg[a, HIGH]
 
 
-@kernel
-def _in_box(one: Floats, leg: Floats) -> bool:
-    """Whether a rectangle may meet those of a leg."""
-    x, y, across, up = _extent(one)
-    beside = leg[LEFT] <= x + across and x - across <= leg[RIGHT]
-    return beside and leg[LOW] <= y + up and y - up <= leg[HIGH]
-
-
-@kernel
-def _crossing(one: Floats, other: Floats) -> bool:
+@inlined
+def _crossing(leg: Floats, a: int, b: int) -> bool:
     """Whether the headings of two legs may differ by CROSSING_RAD."""
-    cos = one[COS_TURNED] * other[COS_TURNED] - one[SIN_TURNED] * other[SIN_TURNED]
-    sin = one[SIN_TURNED] * other[COS_TURNED] + one[COS_TURNED] * other[SIN_TURNED]
-    if min(one[COS_TURNED], other[COS_TURNED], cos) <= _FOLLOWS:
+    cos_a, sin_a, cos_b, sin_b = leg[a, COS_TURNED], leg[a, SIN_TURNED], leg[b, COS_TURNED], leg[b, SIN_TURNED]
+    cos, sin = cos_a * cos_b - sin_a * sin_b, sin_a * cos_b + cos_a * sin_b
+    if min(cos_a, cos_b, cos) <= _FOLLOWS:
         return True  # both together turn so much
-    cosine = one[AHEAD_X] * other[AHEAD_X] + one[AHEAD_Y] * other[AHEAD_Y]
+    cosine = leg[a, AHEAD_X] * leg[b, AHEAD_X] + leg[a, AHEAD_Y] * leg[b, AHEAD_Y]
     return cosine <= _FOLLOWS * cos + _ACROSS * sin
 
 
-@kernel
-def _extent(one: Floats) -> tuple[float, float, float, float]:
+@inlined
+def _extent(rectangle: Floats, i: int) -> tuple[float, float, float, float]:
     """The middle of a rectangle, and how far it reaches from there along x and y."""
-    along, across = abs(one[EX]), abs(one[EY])
+    along, across = abs(rectangle[i, EX]), abs(rectangle[i, EY])
+    length, width = rectangle[i, LENGTH], rectangle[i, WIDTH]
     return (
-        *(one[X], one[Y]),
-        (one[LENGTH] * along + one[WIDTH] * across) / 2,
-        (one[LENGTH] * across + one[WIDTH] * along) / 2,
+        *(rectangle[i, X], rectangle[i, Y]),
+        (length * along + width * across) / 2,
+        (length * across + width * along) / 2,
     )
 
 
-@kernel
-def _distance(one: Floats, other: Floats) -> float:
-    return np.sqrt((one[X] - other[X]) ** 2 + (one[Y] - other[Y]) ** 2)
-
-
-@kernel
-def _cosine(one: Floats, other: Floats) -> float:
+@inlined
+def _cosine(rectangle: Floats, i: int, j: int) -> float:
     """Of the angle between two headings."""
-    return one[EX] * other[EX] + one[EY] * other[EY]
+    return rectangle[i, EX] * rectangle[j, EX] + rectangle[i, EY] * rectangle[j, EY]
 
 
-@kernel
-def _aligned(one: Floats, other: Floats) -> bool:
-    return _cosine(one, other) > _FOLLOWS
+@inlined
+def _aligned(rectangle: Floats, i: int, j: int) -> bool:
+    return _cosine(rectangle, i, j) > _FOLLOWS
 
 
-@kernel
-def _overlap(one: Floats, other: Floats) -> bool:
+@inlined
+def _overlap(rectangle: Floats, i: int, j: int) -> bool:
     """Whether two rectangles overlap: along the normal of every edge."""
-    dx, dy = other[X] - one[X], other[Y] - one[Y]
-    cos, sin = abs(_cosine(one, other)), abs(one[EX] * other[EY] - one[EY] * other[EX])
-    for own, its in ((one, other), (other, one)):
-        along, across = abs(dx * own[EX] + dy * own[EY]), abs(dx * own[EY] - dy * own[EX])
-        if 2 * along > own[LENGTH] + its[LENGTH] * cos + its[WIDTH] * sin:
+    dx, dy = rectangle[j, X] - rectangle[i, X], rectangle[j, Y] - rectangle[i, Y]
+    cos = abs(_cosine(rectangle, i, j))
+    sin = abs(rectangle[i, EX] * rectangle[j, EY] - rectangle[i, EY] * rectangle[j, EX])
+    for own, its in ((i, j), (j, i)):
+        ex, ey, length, width = rectangle[own, EX], rectangle[own, EY], rectangle[its, LENGTH], rectangle[its, WIDTH]
+        along, across = abs(dx * ex + dy * ey), abs(dx * ey - dy * ex)
+        if 2 * along > rectangle[own, LENGTH] + length * cos + width * sin:
             return False
-        if 2 * across > own[WIDTH] + its[LENGTH] * sin + its[WIDTH] * cos:
+        if 2 * across > rectangle[own, WIDTH] + length * sin + width * cos:
             return False
     return True

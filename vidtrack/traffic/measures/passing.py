@@ -14,7 +14,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.rows import Rows
 
@@ -276,7 +276,7 @@ def _look(
     return len(track), count
 
 
-@kernel
+@inlined
 def _met(
     x0: float, y0: float, x: float, y: float, segment: Floats, begin: Floats, first: int, end: int
 ) -> tuple[int, float, float]:
@@ -298,7 +298,7 @@ def _met(
     return (-1 if net == 0 else int(net > 0)), share, along
 
 
-@kernel
+@inlined
 def _distance(x: float, y: float, segment: Floats, first: int, end: int) -> float:
     """Distance of a point from a gate."""
     nearest = np.inf  # its square
@@ -310,7 +310,7 @@ def _distance(x: float, y: float, segment: Floats, first: int, end: int) -> floa
     return np.sqrt(nearest)
 
 
-@kernel
+@inlined
 def _note(passing: Floats, now: Floats, before: Floats, share: float) -> None:
     """Write down the values between two rows; where one of them has none, those of the other."""
     for value, at in ((_T, TIME), (_SIGMA, SIGMA), (_SPEED, SPEED), (_SPEED_SIGMA, SPEED_SIGMA),

@@ -144,9 +144,9 @@ class Reader:
             if ground is not None and "x_m" not in wanted:
                 road = roads.setdefault(recording.session, Footprints(ground, recording.size))
             pictures = whole_pictures(blocks(recording.folder, wanted), recording.folder)
-            with closing(ReadAhead(pictures, depth=1)) as tables:
-                for table in tables:
-                    yield self._rows(table, recording, ground, road)
+            ready = (self._rows(table, recording, ground, road) for table in pictures)
+            with closing(ReadAhead(ready, depth=1)) as ahead:
+                yield from ahead
 
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
         column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
@@ -167,7 +167,7 @@ class Reader:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         box = _box(column)
         at_border = np.where(cut(box, recording.size)[:, None], box, np.nan)
-        rows = _on_road(ground, column, track, t, seen, merged, edge, at_border)
+        rows = _on_road(ground, column, track, t, seen, merged, box, edge, at_border)
         make_room(self._latest, len(self._numbers), np.nan)
         _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
         return rows
@@ -193,7 +193,7 @@ class LiveReader:
         """The rows of the next table; vehicles without a place are carried as in `Reader`."""
         column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
         track, t, unknown = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
-        rows = _on_road(self._ground, column, track, t, *states(table), unknown, unknown)
+        rows = _on_road(self._ground, column, track, t, *states(table), _box(column), unknown, unknown)
         if len(t) == 0:
             return rows
         ids, number = np.unique(track, return_inverse=True)
@@ -221,6 +221,7 @@ def _on_road(
     t: Floats,
     seen: Mask,
     merged: Mask,
+    box: Floats,
     edge: Floats,
     at_border: Floats,
 ) -> Rows:
@@ -230,7 +231,6 @@ def _on_road(
         *(column[name] for name in ("x_m", "y_m", "sigma_x_m", "sigma_y_m", "corr_xy_m", "heading_deg", "length_m")),
         speed,
     )
-    box = _box(column)
     _place_roughly(ground, box, xy, sigma)
     hidden, state = partly_hidden(t, box, merged), (xy, sigma, margin, v, speed, own, shared)
     sides = column["length_m"], column["length_sigma_m"], column["width_m"]

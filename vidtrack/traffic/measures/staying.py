@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.measures.rows import Rows
@@ -191,7 +191,7 @@ def _look(
     return len(t), count
 
 
-@kernel
+@inlined
 def _drives_in(box: Floats, before: Floats) -> bool:
     """Whether an edge of a box (4,) that the border cuts has moved since before; the border holds one in its place."""
     if np.isnan(box[0]) or np.isnan(before[0]):
@@ -204,7 +204,7 @@ def _drives_in(box: Floats, before: Floats) -> bool:
     return False
 
 
-@kernel
+@inlined
 def _inside(x: float, y: float, side: Floats, first: int, end: int) -> bool:
     """Whether a point is in a polygon: a ray to the right meets its sides an odd number of times."""
     inside = False

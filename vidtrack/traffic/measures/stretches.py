@@ -19,7 +19,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 from vidtrack.traffic.lengths import add_lengths, mean_length
 from vidtrack.traffic.measures.rows import Rows
 
@@ -223,21 +223,21 @@ def _follow(
     return count
 
 
-@kernel
+@inlined
 def _copy(source: Floats, i: int, to: Floats, j: int) -> None:
     """Write the state in a row of one table into a row of another."""
     for column in range(9):
         to[j, column] = source[i, column]
 
 
-@kernel
+@inlined
 def _begin(state: Floats, i: int, t: float, x: float, y: float, variance: float) -> None:
     """Write the state of a vehicle of which one row is known."""
     state[i, T], state[i, X], state[i, Y], state[i, VX], state[i, VY] = t, x, y, 0.0, 0.0
     state[i, PXX], state[i, PXV], state[i, PVV], state[i, LASTING] = variance, 0.0, _FIRST_M_S**2, variance
 
 
-@kernel
+@inlined
 def _ahead(state: Floats, i: int, t: float) -> tuple[float, float, float, float, float]:
     """Position, and the variances of each axis, at a later time."""
     dt, vx, vy = t - state[i, T], state[i, VX], state[i, VY]
@@ -247,7 +247,7 @@ def _ahead(state: Floats, i: int, t: float) -> tuple[float, float, float, float,
     return state[i, X] + dt * vx, state[i, Y] + dt * vy, xx, xv, state[i, PVV] + jolt * dt
 
 
-@kernel
+@inlined
 def _step(state: Floats, i: int, t: float, x: float, y: float, variance: float) -> float:
     """Predict and update with a row, unless it is far off; returns its squared distance."""
     px, py, xx, xv, vv = _ahead(state, i, t)
@@ -263,7 +263,7 @@ def _step(state: Floats, i: int, t: float, x: float, y: float, variance: float) 
     return distance
 
 
-@kernel
+@inlined
 def _write_back(state: Floats, i: int, t: float, begun: Floats, j: int) -> None:
     """Write the state at an earlier time, at the same velocity, into a row of another table."""
     dt = t - state[i, T]
@@ -275,7 +275,7 @@ def _write_back(state: Floats, i: int, t: float, begun: Floats, j: int) -> None:
     begun[j, PXV] += dt * state[i, PVV]
 
 
-@kernel
+@inlined
 def _apart(state: Floats, i: int, second: Floats, j: int) -> float:
     """Squared distance of the second state from where the first one leads to."""
     px, py, xx, xv, vv = _ahead(state, i, second[j, T])

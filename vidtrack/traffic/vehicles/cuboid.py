@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from vidtrack.arrays.types import Floats
-from vidtrack.compiled import inlined, kernel
+from vidtrack.compiled import inlined
 
 LEFT, TOP, RIGHT, BOTTOM = range(4)
 X, Y, LENGTH, WIDTH, HEIGHT = range(5)
 
 
-@kernel
+@inlined
 def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_state: Floats) -> float:
     """Write the edges (4,) px of the box of a cuboid and their derivatives (4, 5); returns px per metre there.
 
@@ -24,9 +24,9 @@ def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_
     Edges are NaN where a corner lies behind the camera.
     """
     x, y, length, width, height = state[X], state[Y], state[LENGTH], state[WIDTH], state[HEIGHT]
-    u, u_ahead, u_left = _seen(G[0], x, y, e)
-    v, v_ahead, v_left = _seen(G[1], x, y, e)
-    w, w_ahead, w_left = _seen(G[2], x, y, e)
+    u, u_ahead, u_left = _seen(G, 0, x, y, e)
+    v, v_ahead, v_left = _seen(G, 1, x, y, e)
+    w, w_ahead, w_left = _seen(G, 2, x, y, e)
     if w - abs(w_ahead) * length / 2 - abs(w_left) * width / 2 + min(height * up[2], 0.0) <= 0:
         edge[:] = np.nan
         return 0.0
@@ -58,9 +58,10 @@ def box_edges(G: Floats, up: Floats, state: Floats, e: Floats, edge: Floats, by_
 
 
 @inlined
-def _seen(row: Floats, x: float, y: float, e: Floats) -> tuple[float, float, float]:
-    """A coordinate of a point of the road, and what a metre along e and to its left adds; `row` (3,) is G's."""
-    return row[0] * x + row[1] * y + row[2], row[0] * e[0] + row[1] * e[1], row[1] * e[0] - row[0] * e[1]
+def _seen(G: Floats, row: int, x: float, y: float, e: Floats) -> tuple[float, float, float]:
+    """A coordinate of a point of the road, by a row of G, and what a metre along e and to its left adds."""
+    by_x, by_y = G[row, 0], G[row, 1]
+    return by_x * x + by_y * y + G[row, 2], by_x * e[0] + by_y * e[1], by_y * e[0] - by_x * e[1]
 
 
 @inlined

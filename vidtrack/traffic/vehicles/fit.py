@@ -208,7 +208,7 @@ def _dot(a: Floats, i: int, b: Floats, j: int) -> float:
     return a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j] + a[3, i] * b[3, j]
 
 
-@kernel
+@inlined
 def _bending(t: Floats, k: int, c: Floats) -> None:
     """Write the factors (3,) of the places k - 1, k, k + 1 in the change of velocity there, in standard deviations."""
     before, after = t[k] - t[k - 1], t[k + 1] - t[k]

@@ -8,7 +8,7 @@ import numpy as np
 
 from vidtrack.arrays.rows import by_number, make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
-from vidtrack.compiled import kernel
+from vidtrack.compiled import inlined, kernel
 
 STEP_S, STEP_M = 0.2, 0.5
 """A knot ends when it has lasted so long and the vehicle has moved so far: one that stands makes no knots."""
@@ -82,19 +82,19 @@ class Knotting:
         self._done.append((who.astype(np.int32), done[:, 0].copy(), done[:, 1:].astype(np.float32)))
 
 
-@kernel
-def _mean(knot: Floats, done: Floats) -> None:
-    """Write a knot (COLUMNS,) as mean time, four mean edges, rows (6,)."""
-    done[0] = knot[_TIME] / knot[_ROWS]
+@inlined
+def _mean(knots: Floats, k: int, done: Floats, i: int) -> None:
+    """Write knot k (T, COLUMNS) into row i (K, 6): mean time, four mean edges, rows."""
+    done[i, 0] = knots[k, _TIME] / knots[k, _ROWS]
     for side in range(4):
-        done[1 + side] = knot[_EDGE + side] / knot[_SEEN + side]  # 0 / 0: never seen
-    done[5] = knot[_ROWS]
+        done[i, 1 + side] = knots[k, _EDGE + side] / knots[k, _SEEN + side]  # 0 / 0: never seen
+    done[i, 5] = knots[k, _ROWS]
 
 
 @kernel
 def _means(knots: Floats, done: Floats) -> None:
     for i in range(len(knots)):
-        _mean(knots[i], done[i])
+        _mean(knots, i, done, i)
 
 
 @kernel
@@ -104,23 +104,23 @@ def _gather(track: Ints, t: Floats, xy: Floats, edge: Floats, open_: Floats, who
     for i in range(len(track)):
         if np.isnan(edge[i, 3]) or np.isnan(xy[i, 0]):
             continue
-        knot = open_[track[i]]
+        k = track[i]
         if (
-            knot[_ROWS] > 0
-            and t[i] - knot[_BEGIN] >= STEP_S
-            and (xy[i, 0] - knot[_X]) ** 2 + (xy[i, 1] - knot[_Y]) ** 2 >= STEP_M**2
+            open_[k, _ROWS] > 0
+            and t[i] - open_[k, _BEGIN] >= STEP_S
+            and (xy[i, 0] - open_[k, _X]) ** 2 + (xy[i, 1] - open_[k, _Y]) ** 2 >= STEP_M**2
         ):
-            _mean(knot, done[count])
-            who[count] = track[i]
+            _mean(open_, k, done, count)
+            who[count] = k
             count += 1
-            knot[_ROWS] = 0
-        if not knot[_ROWS] > 0:
-            knot[:] = 0
-            knot[_BEGIN], knot[_X], knot[_Y] = t[i], xy[i, 0], xy[i, 1]
-        knot[_TIME] += t[i]
-        knot[_ROWS] += 1
+            open_[k, _ROWS] = 0
+        if not open_[k, _ROWS] > 0:
+            open_[k] = 0
+            open_[k, _BEGIN], open_[k, _X], open_[k, _Y] = t[i], xy[i, 0], xy[i, 1]
+        open_[k, _TIME] += t[i]
+        open_[k, _ROWS] += 1
         for side in range(4):
             if not np.isnan(edge[i, side]):
-                knot[_EDGE + side] += edge[i, side]
-                knot[_SEEN + side] += 1
+                open_[k, _EDGE + side] += edge[i, side]
+                open_[k, _SEEN + side] += 1
     return count
