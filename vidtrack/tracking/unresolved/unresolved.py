@@ -130,7 +130,7 @@ class Unresolved:
         for members, joint in after:
             self.correlations.keep(register.id[members], joint, bank.P[members, :s, :s])
 
-    def parts(self, register: Register, bank: Estimator, t: float) -> Mask:
+    def parts(self, register: Register, bank: Estimator, t: float, ending: Mask) -> Mask:
         """(T,) none: each is a target."""
         return np.zeros(len(register), bool)
 
