@@ -255,16 +255,15 @@ def test_a_miss_of_what_may_stand_is_a_mixture_by_the_probability_of_a_miss(bank
     assert filters.P[0, 1, 1] == pytest.approx(variance, rel=1e-3)
 
 
-def test_how_probably_a_row_stands_is_expected_over_the_error_of_its_velocity():
+def test_how_probably_a_row_stands_is_expected_over_its_range_rate_and_by_how_its_cross_speed_fits():
     filters = vt.KalmanBank(vt.ConstantVelocity())
-    mean, cov = np.array([0.5, -0.8]), np.array([[1.0, 0.3], [0.3, 2.0]])
-    P = np.eye(4)
-    P[1::2, 1::2] = cov
-    filters.insert(np.array([[30.0, mean[0], 0.0, mean[1]]]), P[None], np.ones(1))
+    P = np.diag([1e-9, 1.0, 1e-9, 2.0])
+    filters.insert(np.array([[30.0, 0.5, 0.0, -0.8]]), P[None], np.ones(1))
     zone = too_slow((0.0, 0.0), 1.0)
-    v = np.random.default_rng(0).multivariate_normal(mean, cov, 200_000)
-    expected = 0.98 * np.exp(-(v**2).sum(axis=1) / (2 * zone.sigma**2)).mean()
-    assert zone.stands(filters)[0] == pytest.approx(expected, rel=0.02)
+    v = np.linspace(-10, 10, 20001)
+    missed = np.average(np.exp(-(v**2) / (2 * zone.sigma**2)), weights=np.exp(-((v - 0.5) ** 2) / 2))
+    expected = 0.98 * missed * np.exp(-(0.8**2) / (2 * (2 + zone.sigma**2)))
+    assert zone.stands(filters)[0] == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("bank", [vt.KalmanBank, vt.UnscentedBank])

@@ -23,16 +23,17 @@ LEFT = 0.02
 class BlindZone:
     """Targets that are not detected where a quantity h of theirs is near zero, as slow ones by a Doppler filter.
 
-    A target is detected with probability P (1 - b), b = (1 - LEFT) exp(-h^2 / (2 sigma^2)). A miss tells how it moves
-    (W. Koch, "On exploiting 'negative' sensor evidence for target tracking and sensor data fusion", Information
-    Fusion 8(1), 2007): one of velocity v that is missed may be one that stands. The state after a miss is a mixture of
-    the state before, with the likelihood 1 - P, and that after a measurement of v = 0 with error sigma on each axis,
-    with
+    A target is detected with probability P (1 - b), b = (1 - LEFT) exp(-h^2 / (2 sigma^2)), so that a miss has the
+    likelihood (1 - P) + P b (W. Koch, "On exploiting 'negative' sensor evidence for target tracking and sensor data
+    fusion", Information Fusion 8(1), 2007). One that is missed because h is near zero stands or moves across the line
+    of sight. It is taken to stand as well as its velocity v, of covariance V, agrees with that: the state after the
+    miss is a mixture of the state before, with the likelihood 1 - P, and that after a measurement of v = 0 with error
+    sigma on each axis, with P times
 
-        P (1 - LEFT) E[exp(-v'v / (2 sigma^2))]
+        (1 - LEFT) E[exp(-h^2 / (2 sigma^2))] exp(-v_c^2 / (2 (V_c + sigma^2))),
 
-    over the error of v. This is next to nothing for a target that is known to move across the line of sight, though b
-    is not, and for one whose velocity nobody knows, as that of a track of one plot.
+    v_c across the line of sight. This is next to nothing for a target that is known to move across, though b is not,
+    and for one whose velocity nobody knows, as that of a track of one plot.
 
     sensor  measurement model of h, one component
     sigma   in the units of h, m/s
@@ -51,11 +52,14 @@ class BlindZone:
         return np.asarray((1 - LEFT) * np.exp(-(zhat[:, 0] ** 2) / (2 * self.sigma**2)))
 
     def stands(self, bank: Estimator) -> Floats:
-        """(T,) (1 - LEFT) E[exp(-v'v / (2 sigma^2))] of the rows."""
+        """(T,) how probable it is that rows are missed because they stand.
+
+        With S the variance of h, (1 - LEFT) sigma / sqrt(sigma^2 + S) exp(-v' (V + sigma^2 I)^-1 v / 2).
+        """
+        _, S = bank.predicted_measurement(self.sensor)
         v, V = bank.predicted_measurement(VELOCITY)
-        spread = np.eye(v.shape[1]) + V / self.sigma**2
-        distance = np.einsum("ti,tij,tj->t", v, np.linalg.inv(spread), v) / self.sigma**2
-        return np.asarray((1 - LEFT) * np.exp(-distance / 2) / np.sqrt(np.linalg.det(spread)))
+        distance = np.einsum("ti,tij,tj->t", v, np.linalg.inv(V + self.sigma**2 * np.eye(v.shape[1])), v)
+        return np.asarray((1 - LEFT) * np.exp(-distance / 2) / np.sqrt(1 + S[:, 0, 0] / self.sigma**2))
 
     def update(self, bank: Estimator, t: float, missed: Floats, detection: Floats, since: float = 0.0) -> None:
         """Update the rows of a bank by a scan at t [s] that missed them with these probabilities (T,).
