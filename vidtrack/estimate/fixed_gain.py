@@ -44,7 +44,7 @@ class FixedGainBank(KalmanBank):
         return x, P
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows: x + K v with the steady-state gain K, which is that of positions: what misses tell is left."""
+        """Successor rows: x + K v with the steady-state gain K of positions; what misses tell is left."""
         if not decision.shows:
             self.keep(decision.parent)
             return
