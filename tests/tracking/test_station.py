@@ -10,6 +10,7 @@ from scipy.linalg import expm
 import vidtrack as vt
 from vidtrack.decision import Decision
 from vidtrack.estimate.fixed_gain import FixedGainBank
+from vidtrack.estimate.sensor import VELOCITY
 from vidtrack.radar.network.coverage import Sector, too_slow
 from vidtrack.tracking.log_ratio import LogRatio
 from vidtrack.tracking.register import Register
@@ -191,11 +192,22 @@ def test_a_miss_counts_by_its_probability_where_the_station_covers_and_sees_a_ro
     beta0, shared = np.array([1.0, 0.3, 1.0, 1.0, 1.0]), np.array([-1, -1, -1, 0, -1])
     found = SimpleNamespace(shared=shared, decision=SimpleNamespace(beta0=beta0))
     scan = vt.Scan(0.0, np.empty((0, 2)), np.eye(2))
-    sight = stations.sight(scan, filters)
-    stations.miss(scan, found, sight, register, filters, 0.0)
-    there = np.array([0.8, 0.8, 0.4]) * sight.hidden[:3]
+    there = np.array([0.8, 0.8, 0.4]) * zone.stands(filters)[:3]
+    stations.miss(scan, found, stations.sight(scan, filters), register, filters, 0.0)
     beta = beta0[:3] * there / (there + 1 - [0.8, 0.8, 0.4])
     np.testing.assert_allclose(filters.x[:, 1], [*0.8 * (1 - beta / (1 + zone.sigma**2)), 0.8, 0.8])
+
+
+@pytest.mark.parametrize(("inside", "missed"), [(0, {1: [0, 1], 2: [0]}), (1, {1: [0], 2: [1]})])
+def test_what_a_station_sees_of_a_track_holds_for_its_hypotheses(inside, missed):
+    """The first track has two where the station sees it, hit and missed; what is outside is not missed."""
+    station = vt.Station(vt.Rates(0.9, 1e-3), Sector((100.0 * inside, 0.0), 50.0))
+    life = vt.LogRatio(coast_s=5.0)
+    tracker = vt.Tracker(vt.ConstantVelocity(), vt.MHT(), picture=vt.NoPicture(), life=life, stations=[station])
+    tracker.add(0.0, np.array([[0.0, 1.0, 0.0, 0.0], [100.0, 1.0, 0.0, 0.0]]), np.tile(np.eye(4), (2, 1, 1)))
+    tracker.step(vt.Scan(0.1, np.array([[1.5, 1.5]]), np.eye(2)))
+    register = tracker.register
+    assert {track: sorted(register.missed[register.id == track, 0].tolist()) for track in missed} == missed
 
 
 def test_tentative_tracks_are_missed_by_a_station_that_rather_does_not_see_them():
@@ -228,12 +240,12 @@ def test_the_p_d_of_an_association_is_that_of_the_update_after_a_miss():
 
 @pytest.mark.parametrize("bank", [vt.KalmanBank, vt.UnscentedBank])
 @pytest.mark.parametrize("beta0", [1.0, 0.3])
-def test_a_miss_of_what_may_be_blind_is_a_mixture_by_the_probability_of_a_miss(bank, beta0):
+def test_a_miss_of_what_may_stand_is_a_mixture_by_the_probability_of_a_miss(bank, beta0):
     filters = bank(vt.ConstantVelocity())
     filters.insert(np.array([[30.0, 1.5, 0.0, 0.0]]), np.diag([1.0, 1.0, 1e-9, 1e-9])[None], np.ones(1))
     zone = too_slow((0.0, 0.0), 1.0)
-    there = 0.8 * zone.hidden(filters)
-    zone.update(filters, 0.0, np.array([beta0]), np.array([0.8]), zone.hidden(filters))
+    there = 0.8 * zone.stands(filters)
+    zone.update(filters, 0.0, np.array([beta0]), np.array([0.8]))
     beta = beta0 * there[0] / (there[0] + 0.2)
     gain = 1 / (1 + zone.sigma**2)
     slowed = 1.5 * (1 - gain)
@@ -243,14 +255,61 @@ def test_a_miss_of_what_may_be_blind_is_a_mixture_by_the_probability_of_a_miss(b
     assert filters.P[0, 1, 1] == pytest.approx(variance, rel=1e-3)
 
 
-def test_a_miss_of_a_row_that_is_well_known_is_bayes_rule():
+def test_how_probably_a_row_stands_is_expected_over_its_range_rate_and_by_how_its_cross_speed_fits():
     filters = vt.KalmanBank(vt.ConstantVelocity())
+    P = np.diag([1e-9, 1.0, 1e-9, 2.0])
+    filters.insert(np.array([[30.0, 0.5, 0.0, -0.8]]), P[None], np.ones(1))
+    zone = too_slow((0.0, 0.0), 1.0)
+    v = np.linspace(-10, 10, 20001)
+    missed = np.average(np.exp(-(v**2) / (2 * zone.sigma**2)), weights=np.exp(-((v - 0.5) ** 2) / 2))
+    expected = 0.98 * missed * np.exp(-(0.8**2) / (2 * (2 + zone.sigma**2)))
+    assert zone.stands(filters)[0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("bank", [vt.KalmanBank, vt.UnscentedBank])
+def test_a_miss_of_one_that_may_stand_is_bayes_rule(bank):
+    """One that moves only along the line of sight, whose P_D is for v = 0 next to nothing."""
+    filters = bank(vt.ConstantVelocity())
     filters.insert(np.array([[30.0, 1.0, 0.0, 0.0]]), np.diag([1.0, 0.01, 1e-9, 1e-9])[None], np.ones(1))
     zone = too_slow((0.0, 0.0), 1.0)
-    zone.update(filters, 0.0, np.ones(1), np.array([0.8]), zone.hidden(filters))
-    v = np.linspace(0, 2, 20001)  # of the range rate, which here is vx
+    zone.update(filters, 0.0, np.ones(1), np.array([0.8]))
+    v = np.linspace(0, 2, 20001)
     weight = np.exp(-((v - 1) ** 2) / 0.02) * (1 - 0.8 * (1 - 0.98 * 2.0 ** -(v**2)))
     assert filters.x[0, 1] - 1 == pytest.approx(np.average(v, weights=weight) - 1, rel=0.02)
+
+
+def test_a_miss_does_not_stop_what_is_known_to_move_across_the_line_of_sight():
+    filters = vt.KalmanBank(vt.ConstantVelocity())
+    filters.insert(np.array([[30.0, 0.0, 0.0, 10.0]]), 0.25 * np.eye(4)[None], np.ones(1))
+    zone = too_slow((0.0, 0.0), 1.0)
+    assert zone.hidden(filters)[0] == pytest.approx(0.98)
+    zone.update(filters, 0.0, np.ones(1), np.array([0.9]))
+    np.testing.assert_allclose(filters.x, [[30.0, 0.0, 0.0, 10.0]])
+
+
+def test_where_a_vehicle_stands_stays_known_in_all_directions_while_nobody_sees_it():
+    """Told of its range rate only, its place became uncertain across the line of sight, by 14 m in 4 s."""
+    tracks = stopping(until_s=10.0)  # 5.5 s after its last plot
+    error = tracks.xy[0] - [85.0, 5.0]
+    P = tracks.P[0][np.ix_([0, 2], [0, 2])]
+    assert np.sqrt(np.trace(P)) < 5
+    assert error @ np.linalg.solve(P, error) < 9.2  # chi-square of 2, .99
+
+
+@pytest.mark.parametrize("doppler", [True, False])
+def test_a_fast_target_seen_once_and_then_missed_is_one_track(doppler):
+    """Its velocity is not known, so misses do not tell that it stands; else its next plot began another track."""
+    station = vt.Station(vt.Rates(0.6, 1e-5), Sector((0.0, 0.0), 200.0), blind=too_slow((0.0, 0.0), 0.7))
+    tracker = vt.Tracker(
+        vt.ConstantVelocity(accel=2.0, speed=20.0, hold_s=2.0), picture=vt.NoPicture(),
+        life=vt.LogRatio(coast_s=10.0, coast_scans=40), stations=[station],
+    )  # fmt: skip
+    sensor, R = (vt.PositionRangeRate((0.0, 0.0)), np.diag([0.16, 0.16, 0.02])) if doppler else (None, 0.16 * np.eye(2))
+    for k in range(20):
+        x = 10 + 2.5 * k
+        z = np.array([[x, 5.0, 25.0 * x / np.hypot(x, 5.0)]])[: int(k == 0 or k > 3), : len(R)]
+        tracks = tracker.step(vt.Scan(0.1 * k, z, R, sensor))
+    assert tracks.id.tolist() == [1]
 
 
 def test_p_d_of_one_is_no_nan_and_a_miss_is_no_hit():
@@ -258,7 +317,7 @@ def test_p_d_of_one_is_no_nan_and_a_miss_is_no_hit():
     x = np.array([[30.0, v, 0.0, 0.0] for v in (0.0, 3.0, 300.0)])
     filters.insert(x, np.tile(np.eye(4), (3, 1, 1)), np.ones(3))
     zone = too_slow((0.0, 0.0), 1.0)
-    zone.update(filters, 0.0, np.ones(3), np.ones(3), zone.hidden(filters))
+    zone.update(filters, 0.0, np.ones(3), np.ones(3))
     assert np.isfinite(filters.x).all()
     assert np.isfinite(filters.P).all()
     assert filters.x[1, 1] < 2
@@ -271,7 +330,7 @@ def test_what_a_radar_sees_or_is_far_too_fast_for_its_blind_zone_is_left_as_it_i
     filters.insert(np.array([[30.0, 15.0, 0.0, 0.0], [30.0, 0.1, 0.0, 0.0]]), np.tile(np.eye(4), (2, 1, 1)), np.ones(2))
     before = filters.x.copy(), filters.P.copy()
     zone = too_slow((0.0, 0.0), 1.0)
-    zone.update(filters, 0.0, np.array([1.0, 0.0]), np.full(2, 0.9), zone.hidden(filters))
+    zone.update(filters, 0.0, np.array([1.0, 0.0]), np.full(2, 0.9))
     np.testing.assert_array_equal(filters.x, before[0])
     np.testing.assert_array_equal(filters.P, before[1])
 
@@ -281,7 +340,7 @@ def test_what_misses_tell_lasts():
         filters = vt.KalmanBank(vt.ConstantVelocity())
         filters.insert(np.array([[30.0, 0.8, 0.0, 0.0]]), np.eye(4)[None], np.ones(1))
         zone = too_slow((0.0, 0.0), 1.0)
-        zone.update(filters, 0.0, np.ones(1), np.full(1, 0.9), zone.hidden(filters), since)
+        zone.update(filters, 0.0, np.ones(1), np.full(1, 0.9), since)
         return filters.x[0, 1]
 
     assert 0.8 - vx(0.1) < (0.8 - vx(1.0)) / 2
@@ -295,12 +354,11 @@ def test_a_filter_of_fixed_gain_takes_positions_only():
     filters = FixedGainBank(vt.ConstantVelocity(), 1.0)
     filters.insert(np.array([[30.0, 0.5, 0.0, 0.0]]), np.eye(4)[None], np.ones(1))
     zone = too_slow((0.0, 0.0), 1.0)
-    zone.update(filters, 0.0, np.ones(1), np.full(1, 0.9), zone.hidden(filters))
+    zone.update(filters, 0.0, np.ones(1), np.full(1, 0.9))
     np.testing.assert_array_equal(filters.x, [[30.0, 0.5, 0.0, 0.0]])
-    twice = Decision(
-        np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64), np.ones(1), np.array([0.0, 1])
-    )
-    filters.update(twice, vt.Scan(0.0, np.zeros((1, 1)), np.eye(1), zone.sensor), zone.sensor)
+    none, beta0 = np.zeros(1, np.int64), np.array([0.0, 1])
+    twice = Decision(np.zeros(2, np.int64), none, none, np.ones(1), beta0, shows=False)
+    filters.update(twice, vt.Scan(0.0, np.zeros((1, 2)), np.eye(2), VELOCITY), VELOCITY)
     np.testing.assert_array_equal(filters.x, [[30.0, 0.5, 0.0, 0.0]] * 2)
 
 

@@ -44,8 +44,8 @@ class FixedGainBank(KalmanBank):
         return x, P
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows: x + K v with the steady-state gain K, which is that of positions: what is less is left."""
-        if scan.z.shape[1] < self.model.dim:
+        """Successor rows: x + K v with the steady-state gain K of positions; what misses tell is left."""
+        if not decision.shows:
             self.keep(decision.parent)
             return
         R = self.sigma**2 * np.eye(scan.z.shape[1])

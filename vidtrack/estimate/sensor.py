@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.errors import ScanError
 
 
 class Sensor(Protocol):
@@ -69,8 +70,28 @@ class PositionVelocity:
         return z[:, ::2], R[:, ::2, ::2]
 
 
+@dataclass(frozen=True, slots=True)
+class Velocity:
+    """The measurement is the velocity, in the state's coordinates."""
+
+    angles: ClassVar[tuple[int, ...]] = ()
+
+    def h(self, x: Floats, position: tuple[int, ...]) -> Floats:
+        """(T, d) the velocities."""
+        return x.take([column + 1 for column in position], axis=1)
+
+    def H(self, x: Floats, position: tuple[int, ...]) -> Floats:  # noqa: N802
+        """(1, d, n) selection of their columns, the same for all rows."""
+        return _selection(tuple(column + 1 for column in position), x.shape[1])
+
+    def locate(self, z: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """Raises ScanError: it has no place."""
+        raise ScanError("a velocity alone tells no position, so no track begins with one")
+
+
 POSITION = Position()
 POSITION_VELOCITY = PositionVelocity()
+VELOCITY = Velocity()
 
 
 def still(sensor: Sensor) -> Sensor:

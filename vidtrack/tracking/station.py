@@ -192,7 +192,7 @@ class Stations:
         visible = 1.0 if station.visibility is None else register.visible[:, scan.station]
         detection = station.rates.detection(register.run) * sight.covered * visible
         missed = np.where(found.shared < 0, found.decision.beta0, 0.0)
-        station.blind.update(bank, scan.t, missed, detection, sight.hidden, since)
+        station.blind.update(bank, scan.t, missed, detection, since)
 
     def record(
         self, scan: Scan, register: Register, sight: Sight, hit: Mask, sure: Mask, detection: Floats, dt: float
