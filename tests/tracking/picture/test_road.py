@@ -196,16 +196,27 @@ def test_a_picture_that_changes_all_at_once_is_no_swarm():
     assert road.swarm.size == 0.0
 
 
-def test_half_a_second_of_damaged_pictures_is_no_swarm_and_snow_that_begins_then_is():
+@pytest.mark.parametrize("fps", [10, 25, 30, 60])
+@pytest.mark.parametrize("begin_s", [3.0, 5.0])
+def test_half_a_second_of_damaged_pictures_is_no_swarm_and_snow_that_begins_then_is(fps, begin_s):
     """Lost packets leave blocks that begin by the hundred; who comes in after them is a vehicle."""
     road, rng = Road(WIDTH, HEIGHT), np.random.default_rng(0)
-    fall(road.learn, 6, 8.0, seconds=5.0)
-    for k in range(15):
-        blocks = np.column_stack([rng.uniform(0, 200, (40, 2)), np.full((40, 2), 30.0)])
-        road.learn(tracks_of(5 + k / 25, blocks, status=TENTATIVE, age_s=0.0))
+    for k in range(round((begin_s + 5) * fps)):
+        t = k / fps
+        count = 40 if begin_s <= t < begin_s + 0.5 else rng.poisson(8 / fps)
+        boxes = np.column_stack([rng.uniform(0, 200, (count, 2)), np.full((count, 2), 30.0)])
+        road.learn(tracks_of(t, boxes, status=TENTATIVE, age_s=0.0))
         assert road.swarm.size == 0.0
-    fall(road.learn, 100, 8.0, first=6.0, seconds=5.0)
+    fall(road.learn, 100, 8.0, first=begin_s + 5, seconds=6.0)
     assert road.swarm.size > 8.0
+
+
+def test_a_swarm_that_was_saved_without_its_windows_goes_on():
+    road, other = Road(WIDTH, HEIGHT), Road(WIDTH, HEIGHT)
+    fall(road.learn, 100, 8.0)
+    saved = {name: value for name, value in gather(road.swarm).items() if name not in ("_busy_s", "_window")}
+    restore(other.swarm, saved)
+    assert other.swarm.size == road.swarm.size > 0
 
 
 def test_flakes_that_drift_are_not_confirmed_and_a_vehicle_among_them_is():

@@ -99,12 +99,36 @@ def test_who_comes_to_stand_without_a_place_has_it_from_when_it_is_known(tmp_pat
     assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(14 + 4, abs=0.2))
 
 
-def test_who_waits_when_the_watching_ends_is_in_the_queue_of_the_nearest_entry(tmp_path):
+def waiting(*ways):
+    """Tracks that begin at x px, drive by so many px in 2 s, and stand until the watching ends, after 16 s."""
     t = np.arange(400) / 25
-    tracks = [along(n, t, x + 20 * np.clip(t, 0, 2), y) for n, x, y in ((1, 30, 240), (2, 560, 240), (3, 300, 240))]
-    run = write_run(tmp_path / "run", tracks, metres=True)  # before the entry, behind the exit, and between both
-    rows = measured([run], site(CALIBRATED)).tables["queues"].to_pylist()
-    assert [(row["leg"], row["vehicles"], row["end_s"]) for row in rows] == [("west", 1, pytest.approx(t[-1]))]
+    return [along(n, t, x + way * np.clip(t, 0, 2) / 2) for n, (x, way) in enumerate(ways, start=1)]
+
+
+def queued(tmp_path, tracks, tree):
+    """Leg and vehicles of each queue."""
+    rows = measured([write_run(tmp_path / "run", tracks, metres=True)], site(tree)).tables["queues"].to_pylist()
+    return [(row["leg"], row["vehicles"]) for row in rows]
+
+
+def test_who_waits_when_the_watching_ends_is_in_the_queue_of_the_nearest_entry(tmp_path):
+    ways = (5, 60), (560, 60), (300, 60)  # before the entry, behind the exit, and between both
+    assert queued(tmp_path, waiting(*ways), CALIBRATED) == [("west", 1)]
+
+
+def test_who_is_parked_beside_an_entry_waits_for_nothing(tmp_path):
+    assert queued(tmp_path, waiting((65, 0)), CALIBRATED) == []
+
+
+def test_a_gate_that_only_counts_takes_nobody_out_of_a_queue(tmp_path):
+    gates = CALIBRATED["gates"] | {"count": {"line": [[60, 0], [60, 479]]}}
+    assert queued(tmp_path, waiting((5, 60)), CALIBRATED | {"gates": gates}) == [("west", 1)]
+
+
+@pytest.mark.parametrize("line", [[[100, 0], [100, 479]], [[100, 479], [100, 0]]])
+def test_nobody_waits_before_a_gate_whose_inner_side_nothing_tells(tmp_path, line):
+    gates = {"west": {"line": line, "role": "entry"}}
+    assert queued(tmp_path, waiting((5, 60), (200, -60)), CALIBRATED | {"gates": gates}) == []
 
 
 def test_a_row_that_seems_to_stand_makes_no_queue():

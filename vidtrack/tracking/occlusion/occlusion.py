@@ -153,15 +153,16 @@ class Occlusion:
         Merged ones that were hardly ever seen alone and do not split off, and those that go along with a larger one
         that does not end.
         """
-        return self._never_alone(register, t) | self._go_along(register, bank, t, ending)
+        return self._never_alone(register, t, ending) | self._go_along(register, bank, t, ending)
 
-    def _never_alone(self, register: Register, t: float) -> Mask:
+    def _never_alone(self, register: Register, t: float, ending: Mask) -> Mask:
         strange = (register.merged >= 0) & (register.alone_s < self.known_s)
         if not np.count_nonzero(strange):
             return strange
+        alone_s = np.where(ending, -1.0, register.alone_s)  # one that stays is the vehicle
         for number in np.unique(register.merged[strange]):
             together = np.flatnonzero(register.merged == number)
-            strange[together[register.alone_s[together].argmax()]] = False
+            strange[together[alone_s[together].argmax()]] = False
         return strange & (t - register.merged_since_s > self.part_s)
 
     def _go_along(self, register: Register, bank: Estimator, t: float, ending: Mask) -> Mask:

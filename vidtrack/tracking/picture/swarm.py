@@ -20,7 +20,8 @@ _STEEP = 0.7  # most that is left of a pair half an octave on; traffic begins wh
 _FORGET_S = 10.0
 _SOON_S = 3.0  # shortest time that births are taken to have come in: few scans are no swarm
 _AT_ONCE = 30  # births of one scan that count: the picture may change all at once
-_LASTING = 0.25  # share of the remembered time that they take; damaged pictures are over sooner
+_LASTING = 0.25  # share of the remembered time in whose windows there are so many; damaged pictures are over sooner
+_WINDOW_S = 0.2
 _LEAST_PX, _STEPS, _BINS = 1.0, 4, 48  # sizes from 1 px to 4096 px, four bins to a factor of two
 
 
@@ -30,14 +31,19 @@ class Swarm:
     births  (48,) remembered births, by the logarithm of the longer side
     """
 
-    STATE = ("births", "_busy_s", "_time_s", "_watched_s")
-    ADDED: ClassVar = {"_watched_s": lambda swarm: _FORGET_S, "_busy_s": lambda swarm: swarm._watched_s}
+    STATE = ("births", "_time_s", "_watched_s", "_busy_s", "_window")
+    ADDED: ClassVar = {
+        "_watched_s": lambda swarm: _FORGET_S,
+        "_busy_s": lambda swarm: swarm._watched_s,
+        "_window": lambda swarm: (0.0, 0.0),
+    }
 
     def __init__(self) -> None:
         self.births: Floats = np.zeros(_BINS)
         self._time_s = 0.0
         self._watched_s = 0.0  # remembered time
-        self._busy_s = 0.0  # that of scans in which so many began
+        self._busy_s = 0.0  # that of windows in which so many began
+        self._window = 0.0, 0.0  # the last one: its length so far [s], and births
 
     @property
     def size(self) -> float:
@@ -64,8 +70,12 @@ class Swarm:
         new = (tracks.age_s <= 0).nonzero()[0]
         if len(new):
             new = new[pieces(tracks.box[new], tracks.box[tracks.status != TENTATIVE], NEAR) < 0]
+        length_s, births = self._window[0] + dt, self._window[1] + len(new)
+        if length_s >= _WINDOW_S:
+            self._busy_s += length_s * (births >= _SWARM_PER_S * length_s)
+            length_s, births = 0.0, 0.0
+        self._window = length_s, births
         if len(new):
             bins = _STEPS * np.log2(np.maximum(longer(tracks.box[new]), _LEAST_PX) / _LEAST_PX)
             share = min(1.0, _AT_ONCE / len(bins))
-            self._busy_s += dt * (len(new) >= _SWARM_PER_S * dt)
             np.add.at(self.births, np.minimum(bins.astype(np.int64), _BINS - 1), share)

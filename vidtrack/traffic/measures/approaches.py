@@ -1,7 +1,8 @@
 """On their way from which leg vehicles stand: by the gate that they enter by, until they leave.
 
 Who is not seen to enter or to leave, since the watching ends before or its track does, is on the approach of an entry
-if this is the gate that is nearest, and it stands outside.
+if it has come nearer to it, of all entries and exits this is the nearest, and it stands outside. Who stood there from
+the beginning may be parked.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from vidtrack.traffic.measures.trips import Trips
 
 _REACH_M = 60.0
 """m; farthest that an entry may be from who was not seen to enter: a row of eight cars"""
+_NEARER_M = 5.0
+"""m; by which it has come nearer: a car's length"""
 
 
 def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, lives: Lives) -> Ints:
@@ -26,8 +29,9 @@ def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, live
     gate[trips.vehicle[entered]] = passed.gate[trips.entry[entered]]
     left_s[trips.vehicle] = trips.to_s
     xy = np.where(np.isfinite(standing.xy), standing.xy, lives.head.xy[who])
-    nearest, _, far = gates.nearest(xy)
-    waits = gates.role("entry", "both")[nearest] & (far < _REACH_M) & ~gates.within(nearest, xy)
+    nearest, _, far = gates.nearest(xy, among=gates.role("entry", "exit", "both"))
+    came = gates.far(nearest, lives.head.xy[who]) - far > _NEARER_M
+    waits = gates.role("entry", "both")[nearest] & came & (far < _REACH_M) & gates.outside(nearest, xy)
     return np.where(
         np.isin(who, trips.vehicle),
         np.where(standing.begin < left_s[who], gate[who], -1),

@@ -17,6 +17,8 @@ _LENS_STEPS = 8
 """Pieces of a gate's segment on the road where a lens bends it"""
 _NEAR_PX = 0.5
 """px; beside the middle of a gate, to see which side of it lies where on the road"""
+_OFF = 0.05
+"""of a gate's length; so far beside it the middle of all entries and exits must lie to tell its inner side"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,10 +51,7 @@ class Gates:
     @property
     def inward(self) -> Ints:
         """(G,) the side of each gate on which the middle of all entries and exits lies, as `Passed` has it."""
-        gates, meant = np.arange(len(self)), self.role("entry", "exit", "both")
-        ends = self._ends[:, meant]
-        middle = ends.mean(axis=(0, 1)) if meant.any() else np.zeros(2)
-        return self._side(gates, np.broadcast_to(middle, (len(self), 2)))
+        return (self._beside(np.arange(len(self)), self._middle) >= 0).astype(np.int64)
 
     @property
     def length(self) -> Floats:
@@ -98,20 +97,35 @@ class Gates:
         s, n = np.argmin(far, axis=1), np.arange(len(xy))
         return owner[s], self.begin[s] + share[n, s] * np.linalg.norm(step[s], axis=1), far[n, s]
 
-    def within(self, gate: Ints, xy: Floats) -> Mask:
-        """(N,) whether points (N, 2) lie on the inner side of gates (N,)."""
-        return np.asarray(self._side(gate, xy) == self.inward[gate])
+    def far(self, gate: Ints, xy: Floats) -> Floats:
+        """(N,) how far points (N, 2) are from gates (N,)."""
+        found = np.full(len(gate), np.nan)
+        for number in np.unique(gate).tolist():
+            of = gate == number
+            _, _, found[of] = self.nearest(xy[of], among=np.arange(len(self)) == number)
+        return found
+
+    def outside(self, gate: Ints, xy: Floats) -> Mask:
+        """(N,) whether points (N, 2) lie on the outer side of gates (N,); a gate on the middle of all has none."""
+        inner, long = self._beside(gate, self._middle), np.linalg.norm(self._ends[1] - self._ends[0], axis=1)
+        return np.asarray((np.abs(inner) > _OFF * long[gate] ** 2) & (inner * self._beside(gate, xy) < 0))
 
     @property
     def _ends(self) -> Floats:
         """(2, G, 2) the first and the last end of each gate."""
         return np.stack([self.segment[self.first[:-1], :2], self.segment[self.first[1:] - 1, 2:]])
 
-    def _side(self, gate: Ints, xy: Floats) -> Ints:
-        """(N,) the side of the straight line between the ends of gates (N,) on which points (N, 2) lie."""
+    @property
+    def _middle(self) -> Floats:
+        """(2,) the middle of the ends of all entries and exits."""
+        meant = self.role("entry", "exit", "both")
+        return np.asarray(self._ends[:, meant].mean(axis=(0, 1)) if meant.any() else np.zeros(2))
+
+    def _beside(self, gate: Ints, xy: Floats) -> Floats:
+        """(N,) how far points (N, 2) lie beside the straight lines between the ends of gates (N,), times their lengths."""
         start, end = self._ends[:, gate]
         (dx, dy), (x, y) = (end - start).T, (xy - start).T
-        return (dx * y - dy * x >= 0).astype(np.int64)
+        return np.asarray(dx * y - dy * x)
 
     def ways(self, gate: Ints, side: Ints) -> tuple[Mask, Mask]:
         """(N,) whether passings of gates (N,) to a side (N,) enter, and whether they leave."""

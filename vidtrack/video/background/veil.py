@@ -83,27 +83,27 @@ class VeilByPlace:
 
     def air(self, haze: Haze, shape: tuple[int, int]) -> Air:
         """The air at each place of a picture (h, w): that of `haze` where it is not known that more is added."""
-        level, known = self._levels(haze)
+        level = self._levels(haze)
         if self._last is not None:
             before, base, air = self._last
             if base == haze and air.black.shape == shape and np.array_equal(before, level):
                 return air
-        air = _between(level, known, haze, shape) if (level > haze.black).any() else even(haze, shape)
+        air = _between(level, haze, shape) if (level > haze.black).any() else even(haze, shape)
         self._last = level, haze, air
         return air
 
-    def _levels(self, haze: Haze) -> tuple[Floats, Mask]:
-        """Luminance of black in each cell, and whether it is known."""
+    def _levels(self, haze: Haze) -> Floats:
+        """Luminance of black in each cell; where it is not known that of the nearest known cells, if any is."""
         known = self._seen_s > _SEEN_S
         room = max(float(haze.light) - _DARK, 1.0)
         behind = 1 - haze.share * np.clip((self._darkest - _DARK) / room, 0, 1)  # share of the light that comes through
-        return np.where(known, np.maximum(self._darkest - _DARK * behind, haze.black), haze.black), known
+        level = np.where(known, np.maximum(self._darkest - _DARK * behind, haze.black), haze.black)
+        return _filled(level, known) if (level > haze.black).any() else level
 
 
-def _between(level: Floats, known: Mask, haze: Haze, shape: tuple[int, int]) -> Air:
-    """The air of a picture (h, w) between cells with these levels of black, some of which are known."""
-    cells = _filled(level, known).astype(np.float32)
-    black = np.asarray(cv2.resize(cells, shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+def _between(level: Floats, haze: Haze, shape: tuple[int, int]) -> Air:
+    """The air of a picture (h, w) between cells with these levels of black."""
+    black = np.asarray(cv2.resize(level.astype(np.float32), shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
     return Air(black, _spread(black, haze) if haze.share else np.zeros(shape, np.float32))
 
 
