@@ -72,7 +72,7 @@ class PositionVelocity:
 
 @dataclass(frozen=True, slots=True)
 class Velocity:
-    """The measurement is the velocity, in the state's coordinates."""
+    """The measurement is the velocity, in the state's coordinates; it follows each position in the state."""
 
     angles: ClassVar[tuple[int, ...]] = ()
 

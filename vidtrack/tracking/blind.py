@@ -30,10 +30,11 @@ class BlindZone:
     miss is a mixture of the state before, with the likelihood 1 - P, and that after a measurement of v = 0 with error
     sigma on each axis, with P times
 
-        (1 - LEFT) E[exp(-h^2 / (2 sigma^2))] exp(-v_c^2 / (2 (V_c + sigma^2))),
+        (1 - LEFT) sigma / sqrt(sigma^2 + S) exp(-v' (V + sigma^2 I)^-1 v / 2), S the variance of h.
 
-    v_c across the line of sight. This is next to nothing for a target that is known to move across, though b is not,
-    and for one whose velocity nobody knows, as that of a track of one plot.
+    Without correlation between the axes this is (1 - LEFT) E[exp(-h^2 / (2 sigma^2))], times how well the velocity
+    across the line of sight agrees with zero. It is next to nothing for a target that is known to move across, though
+    b is not, and for one whose velocity nobody knows, as that of a track of one plot.
 
     sensor  measurement model of h, one component
     sigma   in the units of h, m/s
@@ -52,10 +53,7 @@ class BlindZone:
         return np.asarray((1 - LEFT) * np.exp(-(zhat[:, 0] ** 2) / (2 * self.sigma**2)))
 
     def stands(self, bank: Estimator) -> Floats:
-        """(T,) how probable it is that rows are missed because they stand.
-
-        With S the variance of h, (1 - LEFT) sigma / sqrt(sigma^2 + S) exp(-v' (V + sigma^2 I)^-1 v / 2).
-        """
+        """(T,) how probable it is that rows are missed because they stand, as above."""
         _, S = bank.predicted_measurement(self.sensor)
         v, V = bank.predicted_measurement(VELOCITY)
         distance = np.einsum("ti,tij,tj->t", v, np.linalg.inv(V + self.sigma**2 * np.eye(v.shape[1])), v)

@@ -99,9 +99,9 @@ def test_who_comes_to_stand_without_a_place_has_it_from_when_it_is_known(tmp_pat
     assert (row["vehicles"], row["length_m"]) == (2, pytest.approx(14 + 4, abs=0.2))
 
 
-def waiting(*ways):
-    """Tracks that begin at x px, drive by so many px in 2 s, and stand until the watching ends, after 16 s."""
-    t = np.arange(400) / 25
+def waiting(*ways, seconds=16):
+    """Tracks that begin at x px, drive by so many px in 2 s, and stand until the watching ends."""
+    t = np.arange(0, seconds, 0.04)
     return [along(n, t, x + way * np.clip(t, 0, 2) / 2) for n, (x, way) in enumerate(ways, start=1)]
 
 
@@ -116,8 +116,15 @@ def test_who_waits_when_the_watching_ends_is_in_the_queue_of_the_nearest_entry(t
     assert queued(tmp_path, waiting(*ways), CALIBRATED) == [("west", 1)]
 
 
-def test_who_is_parked_beside_an_entry_waits_for_nothing(tmp_path):
-    assert queued(tmp_path, waiting((65, 0)), CALIBRATED) == []
+@pytest.mark.parametrize(("seconds", "found"), [(160, [("west", 1)]), (200, [])])
+def test_who_stands_for_longer_than_a_red_light_is_parked(tmp_path, seconds, found):
+    assert queued(tmp_path, waiting((65, 0), seconds=seconds), CALIBRATED) == found
+
+
+@pytest.mark.parametrize(("way", "found"), [((10, 70), [("west", 1)]), ((90, -70), [])])
+def test_who_drives_away_from_a_gate_of_both_roles_does_not_wait_before_it(tmp_path, way, found):
+    gates = CALIBRATED["gates"] | {"west": {"line": [[100, 0], [100, 479]], "role": "both"}}
+    assert queued(tmp_path, waiting(way), CALIBRATED | {"gates": gates}) == found
 
 
 def test_a_gate_that_only_counts_takes_nobody_out_of_a_queue(tmp_path):

@@ -49,6 +49,19 @@ def test_light_is_spread_where_haze_is_dense_and_not_in_glare():
     assert not dense.air(CLEAR, SHAPE).spread.any()
 
 
+def test_the_air_is_that_of_what_is_known_now():
+    """A place next to glare passes for glare until dark vehicles were seen there."""
+    veil = learnt(150, where=np.s_[:, 80:])
+    veil.air(CLEAR, SHAPE)
+    luma, mask = np.full(SHAPE, 30, np.uint8), np.zeros(SHAPE, np.uint8)
+    mask[:, :80] = 255
+    for _ in range(100):
+        veil.learn(luma, mask, 0.04)
+    again = VeilByPlace()
+    restore(again, gather(veil))
+    np.testing.assert_array_equal(veil.air(CLEAR, SHAPE).black, again.air(CLEAR, SHAPE).black)
+
+
 @pytest.mark.parametrize("seconds", [0.0, 1.5])
 def test_a_place_is_unknown_until_traffic_has_been_seen_for_seconds(seconds):
     np.testing.assert_array_equal(learnt(150, seconds).air(CLEAR, SHAPE).black, np.full(SHAPE, BLACK))

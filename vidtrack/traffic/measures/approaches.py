@@ -1,8 +1,8 @@
 """On their way from which leg vehicles stand: by the gate that they enter by, until they leave.
 
 Who is not seen to enter or to leave, since the watching ends before or its track does, is on the approach of an entry
-if it has come nearer to it, of all entries and exits this is the nearest, and it stands outside. Who stood there from
-the beginning may be parked.
+if of all entries and exits this is the nearest, if it stands outside, has not driven away from it, and does not stand
+for so long that it is parked.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ from vidtrack.traffic.measures.trips import Trips
 
 _REACH_M = 60.0
 """m; farthest that an entry may be from who was not seen to enter: a row of eight cars"""
-_NEARER_M = 5.0
-"""m; by which it has come nearer: a car's length"""
+_AWAY_M = 5.0
+"""m; by which who drives away from it is farther than at first: a car's length"""
+_PARKED_S = 180.0
+"""s; who stands for longer is parked: no red light lasts so long"""
 
 
 def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, lives: Lives) -> Ints:
@@ -30,8 +32,9 @@ def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, live
     left_s[trips.vehicle] = trips.to_s
     xy = np.where(np.isfinite(standing.xy), standing.xy, lives.head.xy[who])
     nearest, _, far = gates.nearest(xy, among=gates.role("entry", "exit", "both"))
-    came = gates.far(nearest, lives.head.xy[who]) - far > _NEARER_M
-    waits = gates.role("entry", "both")[nearest] & came & (far < _REACH_M) & gates.outside(nearest, xy)
+    away = far - gates.far(nearest, lives.head.xy[who]) > _AWAY_M
+    parked = standing.end - standing.begin > _PARKED_S
+    waits = gates.role("entry", "both")[nearest] & (far < _REACH_M) & gates.outside(nearest, xy) & ~away & ~parked
     return np.where(
         np.isin(who, trips.vehicle),
         np.where(standing.begin < left_s[who], gate[who], -1),
