@@ -231,7 +231,7 @@ def test_names_that_are_allowed(read, name):
 def test_a_name_that_is_allowed_is_safe_in_every_table(name):
     from pydantic import TypeAdapter, ValidationError
 
-    from vidtrack.traffic.site import Name
+    from vidtrack.traffic.shapes import Name
 
     try:
         TypeAdapter(Name).validate_python(name)

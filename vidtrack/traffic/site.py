@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import (
     AfterValidator,
     AwareDatetime,
@@ -27,52 +24,11 @@ from pydantic import model_validator as whole
 from vidtrack.config.group import Group, parse_toml, read_toml_text
 from vidtrack.errors import ConfigError
 from vidtrack.traffic.epsg import metric_system, refuse_untrue
-from vidtrack.traffic.lengths import apart, bounds
-from vidtrack.traffic.polyline import crosses_itself
+from vidtrack.traffic.lengths import apart
+from vidtrack.traffic.shapes import Bounds, Line, Name, Point, Polygon, Positive, Segment, written
 
-_NAME = re.compile(r"[^\W_][\w .-]{0,63}(?<! )")
 _FARTHEST_M = 1e8
 _ASPECT_PX = 1.0  # what rounding to whole pixels may do to a picture's height
-
-
-def _plain(name: str) -> str:
-    """Names go into tables that spreadsheets and browsers open: nothing in them may be a formula, a cell or a tag."""
-    if not _NAME.fullmatch(name):
-        raise ValueError(
-            "a name begins with a letter or a digit; letters, digits, spaces and . _ - may follow, up to 64 characters"
-        )
-    return name
-
-
-Name = Annotated[str, AfterValidator(_plain)]
-Point = tuple[float, float]
-Positive = Annotated[float, Field(gt=0)]
-Segment = tuple[Point, Point]
-Bounds = Annotated[tuple[float, float], AfterValidator(bounds)]
-
-
-def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    for first, second in pairwise(points):
-        if first == second:
-            raise ValueError(f"the point {_written(first)} stands twice in a row")
-    return points
-
-
-def _path(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    if len(points) < 2:
-        raise ValueError("a line needs at least 2 points")
-    if crosses_itself(np.array(_distinct(points)), closed=False):
-        raise ValueError("the line crosses itself; its sides would have no meaning")
-    return points
-
-
-def _outline(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    points = points[:-1] if points[:1] == points[-1:] else points
-    if len(points) < 3:
-        raise ValueError("a polygon needs at least 3 corners")
-    if crosses_itself(np.array(_distinct(points)), closed=True):
-        raise ValueError("the polygon crosses itself; list its corners in order around it")
-    return points
 
 
 def _metric(epsg: int) -> int:
@@ -149,9 +105,9 @@ class Calibration(Group):
         for name, points in (("picture", self.picture), ("ground", self.ground)):
             if len(set(points)) < len(points):
                 twice = next(point for point in points if points.count(point) > 1)
-                raise ValueError(f"the point {_written(twice)} stands twice in {name}")
+                raise ValueError(f"the point {written(twice)} stands twice in {name}")
         if far := [point for point in self.ground if max(map(abs, point)) > _FARTHEST_M]:
-            raise ValueError(f"the point {_written(far[0])} in ground is farther away than any place on Earth")
+            raise ValueError(f"the point {written(far[0])} in ground is farther away than any place on Earth")
         if self.geographic and self.epsg is None:
             raise ValueError("geographic needs epsg, the metric system to measure in, for example 25832")
         if self.geographic and not all(abs(lon) <= 180 and abs(lat) <= 90 for lon, lat in self.ground):
@@ -170,7 +126,7 @@ class Calibration(Group):
 class Gate(Group):
     """A line that vehicles are counted over."""
 
-    line: Annotated[tuple[Point, ...], AfterValidator(_path)]
+    line: Line
     """px; the corners of the line"""
     leg: Name | None = None
     """arm of the junction that the gate lies on"""
@@ -181,7 +137,7 @@ class Gate(Group):
 class Zone(Group):
     """A part of the road."""
 
-    polygon: Annotated[tuple[Point, ...], AfterValidator(_outline)]
+    polygon: Polygon
     """px; its corners in order"""
     tracked: bool = True
     """false: a mask, inside which nothing is tracked"""
@@ -250,7 +206,7 @@ class Site(Group):
         for name, (x, y) in _picture_points(parts):
             if not (-0.5 <= x <= camera.width and -0.5 <= y <= camera.height):
                 size = f"{camera.width} x {camera.height}"
-                raise ValueError(f"the point {_written((x, y))} of {name} lies outside the {size} picture")
+                raise ValueError(f"the point {written((x, y))} of {name} lies outside the {size} picture")
         return parts
 
     @whole(mode="after")
@@ -415,7 +371,3 @@ def _near(name: str, known: Iterable[str]) -> str:
     if near:
         return f"; did you mean {near[0]}?"
     return f"; there {'are' if len(names) > 1 else 'is'} {', '.join(names)}" if names else "; there is none"
-
-
-def _written(point: Point) -> str:
-    return f"({point[0]:g}, {point[1]:g})"

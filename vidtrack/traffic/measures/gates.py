@@ -122,7 +122,7 @@ class Gates:
         return np.asarray(self._ends[:, meant].mean(axis=(0, 1)) if meant.any() else np.zeros(2))
 
     def _beside(self, gate: Ints, xy: Floats) -> Floats:
-        """(N,) how far points (N, 2) lie beside the straight lines between the ends of gates (N,), times their lengths."""
+        """(N,) how far points (N, 2) lie beside the lines between the ends of gates (N,), times their lengths."""
         start, end = self._ends[:, gate]
         (dx, dy), (x, y) = (end - start).T, (xy - start).T
         return np.asarray(dx * y - dy * x)

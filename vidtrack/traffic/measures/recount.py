@@ -19,7 +19,8 @@ from vidtrack.traffic.measures.rows import Reader, Rows
 from vidtrack.traffic.measures.runs import has_tracks, open_day
 from vidtrack.traffic.measures.staying import Staying, outlines_of
 from vidtrack.traffic.measures.stretches import Stretches
-from vidtrack.traffic.site import Calibration, Fault, Gate, Point, Site
+from vidtrack.traffic.shapes import Point
+from vidtrack.traffic.site import Calibration, Fault, Gate, Site
 
 MOST_ROWS = 4_000_000
 """Rows that stay in memory, of 100 bytes: 20,000 vehicles of 8 s at 25 frames/s."""

@@ -21,7 +21,8 @@ from vidtrack.traffic.clock import Clock
 from vidtrack.traffic.lines import Line, parse_lines
 from vidtrack.traffic.measures.runs import Recording, measured_run, open_day
 from vidtrack.traffic.metres import SITE_COPY
-from vidtrack.traffic.site import Point, Site, read_site
+from vidtrack.traffic.shapes import Point
+from vidtrack.traffic.site import Site, read_site
 
 MERGED, COASTED, DOUBLE = 0.05, 0.1, 0.2
 """Least doubt of a crossing in a shared blob, of one that the picture did not show, and of one close behind another"""
