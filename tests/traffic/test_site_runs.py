@@ -109,6 +109,7 @@ def test_a_picture_of_another_shape_is_refused_and_half_the_size_is_not(road, vi
     (road / "square.toml").write_text(text.replace("width = 1280", "width = 1290"))
     code, _, err = vidtrack("track", "det.txt", "--site", "square.toml", "-o", "out", "-q")
     assert code == 2
+    assert err.startswith("vidtrack: square.toml: ")
     assert "not the same shape" in err
     assert "Traceback" not in err
     assert not (road / "out" / "tracks.csv").exists()

@@ -239,10 +239,11 @@ class Site(Group):
         if (width, height) == (was.width, was.height):
             return self
         if abs(width * was.height / was.width - height) > _ASPECT_PX:
-            raise ConfigError(
-                f"the site {was.name} is drawn on a {was.width} x {was.height} picture, and this one is "
-                f"{width} x {height}: not the same shape, so the place of the site in it is not known"
-            )
+            with self.named():
+                raise ConfigError(
+                    f"the site {was.name} is drawn on a {was.width} x {was.height} picture, and this one is "
+                    f"{width} x {height}: not the same shape, so the place of the site in it is not known"
+                )
         fx, fy = width / was.width, height / was.height
         tree = _moved(self, lambda point: (fx * (point[0] + 0.5) - 0.5, fy * (point[1] + 0.5) - 0.5))
         tree["site"] |= {"width": width, "height": height}

@@ -355,3 +355,12 @@ def test_nobody_is_a_part_of_a_track_that_ends_in_the_same_scan():
 
     assert list(ended(LifeCycle)) == [(1.2, 1)]
     assert list(ended(LorryEnds)) == [(1.2, 2)]
+
+
+def test_of_vehicles_that_were_never_alone_one_stays_that_does_not_end():
+    tracker = default_tracker()
+    tracker.add(0.0, np.zeros((2, 4)), np.tile(np.eye(4), (2, 1, 1)), box=np.array([[-9.0, -9, 18, 18]] * 2))
+    register = tracker.register
+    register.merged[:], register.alone_s[:], register.merged_since_s[:] = 7, [0.2, 0.1], 0.0
+    for ending, parts in (([False, False], [False, True]), ([True, False], [True, False])):
+        assert tracker.sharing.parts(register, tracker.bank, 60.0, np.array(ending)).tolist() == parts
