@@ -239,10 +239,8 @@ def _follows(first: Ints, second: Ints, track: Ints, rectangle: Floats) -> Mask:
         since, until = rectangle[at, T] - PET_S, rectangle[at, T] + PET_S
         while i > 0 and track[i - 1] == track[i] and rectangle[i - 1, T] > since:
             i -= 1
-        ex, ey = rectangle[at, EX], rectangle[at, EY]
         while i < len(track) and track[i] == track[first[k]] and rectangle[i, T] < until:
-            aligned = rectangle[i, EX] * ex + rectangle[i, EY] * ey > _FOLLOWS
-            if aligned and _overlap(rectangle, i, at):
+            if _aligned(rectangle, i, at) and _overlap(rectangle, i, at):
                 follows[k] = True
                 break
             i += 1

@@ -51,7 +51,8 @@ class Gates:
     @property
     def inward(self) -> Ints:
         """(G,) the side of each gate on which the middle of all entries and exits lies, as `Passed` has it."""
-        return (self._beside(np.arange(len(self)), self._middle) >= 0).astype(np.int64)
+        start, end = self._ends
+        return (turn(start, end, self._middle) >= 0).astype(np.int64)
 
     @property
     def length(self) -> Floats:
@@ -75,7 +76,7 @@ class Gates:
 
     def place(self, gate: Ints, along: Floats) -> Floats:
         """(N, 2) the places on gates (N,), or beside them, so far along them (N,)."""
-        owner = np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
+        owner = self._owner
         apart = self.begin.max(initial=0) + np.abs(along).max(initial=0) + 1.0  # one axis for all gates
         s = np.searchsorted(self.begin + apart * owner, along + apart * gate, side="right") - 1
         s = np.maximum(s, self.first[gate])  # before the first end
@@ -88,27 +89,35 @@ class Gates:
 
         among  (G,) the gates that are looked at; None: all
         """
-        owner = np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
-        start, step = self.segment[:, :2], self.segment[:, 2:] - self.segment[:, :2]
-        share = np.clip(np.einsum("nsi,si->ns", xy[:, None] - start, step) / np.sum(step**2, axis=1), 0, 1)
-        far = np.linalg.norm(xy[:, None] - start - share[..., None] * step, axis=2)
+        share, far = self._apart(xy)
+        owner, n = self._owner, np.arange(len(xy))
         if among is not None:
             far[:, ~among[owner]] = np.inf
-        s, n = np.argmin(far, axis=1), np.arange(len(xy))
-        return owner[s], self.begin[s] + share[n, s] * np.linalg.norm(step[s], axis=1), far[n, s]
+        s = np.argmin(far, axis=1)
+        step = self.segment[s, 2:] - self.segment[s, :2]
+        return owner[s], self.begin[s] + share[n, s] * np.linalg.norm(step, axis=1), far[n, s]
 
     def far(self, gate: Ints, xy: Floats) -> Floats:
         """(N,) how far points (N, 2) are from gates (N,)."""
-        found = np.full(len(gate), np.nan)
-        for number in np.unique(gate).tolist():
-            of = gate == number
-            _, _, found[of] = self.nearest(xy[of], among=np.arange(len(self)) == number)
-        return found
+        _, far = self._apart(xy)
+        return np.asarray(np.where(self._owner == gate[:, None], far, np.inf).min(axis=1, initial=np.inf))
+
+    def _apart(self, xy: Floats) -> tuple[Floats, Floats]:
+        """(N, S) the nearest places to points (N, 2) on each segment, as shares of it, and how far they are."""
+        start, step = self.segment[:, :2], self.segment[:, 2:] - self.segment[:, :2]
+        share = np.clip(np.einsum("nsi,si->ns", xy[:, None] - start, step) / np.sum(step**2, axis=1), 0, 1)
+        return share, np.linalg.norm(xy[:, None] - start - share[..., None] * step, axis=2)
+
+    @property
+    def _owner(self) -> Ints:
+        """(S,) the gate of each segment."""
+        return np.searchsorted(self.first, np.arange(len(self.segment)), side="right") - 1
 
     def outside(self, gate: Ints, xy: Floats) -> Mask:
         """(N,) whether points (N, 2) lie on the outer side of gates (N,); a gate on the middle of all has none."""
-        inner, long = self._beside(gate, self._middle), np.linalg.norm(self._ends[1] - self._ends[0], axis=1)
-        return np.asarray((np.abs(inner) > _OFF * long[gate] ** 2) & (inner * self._beside(gate, xy) < 0))
+        start, end = self._ends[:, gate]
+        inner, long = turn(start, end, self._middle), np.linalg.norm(end - start, axis=1)
+        return np.asarray((np.abs(inner) > _OFF * long**2) & (inner * turn(start, end, xy) < 0))
 
     @property
     def _ends(self) -> Floats:
@@ -120,12 +129,6 @@ class Gates:
         """(2,) the middle of the ends of all entries and exits."""
         meant = self.role("entry", "exit", "both")
         return np.asarray(self._ends[:, meant].mean(axis=(0, 1)) if meant.any() else np.zeros(2))
-
-    def _beside(self, gate: Ints, xy: Floats) -> Floats:
-        """(N,) how far points (N, 2) lie beside the lines between the ends of gates (N,), times their lengths."""
-        start, end = self._ends[:, gate]
-        (dx, dy), (x, y) = (end - start).T, (xy - start).T
-        return np.asarray(dx * y - dy * x)
 
     def ways(self, gate: Ints, side: Ints) -> tuple[Mask, Mask]:
         """(N,) whether passings of gates (N,) to a side (N,) enter, and whether they leave."""
