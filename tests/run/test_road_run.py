@@ -7,10 +7,11 @@ from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 import vidtrack as vt
 from vidtrack.config.load import load
 from vidtrack.config.settings import SourceSettings
+from vidtrack.errors import ConfigError
 from vidtrack.output.sink import Step
 from vidtrack.radar.network.network import read_feeds
 from vidtrack.radar.network.radars import read_radars
-from vidtrack.run.road import ROAD, is_shown, run_road, stated_span, told_if_apart
+from vidtrack.run.road import ROAD, build_road_tracker, is_shown, run_road, stated_span, told_if_apart
 from vidtrack.simulate import simulate_road
 from vidtrack.simulate.roads.write import write_road
 from vidtrack.traffic.calibration.calibrate import calibrated
@@ -80,3 +81,9 @@ def test_the_times_of_the_pictures_of_a_file_are_those_of_the_part_that_is_read(
     assert stated_span(video, SourceSettings(start_s=0.2, end_s=0.5)) == pytest.approx((0.2, 0.5))
     assert stated_span(str(clip), SourceSettings()) is None
     assert stated_span(video, SourceSettings(fps=5.0)) == pytest.approx((0, 2))  # the file states 10 frames/s
+
+
+def test_one_gain_for_two_rates_of_scans_is_refused():
+    settings = load(assignments=["radar.estimator=alpha-beta"], base=ROAD)
+    with pytest.raises(ConfigError, match="take kalman"):
+        build_road_tracker(settings, [], None)

@@ -189,6 +189,8 @@ def build_road_tracker(
     radar, common = settings.radar, settings.tracker
     if radar.group_link_m is not None or radar.snr_db is not None:
         raise ConfigError("radar.group_link_m and radar.snr_db are for one radar without a camera; leave them out")
+    if radar.estimator == "alpha-beta":
+        raise ConfigError("alpha-beta has one gain, for scans at one rate; radar and camera have two, take kalman")
     refuse_smoothing(settings)
     stations = [
         Station(
