@@ -36,6 +36,8 @@ class RadarSettings(Group):
     """m; the same of x, y and z"""
     sigma_doppler_m_s: float = Field(2.0, gt=0)
     """m/s; the same of a range rate"""
+    extent_m: float = Field(0.0, ge=0)
+    """m; standard deviation, in each direction, of the place on a target that its echo comes from"""
     skip_bad_rows: bool = False
     """invalid rows are left out and counted; false: they end the run"""
     estimator: Estimator = "imm"

@@ -67,6 +67,15 @@ class Plots:
         z, sigma = self.z[rows], self.sigma[rows]
         return replace(self, scan=self.scan[rows], time_s=self.time_s[rows], z=z, sigma=sigma, amplitude=amplitude)
 
+    def of_extended_targets(self, extent: float) -> Plots:
+        """The plots with errors of targets whose echo comes from a place on them, of this standard deviation [m]."""
+        arm = np.ones((len(self), self.dim))  # m that a unit of a component moves a target
+        if self.polar:
+            arm[:, 1:] = np.maximum(self.z[:, :1], extent)
+        sigma = self.sigma.copy()
+        sigma[:, : self.dim] = np.hypot(sigma[:, : self.dim], extent / arm)
+        return replace(self, sigma=sigma)
+
     def without_range_rate(self) -> Plots:
         """The plots without range rates."""
         return replace(self, z=self.z[:, : self.dim], sigma=self.sigma[:, : self.dim], doppler=False)

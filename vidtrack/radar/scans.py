@@ -112,10 +112,12 @@ def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
     """Plots in the coordinates of the settings' estimator.
 
     NONLINEAR estimators use range and angles directly; others use positions, converted without bias. A range rate is
-    linearised; alpha-beta and groups use positions only.
+    linearised; alpha-beta and groups use positions only. The errors grow by the targets' extent.
     """
     if settings.estimator == "alpha-beta" or settings.group_link_m is not None:
         plots = plots.without_range_rate()
+    if settings.extent_m > 0:
+        plots = plots.of_extended_targets(settings.extent_m)
     z, R = plots.z, np.einsum("ni,ij->nij", plots.sigma**2, np.eye(plots.sigma.shape[1]))
     sensor: Sensor = PositionRangeRate(settings.position[: plots.dim]) if plots.doppler else POSITION
     if plots.polar:

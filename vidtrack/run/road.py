@@ -40,11 +40,10 @@ from vidtrack.video.source import duration_s, open_source
 _log = logging.getLogger(__name__)
 
 ROAD: Mapping[str, Any] = {
-    "radar": {"estimator": "kalman", "model": "singer", "max_speed": 40.0, "accel": 2.0, "hold_s": 2.0,
-              "coast_scans": 40, "unresolved": False, "detection_probability": 0.9}
+    "radar": {"estimator": "kalman", "max_speed": 40.0, "accel": 1.5, "hold_s": 2.0, "extent_m": 0.7, "coast_scans": 40,
+              "unresolved": False, "detection_probability": 0.9}
 }  # fmt: skip
-"""Defaults where vehicles are tracked and not aircraft. Their speed is smooth: with white acceleration the speed of one
-that stands would be another by 0.9 m/s in the next tenth of a second, and any false plot near it could be its own."""
+"""Defaults where vehicles are tracked and not aircraft."""
 CAMERA_DETECTION = 0.9
 LASTING_S = 1.0
 """s; the light of headlamps, a reflection or a shadow looks like a vehicle for so long."""

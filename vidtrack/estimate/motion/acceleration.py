@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -84,36 +83,31 @@ class Singer(Columns):
 
     def transition(self, dt: float, x: Floats) -> Floats:
         """F (1, n, n) over dt seconds."""
-        return _each_axis(_correlated(dt, self.accel, self.hold_s)[0], self.dim)
+        return _each_axis(self._discretised(dt)[0], self.dim)
 
     def jacobian(self, dt: float, x: Floats, F: Floats) -> Floats:
         """F: the motion is linear."""
         return F
 
     def process_noise(self, dt: float, x: Floats, P: Floats, hits: Ints, scale: Floats) -> Floats:
-        return _each_axis(_correlated(dt, self.accel, self.hold_s)[1], self.dim) * scale[:, None, None] ** 2
+        return _each_axis(self._discretised(dt)[1], self.dim) * scale[:, None, None] ** 2
 
     def birth(self, position: Floats, cov: Floats, scale: Floats) -> tuple[Floats, Floats]:
         return at_rest(position, cov, _priors(self.dim, self.speed, self.accel) * scale[:, None])
 
+    def _discretised(self, dt: float) -> tuple[Floats, Floats]:
+        """F and Q (3, 3) of one axis: da/dt = -a / hold_s + w, of intensity 2 accel^2 / hold_s (Van Loan 1978)."""
+        from scipy.linalg import expm
 
-@lru_cache(maxsize=16)
-def _correlated(dt: float, accel: float, hold_s: float) -> tuple[Floats, Floats]:
-    """F and Q (3, 3) of one axis: da/dt = -a / hold_s + w, of intensity 2 accel^2 / hold_s (Van Loan 1978).
-
-    Cached: do not write to them.
-    """
-    from scipy.linalg import expm
-
-    if dt > LONG * hold_s:  # the matrix below contains exp(dt / hold_s)
-        F, Q = _correlated(dt / 2, accel, hold_s)
-        return F @ F, F @ Q @ F.T + Q
-    A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -1 / hold_s]])
-    W = np.diag([0, 0, 2 * accel**2 / hold_s])
-    block = expm(np.block([[-A, W], [np.zeros((3, 3)), A.T]]) * dt)
-    F = block[3:, 3:].T
-    Q = F @ block[:3, 3:]
-    return F, (Q + Q.T) / 2
+        if dt > LONG * self.hold_s:  # the matrix below contains exp(dt / hold_s)
+            F, Q = self._discretised(dt / 2)
+            return F @ F, F @ Q @ F.T + Q
+        A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -1 / self.hold_s]])
+        W = np.diag([0, 0, 2 * self.accel**2 / self.hold_s])
+        block = expm(np.block([[-A, W], [np.zeros((3, 3)), A.T]]) * dt)
+        F = block[3:, 3:].T
+        Q = F @ block[:3, 3:]
+        return F, (Q + Q.T) / 2
 
 
 def _each_axis(M: Floats, dim: int) -> Floats:

@@ -80,7 +80,7 @@ def write_road_plots(folder: Path, clip: RoadClip, radar: TrafficRadar | None = 
         "y_m": y,
         "height_m": height,
         "boresight_deg": 90 - np.degrees(clip.layout.azimuth),
-        "sigma_range_m": 0.8,
+        "sigma_range_m": radar.sigma[0],
         "sigma_azimuth_deg": np.degrees(radar.sigma[1]),
         "sigma_doppler_m_s": radar.sigma[2],
         "scan_s": radar.scan_s,
