@@ -15,7 +15,7 @@ from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.boxes import cut, partly_hidden, uncut
+from vidtrack.traffic.boxes import cut_ones, partly_hidden, uncut
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint
 from vidtrack.traffic.lines import foot_of
@@ -166,8 +166,7 @@ class Reader:
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
         box = _box(column)
-        at_border = np.where(cut(box, recording.size)[:, None], box, np.nan)
-        rows = _on_road(ground, column, track, t, seen, merged, box, edge, at_border)
+        rows = _on_road(ground, column, track, t, seen, merged, box, edge, cut_ones(box, recording.size))
         make_room(self._latest, len(self._numbers), np.nan)
         _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
         return rows

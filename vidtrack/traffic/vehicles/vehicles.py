@@ -66,21 +66,24 @@ class Vehicles:
         ground, order = self._ground, np.argsort(track, kind="stable")
         first = np.searchsorted(track[order], np.arange(0, tracks + _BATCH, _BATCH))
 
-        def batch(number: int) -> tuple[_Sizes, Paths]:
+        def batch(number: int) -> tuple[_Sizes, Classified, Paths]:
             begin, asked = number * _BATCH, order[first[number] : first[number + 1]]
             some = knots.between(begin, min(begin + _BATCH, tracks))
             looked = np.arange(begin, begin + _BATCH) % every == 0
             speeds[:, asked], found, paths = _fitted(ground, some, track[asked] - begin, t[asked], looked)
-            return replace(found, track=found.track + begin), paths
+            of_size = classified(found.information, found.vector, found.speed)
+            return replace(found, track=found.track + begin), of_size, paths
 
         speeds, every = np.full((3, len(t)), np.nan), -(-tracks // LOOKED_AT)
         with ThreadPoolExecutor(_AT_ONCE) as pool:
-            sizes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
+            sizes, classes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
         told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
-        told = _best(replace(told, track=vehicle[told.track]))
-        scale = scale_of(told.information, told.vector, told.speed)
+        of_size = Classified(*(np.concatenate([getattr(one, name) for one in classes]) for name in Classified.__slots__))
+        best = _last(told.worth, vehicle[told.track])  # of each vehicle the track that tells most
+        scale = scale_of(told.information[best], told.vector[best], told.speed[best])
         straight = Paths(*(np.concatenate([getattr(one, name) for one in driven]) for name in Paths.__slots__))
-        return Fitted(Speeds(*speeds), _classes(told, vehicle), scale, straightness(straight))
+        whole = _of_all(of_size.of(best), vehicle[told.track[best]], vehicle)
+        return Fitted(Speeds(*speeds), whole, scale, straightness(straight))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,25 +158,18 @@ def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov:
     )
 
 
-def _best(told: _Sizes) -> _Sizes:
-    """Of each track only what tells most."""
-    best = _last(told.worth, told.track)
-    return _Sizes(*(getattr(told, name)[best] for name in _Sizes.__slots__))
-
-
 def _last(worth: Floats, owner: Ints) -> Ints:
     """The indices of those that are worth most, one of each owner."""
     order = np.lexsort((worth, owner))
     return order[np.diff(owner[order], append=-1) != 0]
 
 
-def _classes(told: _Sizes, vehicle: Ints) -> Classified:
-    """The classes of all tracks (T,), each of a vehicle; NaN for those that tell nothing."""
-    found = classified(told.information, told.vector, told.speed)
+def _of_all(found: Classified, who: Ints, vehicle: Ints) -> Classified:
+    """The classes of all tracks, each of a vehicle (T,), by those of vehicles `who`; NaN for those that tell nothing."""
     parts = found.probability, found.size, found.sigma
     result = [np.full((len(vehicle), part.shape[1]), np.nan) for part in parts]
     for whole, part in zip(result, parts, strict=True):
-        whole[told.track] = part
+        whole[who] = part
     return Classified(*(whole[vehicle] for whole in result))
 
 
