@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
 from vidtrack.traffic.vehicles.straightness import LOOKED_AT, Paths, Straightness, paths_of, straightness
 
+_Table = TypeVar("_Table", "_Sizes", Classified, Paths)
 _BATCH, _AT_ONCE = 1024, 2
 """Tracks that are fitted together, and how many such batches at a time: they bound the memory."""
 
@@ -77,11 +80,9 @@ class Vehicles:
         speeds, every = np.full((3, len(t)), np.nan), -(-tracks // LOOKED_AT)
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             sizes, classes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
-        told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
-        of_size = Classified(*(np.concatenate([getattr(one, name) for one in classes]) for name in Classified.__slots__))
+        told, of_size, straight = _together(_Sizes, sizes), _together(Classified, classes), _together(Paths, driven)
         best = _last(told.worth, vehicle[told.track])  # of each vehicle the track that tells most
         scale = scale_of(told.information[best], told.vector[best], told.speed[best])
-        straight = Paths(*(np.concatenate([getattr(one, name) for one in driven]) for name in Paths.__slots__))
         whole = _of_all(of_size.of(best), vehicle[told.track[best]], vehicle)
         return Fitted(Speeds(*speeds), whole, scale, straightness(straight))
 
@@ -158,6 +159,11 @@ def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov:
     )
 
 
+def _together(kind: type[_Table], parts: Sequence[_Table]) -> _Table:
+    """The rows of several tables of a kind, one after the other."""
+    return kind(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(kind)))
+
+
 def _last(worth: Floats, owner: Ints) -> Ints:
     """The indices of those that are worth most, one of each owner."""
     order = np.lexsort((worth, owner))
@@ -165,7 +171,7 @@ def _last(worth: Floats, owner: Ints) -> Ints:
 
 
 def _of_all(found: Classified, who: Ints, vehicle: Ints) -> Classified:
-    """The classes of all tracks, each of a vehicle (T,), by those of vehicles `who`; NaN for those that tell nothing."""
+    """The classes of all tracks, each of a vehicle (T,), by those of the vehicles `who`; NaN where nothing is told."""
     parts = found.probability, found.size, found.sigma
     result = [np.full((len(vehicle), part.shape[1]), np.nan) for part in parts]
     for whole, part in zip(result, parts, strict=True):
