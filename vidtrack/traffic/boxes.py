@@ -23,28 +23,41 @@ def within(box: Floats, rim: Floats | float) -> Floats:
 
 def uncut(edge: Floats, size: tuple[int, int]) -> Floats:
     """(N, 4) left, top, right and lower edges [px]; NaN where the border of a picture (width, height) may cut them."""
-    inside = edge.copy()
-    _cut_off(inside, _NEAR * size[0], size[0] - _NEAR * size[0], size[1] - _NEAR * size[0])
-    return inside
+    return _inside(edge, _NEAR * size[0], size[0] - _NEAR * size[0], size[1] - _NEAR * size[0])
 
 
 def cut(box: Floats, size: tuple[int, int]) -> Mask:
     """(N,) whether the left, right or lower border of a picture (width, height) cuts boxes (N, 4)."""
-    (left, top, wide, high), (width, height) = box.T, size
-    return np.asarray((left < 0.5) | (left + wide > width - 0.5) | (top + high > height - 0.5))
+    return ~np.isnan(cut_ones(box, size)[:, 0])
+
+
+def cut_ones(box: Floats, size: tuple[int, int]) -> Floats:
+    """(N, 4) the boxes that the left, right or lower border of a picture (width, height) cuts; NaN of others."""
+    return _at_border(box, 0.5, size[0] - 0.5, size[1] - 0.5)
 
 
 @kernel
-def _cut_off(edge: Floats, near: float, right: float, bottom: float) -> None:
-    """Forget left and top edges up to `near`, and right and lower ones from `right` and `bottom` on."""
+def _inside(edge: Floats, near: float, right: float, bottom: float) -> Floats:
+    """The edges without left and top ones up to `near`, and without right and lower ones from `right` and `bottom`."""
+    inside = np.empty((len(edge), 4))
     for i in range(len(edge)):
         for side in range(2):
-            if not edge[i, side] > near:
-                edge[i, side] = np.nan
-        if not edge[i, 2] < right:
-            edge[i, 2] = np.nan
-        if not edge[i, 3] < bottom:
-            edge[i, 3] = np.nan
+            inside[i, side] = edge[i, side] if edge[i, side] > near else np.nan
+        inside[i, 2] = edge[i, 2] if edge[i, 2] < right else np.nan
+        inside[i, 3] = edge[i, 3] if edge[i, 3] < bottom else np.nan
+    return inside
+
+
+@kernel
+def _at_border(box: Floats, left: float, right: float, bottom: float) -> Floats:
+    """The boxes that reach beyond `left`, `right` or `bottom`; NaN of others."""
+    cut = np.empty((len(box), 4))
+    for i in range(len(box)):
+        beside = box[i, 0] < left or box[i, 0] + box[i, 2] > right
+        beyond = beside or box[i, 1] + box[i, 3] > bottom
+        for side in range(4):
+            cut[i, side] = box[i, side] if beyond else np.nan
+    return cut
 
 
 def partly_hidden(t: Floats, box: Floats, merged: Mask) -> Mask:

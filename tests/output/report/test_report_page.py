@@ -121,7 +121,7 @@ def test_conflicts_are_shown_where_there_is_a_table_of_them(tmp_path, made, unpa
     text = words(out)
     times = [
         text.index(one)
-        for one in ("06:02 crossing 0.8 ± 0.2 0.5 ± 0.4", "06:01 rear-end 1.2 ± 0.2 –", "06:00 crossing –")
+        for one in ("06:02 crossing 0.75 ± 0.20 0.50 ± 0.40", "06:01 rear-end 1.20 ± 0.20 –", "06:00 crossing –")
     ]
     assert times == sorted(times)  # the closest first
 

@@ -245,3 +245,11 @@ def test_the_account_tells_near_from_far_and_a_wrong_height():
     sigma = re.search(r"standard deviation 0\.0*(\d+) m", warning)
     assert len(sigma[1]) == 2  # digits
     assert wrong["contradiction"]
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, 6, 13))
+def test_a_camera_that_looks_straight_down_has_no_focal_length(turn):
+    """Whatever rounding leaves of a perspective."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    picture = POINTS @ np.array([[cos, sin], [sin, -cos]]) * 7.0 + [640, 360]
+    assert calibrated(site_of(picture - picture.min(axis=0), POINTS)).pose() is None

@@ -10,8 +10,8 @@ from vidtrack.arrays.types import Ints
 from vidtrack.traffic.boxes import partly_hidden
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.lengths import add_lengths, mean_length
-from vidtrack.traffic.measures.blocks import numbers
-from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS, edges, states
+from vidtrack.traffic.measures.blocks import side_by_side
+from vidtrack.traffic.measures.rows import BOX, numbers_of, states, uncut_edges
 from vidtrack.traffic.site import Site
 from vidtrack.traffic.vehicles.naming import Named, whole_tracks
 from vidtrack.traffic.vehicles.vehicles import Vehicles
@@ -31,15 +31,12 @@ class WholeTracks:
 
     def add(self, table: pa.Table) -> None:
         """Look at the rows of whole pictures; those of runs of earlier versions have no edges, and tell less."""
-        column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
+        column, box = numbers_of(table), side_by_side(table, BOX)
         track, t = table["track_id"].to_numpy(), column["time_s"]
-        box = np.column_stack([column[name] for name in BOX])
         hidden = partly_hidden(t, box, states(table)[1])
         make_room(self._sums, int(track.max(initial=-1)) + 1, 0.0)
         add_lengths(self._sums, track, column["length_m"], column["length_sigma_m"], hidden)
-        if EDGE_COLUMNS[0] in column:
-            xy = np.column_stack([column["x_m"], column["y_m"]])
-            self._vehicles.add(track, t, xy, edges(column, self._size))
+        self._vehicles.add(track, t, side_by_side(table, ("x_m", "y_m")), uncut_edges(table, self._size))
 
     def named(self, track: Ints) -> Named:
         """Of tracks (T,)."""

@@ -109,7 +109,7 @@ class Ground:
         across, down = by_k(self.k, X).transpose(1, 0, 2)
         # picture_of(k, X) stays where it is
         moved = np.stack([d * across - b * down, a * down - c * across], axis=1) / (a * d - b * c)[:, None]
-        return np.asarray(-self.plane.scale * moved @ self._errors())
+        return np.asarray(-self.plane.scale * (moved.reshape(-1, 8) @ self._errors()).reshape(-1, 2, 8))
 
     def varied(self) -> Iterator[tuple[Ground, Ground]]:
         """Pairs of calibrations, each pair one of those eight errors above and below this one."""

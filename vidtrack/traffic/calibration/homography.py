@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.compiled import kernel
 
 _REWEIGHTINGS = 4
 
@@ -50,12 +51,12 @@ class Fit:
 
 def depth(k: Floats, X: Floats) -> Floats:
     """(N,) w, in proportion to the distance from the camera along its axis."""
-    return np.asarray(X @ k[6:] + 1)
+    return np.asarray(k[6] * X[:, 0] + k[7] * X[:, 1] + 1)
 
 
 def picture_of(k: Floats, X: Floats) -> Floats:
     """(N, 2) where points of the plane X (N, 2) are in the picture."""
-    return np.asarray((X @ k[[[0, 3], [1, 4]]] + k[[2, 5]]) / depth(k, X)[:, None])
+    return _mapped(matrix(k), np.ascontiguousarray(X))
 
 
 def by_point(k: Floats, X: Floats) -> Floats:
@@ -76,9 +77,22 @@ def by_k(k: Floats, X: Floats) -> Floats:
 
 def plane_of(k: Floats, p: Floats) -> Floats:
     """(N, 2) where points of the picture p (N, 2) are on the plane; NaN on the horizon and above it."""
-    X = np.column_stack([p, np.ones(len(p))]) @ np.linalg.inv(matrix(k)).T
-    w = np.where(X[:, 2] > 0, X[:, 2], np.nan)
-    return np.asarray(X[:, :2] / w[:, None])
+    back = np.linalg.inv(matrix(k))
+    X = _mapped(back, np.ascontiguousarray(p))
+    X[~(back[2, 0] * p[:, 0] + back[2, 1] * p[:, 1] + back[2, 2] > 0)] = np.nan
+    return X
+
+
+@kernel
+def _mapped(H: Floats, points: Floats) -> Floats:
+    """(N, 2) images of points (N, 2) by a homography (3, 3)."""
+    image = np.empty((len(points), 2))
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        w = H[2, 0] * x + H[2, 1] * y + H[2, 2]
+        for axis in range(2):
+            image[i, axis] = (H[axis, 0] * x + H[axis, 1] * y + H[axis, 2]) / w
+    return image
 
 
 def matrix(k: Floats) -> Floats:

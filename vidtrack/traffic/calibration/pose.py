@@ -12,6 +12,9 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats
 
+_ROUNDING = 1e-9
+"""Change of w over the calibration's points, as a share, that is no perspective: a camera that looks straight down"""
+
 
 @dataclass(frozen=True, slots=True)
 class Pose:
@@ -43,5 +46,5 @@ def _focal(xy: Floats, w: Floats) -> float | None:
     """The f for which (x, y)/f, w of east and north are at right angles and of one length, by least squares."""
     flat = np.array([2 * xy[:, 0] @ xy[:, 1], xy[:, 0] @ xy[:, 0] - xy[:, 1] @ xy[:, 1]])
     deep = np.array([2 * w[0] * w[1], w[0] ** 2 - w[1] ** 2])
-    square = -(flat @ deep) / (deep @ deep) if deep.any() else -1.0
+    square = -(flat @ deep) / (deep @ deep) if np.hypot(w[0], w[1]) > _ROUNDING * abs(w[2]) else -1.0
     return float(np.sqrt(square)) if square > 0 else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from os import SEEK_END
 from pathlib import Path
 
@@ -123,6 +123,19 @@ def damaged(path: Path, error: Exception) -> FormatError:
 
 def numbers(table: pa.Table, name: str) -> Floats:
     """(N,) a column; NaN where it is empty."""
+    return np.concatenate([np.empty(0), *_chunks(table, name)])
+
+
+def side_by_side(table: pa.Table, names: Sequence[str]) -> Floats:
+    """(N, K) columns; NaN where they are empty."""
+    values = np.empty((len(table), len(names)))
+    for k, name in enumerate(names):
+        np.concatenate([np.empty(0), *_chunks(table, name)], out=values[:, k])
+    return values
+
+
+def _chunks(table: pa.Table, name: str) -> list[Floats]:
+    """A column, as it lies in memory."""
     column = table[name]
     column = column if column.type == pa.float64() else column.cast(pa.float64())
-    return np.concatenate([chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks] or [np.empty(0)])
+    return [chunk.to_numpy(zero_copy_only=False) for chunk in column.chunks]

@@ -214,7 +214,7 @@ def touching_place(a: Bodies, b: Bodies, n: Floats) -> Floats:
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.sum(a * b, axis=1))
+    return np.einsum("ni,ni->n", a, b)
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

@@ -109,19 +109,19 @@ def found_again(tail: End, head: End, a: Ints, b: Ints) -> Floats:
     gap = np.maximum(head.t[b] - tail.t[a], 0.0)
     place = head.xy[b] - tail.xy[a] - gap[:, None] * tail.v[a]
     pace = head.v[b] - tail.v[a]
-    jolt = STANDING_JOLT + JOLT_PER_M_S * np.linalg.norm(tail.v[a], axis=1)
+    jolt = STANDING_JOLT + JOLT_PER_M_S * np.linalg.norm(tail.v, axis=1)[a]
     (xx, xv, vv), (x2, xv2, v2) = tail.spread[a].T, head.spread[b].T
     sxx = xx + 2 * gap * xv + gap**2 * vv + jolt * gap**3 / 3 + x2
     sxv = xv + gap * vv + jolt * gap**2 / 2 + xv2
     svv = vv + jolt * gap + v2 + MODEL_M_S**2
     det = sxx * svv - sxv**2
     square = (svv * _dot(place, place) - 2 * sxv * _dot(place, pace) + sxx * _dot(pace, pace)) / det
-    found = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det * (1 + square / _FREEDOM) ** -(2 + _FREEDOM / 2)
-    return np.asarray(np.exp(-gap / _LOST_S) / _LOST_S * found)
+    density = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det / _LOST_S
+    return np.asarray(density * np.exp(-(2 + _FREEDOM / 2) * np.log1p(square / _FREEDOM) - gap / _LOST_S))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.sum(a * b, axis=1))
+    return np.einsum("ni,ni->n", a, b)
 
 
 def gap_rows(lives: Lives, joins: Joins) -> Rows:

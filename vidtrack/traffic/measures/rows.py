@@ -15,11 +15,11 @@ from vidtrack.arrays.rows import make_room
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.errors import ConfigError
-from vidtrack.traffic.boxes import cut, partly_hidden, uncut
+from vidtrack.traffic.boxes import cut_ones, partly_hidden, uncut
 from vidtrack.traffic.calibration.ground import Ground
 from vidtrack.traffic.footprint import Footprints, footprint
 from vidtrack.traffic.lines import foot_of
-from vidtrack.traffic.measures.blocks import blocks, column_names, numbers, whole_pictures
+from vidtrack.traffic.measures.blocks import blocks, column_names, numbers, side_by_side, whole_pictures
 from vidtrack.traffic.measures.runs import Day, Recording
 from vidtrack.video.readahead import ReadAhead
 
@@ -149,25 +149,22 @@ class Reader:
                 yield from ahead
 
     def _rows(self, table: pa.Table, recording: Recording, ground: Ground | None, road: Footprints | None) -> Rows:
-        column = {name: numbers(table, name) for name in table.column_names if name not in ("track_id", "status")}
+        column, box = numbers_of(table), side_by_side(table, BOX)
         track = self._numbered(table, recording.session)
         seen, merged = states(table)
         t = column["time_s"] + recording.offset_s
         if ground is None:
-            high = column["height_px"]
-            xy = foot_of(np.column_stack([column[name] for name in BOX]))
+            xy, wide, high = foot_of(box), box[:, 2], box[:, 3]
             sigma = np.sqrt((column["sigma_x_px"] ** 2 + column["sigma_y_px"] ** 2 + (_FOOT_SIGMA * high) ** 2) / 2)
-            margin = _MARGIN * (column["width_px"] + column["height_px"]) / 2
+            margin = _MARGIN * (wide + high) / 2
             v = np.column_stack([column["vx_px_s"], column["vy_px_s"]])
             return Rows(track, t, seen, merged, merged, xy, sigma, margin, v, *off_road(len(t)))
         if road is not None:
-            column |= _stand(road, track, column, merged, recording.rim_px)
-        edge = edges(column, recording.size)
+            column |= _stand(road, track, column, box, edges(table), merged, recording.rim_px)
+        edge = uncut_edges(table, recording.size)
         if recording.size != self._size:
             edge = (edge + 0.5) * (self._size[0] / recording.size[0]) - 0.5
-        box = _box(column)
-        at_border = np.where(cut(box, recording.size)[:, None], box, np.nan)
-        rows = _on_road(ground, column, track, t, seen, merged, box, edge, at_border)
+        rows = _on_road(ground, column, track, t, seen, merged, box, edge, cut_ones(box, recording.size))
         make_room(self._latest, len(self._numbers), np.nan)
         _go_on(track, t, np.isnan(column["x_m"]), seen & ~merged, rows.v, rows.xy, self._latest)
         return rows
@@ -191,9 +188,9 @@ class LiveReader:
 
     def read(self, table: pa.Table) -> Rows:
         """The rows of the next table; vehicles without a place are carried as in `Reader`."""
-        column = {name: numbers(table, name) for name in ROAD_COLUMNS if name not in ("track_id", "status")}
+        column = numbers_of(table)
         track, t, unknown = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
-        rows = _on_road(self._ground, column, track, t, *states(table), _box(column), unknown, unknown)
+        rows = _on_road(self._ground, column, track, t, *states(table), side_by_side(table, BOX), unknown, unknown)
         if len(t) == 0:
             return rows
         ids, number = np.unique(track, return_inverse=True)
@@ -203,6 +200,12 @@ class LiveReader:
         known = self._latest | dict(zip(ids.tolist(), latest, strict=True))
         self._latest = {one: last for one, last in known.items() if t[-1] - last[0] < _ONWARD_S}
         return rows
+
+
+def numbers_of(table: pa.Table) -> dict[str, Floats]:
+    """(N,) of each column of numbers, but for those that lie side by side."""
+    apart = {"track_id", "status", *BOX, *EDGE_COLUMNS}
+    return {name: numbers(table, name) for name in table.column_names if name not in apart}
 
 
 def states(table: pa.Table) -> tuple[Mask, Mask]:
@@ -235,11 +238,6 @@ def _on_road(
     hidden, state = partly_hidden(t, box, merged), (xy, sigma, margin, v, speed, own, shared)
     sides = column["length_m"], column["length_sigma_m"], column["width_m"]
     return Rows(track, t, seen, merged, hidden, *state, *sides, ahead, spread, edge, at_border)
-
-
-def _box(column: dict[str, Floats]) -> Floats:
-    """(N, 4) left, top, width, height [px]."""
-    return np.column_stack([column[name] for name in BOX])
 
 
 @kernel
@@ -292,11 +290,15 @@ def _of_this_site(folder: Path, ground: Ground) -> bool:
     return True
 
 
-def edges(column: dict[str, Floats], size: tuple[int, int]) -> Floats:
-    """(N, 4) edges that were seen and that the border of the picture does not cut [px]."""
-    if EDGE_COLUMNS[0] not in column:
-        return np.full((len(column["time_s"]), 4), np.nan)
-    return uncut(np.column_stack([column[name] for name in EDGE_COLUMNS]), size)
+def edges(table: pa.Table) -> Floats | None:
+    """(N, 4) left, top, right and lower edges that were seen [px]; None in runs of earlier versions."""
+    return side_by_side(table, EDGE_COLUMNS) if EDGE_COLUMNS[0] in table.column_names else None
+
+
+def uncut_edges(table: pa.Table, size: tuple[int, int]) -> Floats:
+    """(N, 4) those that the border of the picture does not cut; NaN of others, and where none are known."""
+    edge = edges(table)
+    return np.full((len(table), 4), np.nan) if edge is None else uncut(edge, size)
 
 
 def _place_roughly(ground: Ground, box: Floats, xy: Floats, sigma: Floats) -> None:
@@ -332,7 +334,15 @@ def _go_on(track: Ints, t: Floats, rough: Mask, alone: Mask, v: Floats, xy: Floa
             xy[i, 1] = latest[k, 2] + (t[i] - latest[k, 0]) * latest[k, 4]
 
 
-def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mask, rim_px: float) -> dict[str, Floats]:
+def _stand(
+    road: Footprints,
+    track: Ints,
+    column: dict[str, Floats],
+    box: Floats,
+    edge: Floats | None,
+    merged: Mask,
+    rim_px: float,
+) -> dict[str, Floats]:
     """The columns of the road, computed from those of the picture, whose boxes have a rim."""
     sigma = np.column_stack([column[f"sigma_{name}"] for name in ("x_px", "y_px", "vx_px_s", "vy_px_s")])
     corr = np.ones((len(track), 4, 4))
@@ -341,8 +351,6 @@ def _stand(road: Footprints, track: Ints, column: dict[str, Floats], merged: Mas
         corr[:, i, j] = corr[:, j, i] = column[f"corr_{name}"]
     P = corr * sigma[:, :, None] * sigma[:, None, :]
     xy, u = (np.column_stack([column[a], column[b]]) for a, b in (("x_px", "y_px"), ("vx_px_s", "vy_px_s")))
-    box = _box(column)
-    edge = np.column_stack([column[name] for name in EDGE_COLUMNS]) if EDGE_COLUMNS[0] in column else None
     stand = road.place(track, column["time_s"], xy, u, P, box, merged, edge, rim_px)
     own = np.sqrt(np.diagonal(stand.xy_own, axis1=1, axis2=2))
     return {

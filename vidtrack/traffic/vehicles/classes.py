@@ -95,14 +95,21 @@ def evidence(kind: Kind, information: Floats, vector: Floats, speed: Floats) -> 
     The integral of the normal density of the kind's sizes times exp(-s' A s / 2 + b' s).
     """
     mean, prior = np.array(kind.mean), np.diag(1 / np.square(kind.sigma))
-    cov = np.linalg.inv(information + prior)
+    cov, det = _inverse(information + prior)
     b = vector + prior @ mean
     size = np.einsum("tij,tj->ti", cov, b)
     log = np.log(kind.share) + (np.einsum("ti,ti->t", b, size) - mean @ prior @ mean) / 2
-    log += (np.linalg.slogdet(cov)[1] + np.linalg.slogdet(prior)[1]) / 2
+    log -= (np.log(det) + 2 * np.log(kind.sigma).sum()) / 2
     if kind.speed is None:
         log -= np.log(_FASTEST)
     else:
         walk, sigma = kind.speed
         log -= ((speed - walk) / sigma) ** 2 / 2 + np.log(np.sqrt(2 * np.pi) * sigma)
     return log, size, np.diagonal(cov, axis1=1, axis2=2)
+
+
+def _inverse(matrix: Floats) -> tuple[Floats, Floats]:
+    """(T, 3, 3) inverses of symmetric matrices by their cofactors, and (T,) determinants."""
+    cofactor = np.cross(matrix[:, [1, 2, 0]], matrix[:, [2, 0, 1]])
+    det = np.einsum("ti,ti->t", matrix[:, 0], cofactor[:, 0])
+    return cofactor / det[:, None, None], det

@@ -152,7 +152,7 @@ def _normal(
     band[:], right[:], whole[:], rest[:] = 0.0, 0.0, 0.0, 0.0
     state, ahead, model, by_state = np.empty(5), np.empty(2), np.empty(4), np.zeros((4, 5))
     # derivatives of each side's residual: by x, by y, by the size; then the residual. And the same, weighted
-    by, weighted = np.empty((4, SIZE + 3)), np.empty((4, SIZE + 2))
+    by, weighted = np.empty((SIZE + 3, 4)), np.empty((SIZE + 2, 4))
     total, strange, count = 0.0, 0, 0
     for s in range(SIZE):
         whole[s, s] = 1 / SIGMA[s] ** 2
@@ -166,7 +166,7 @@ def _normal(
             sign = -1.0 if side < 2 else 1.0
             residual = edge[k, side] - model[side] - sign * size[3]
             if np.isnan(residual):
-                by[side], weighted[side] = 0.0, 0.0
+                by[:, side], weighted[:, side] = 0.0, 0.0
                 continue
             variance = (noise + (_SHAPE_M[side] * scale) ** 2) * coarse**2
             square = residual * residual
@@ -175,8 +175,8 @@ def _normal(
             strange += square > _FAR**2 * variance
             count += 1
             for i in range(5):
-                by[side, i], weighted[side, i] = by_state[side, i], weight * by_state[side, i]
-            by[side, 5], by[side, 6], weighted[side, 5] = sign, residual, weight * sign
+                by[i, side], weighted[i, side] = by_state[side, i], weight * by_state[side, i]
+            by[5, side], by[6, side], weighted[5, side] = sign, residual, weight * sign
         band[row, 0] += _dot(weighted, 0, by, 0)
         band[row + 1, 1] += _dot(weighted, 1, by, 0)
         band[row + 1, 0] += _dot(weighted, 1, by, 1)
@@ -204,8 +204,8 @@ def _normal(
 
 @inlined
 def _dot(a: Floats, i: int, b: Floats, j: int) -> float:
-    """Product of two columns (4,)."""
-    return a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j] + a[3, i] * b[3, j]
+    """Product of two rows (4,)."""
+    return a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2] + a[i, 3] * b[j, 3]
 
 
 @inlined

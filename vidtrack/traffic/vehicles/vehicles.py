@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from vidtrack.traffic.vehicles.pieces import pieces
 from vidtrack.traffic.vehicles.scale import Scale, scale_of
 from vidtrack.traffic.vehicles.straightness import LOOKED_AT, Paths, Straightness, paths_of, straightness
 
+_Table = TypeVar("_Table", "_Sizes", Classified, Paths)
 _BATCH, _AT_ONCE = 1024, 2
 """Tracks that are fitted together, and how many such batches at a time: they bound the memory."""
 
@@ -66,21 +69,22 @@ class Vehicles:
         ground, order = self._ground, np.argsort(track, kind="stable")
         first = np.searchsorted(track[order], np.arange(0, tracks + _BATCH, _BATCH))
 
-        def batch(number: int) -> tuple[_Sizes, Paths]:
+        def batch(number: int) -> tuple[_Sizes, Classified, Paths]:
             begin, asked = number * _BATCH, order[first[number] : first[number + 1]]
             some = knots.between(begin, min(begin + _BATCH, tracks))
             looked = np.arange(begin, begin + _BATCH) % every == 0
             speeds[:, asked], found, paths = _fitted(ground, some, track[asked] - begin, t[asked], looked)
-            return replace(found, track=found.track + begin), paths
+            of_size = classified(found.information, found.vector, found.speed)
+            return replace(found, track=found.track + begin), of_size, paths
 
         speeds, every = np.full((3, len(t)), np.nan), -(-tracks // LOOKED_AT)
         with ThreadPoolExecutor(_AT_ONCE) as pool:
-            sizes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
-        told = _Sizes(*(np.concatenate([getattr(one, name) for one in sizes]) for name in _Sizes.__slots__))
-        told = _best(replace(told, track=vehicle[told.track]))
-        scale = scale_of(told.information, told.vector, told.speed)
-        straight = Paths(*(np.concatenate([getattr(one, name) for one in driven]) for name in Paths.__slots__))
-        return Fitted(Speeds(*speeds), _classes(told, vehicle), scale, straightness(straight))
+            sizes, classes, driven = zip(*pool.map(batch, range(len(first) - 1)), strict=True)
+        told, of_size, straight = _together(_Sizes, sizes), _together(Classified, classes), _together(Paths, driven)
+        best = _last(told.worth, vehicle[told.track])  # of each vehicle the track that tells most
+        scale = scale_of(told.information[best], told.vector[best], told.speed[best])
+        whole = _of_all(of_size.of(best), vehicle[told.track[best]], vehicle)
+        return Fitted(Speeds(*speeds), whole, scale, straightness(straight))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,10 +159,9 @@ def _sizes(t: Floats, first: Ints, owner: Ints, path: Floats, size: Floats, cov:
     )
 
 
-def _best(told: _Sizes) -> _Sizes:
-    """Of each track only what tells most."""
-    best = _last(told.worth, told.track)
-    return _Sizes(*(getattr(told, name)[best] for name in _Sizes.__slots__))
+def _together(kind: type[_Table], parts: Sequence[_Table]) -> _Table:
+    """The rows of several tables of a kind, one after the other."""
+    return kind(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(kind)))
 
 
 def _last(worth: Floats, owner: Ints) -> Ints:
@@ -167,13 +170,12 @@ def _last(worth: Floats, owner: Ints) -> Ints:
     return order[np.diff(owner[order], append=-1) != 0]
 
 
-def _classes(told: _Sizes, vehicle: Ints) -> Classified:
-    """The classes of all tracks (T,), each of a vehicle; NaN for those that tell nothing."""
-    found = classified(told.information, told.vector, told.speed)
+def _of_all(found: Classified, who: Ints, vehicle: Ints) -> Classified:
+    """The classes of all tracks, each of a vehicle (T,), by those of the vehicles `who`; NaN where nothing is told."""
     parts = found.probability, found.size, found.sigma
     result = [np.full((len(vehicle), part.shape[1]), np.nan) for part in parts]
     for whole, part in zip(result, parts, strict=True):
-        whole[told.track] = part
+        whole[who] = part
     return Classified(*(whole[vehicle] for whole in result))
 
 

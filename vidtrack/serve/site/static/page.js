@@ -169,7 +169,7 @@ function showPlace() {
     ? store.now.world && metresOfPlan(store.now.world, place.at)
     : metresOf(found?.calibration?.metres, place.at);
   const pixels = `${place.at[0].toFixed(0)}, ${place.at[1].toFixed(0)} px`;
-  $("#place").textContent = metres ? `${pixels}   ${metres[0].toFixed(2)} m east, ${metres[1].toFixed(2)} m north` : pixels;
+  $("#place").textContent = metres ? `${pixels} · ${metres[0].toFixed(2)} m east, ${metres[1].toFixed(2)} m north` : pixels;
 }
 
 /* A line at the top; words null: none. */
