@@ -148,16 +148,20 @@ class LikelihoodGate(Gate):
     """The maximum-likelihood gate, which is optimal for two hypotheses (SPEC 001; Blackman 1986, section 4.2).
 
     A pair is admitted if it is likelier than its alternative, that the target is missed and the measurement is false or
-    of a new target: v' S^-1 v <= 2 ln(P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
+    of a new target, or less likely by no more than a factor:
+    v' S^-1 v <= 2 ln(loss P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
     Among few false measurements the gate is wide, and holds a target that manoeuvres; in dense ones it is narrow.
 
     detection_probability, new_density [per unit of measurement space]   P_D, and the density of false measurements and
     new targets. None: the P_D and clutter density of the tracker, the latter with new_share of new targets in addition
+    loss   what it costs to refuse a target's measurement, in costs of admitting a false one: the least expected cost
+           admits whatever is not as many times less likely than its alternative
     """
 
     detection_probability: float | None = 0.9
     new_density: float | None = 1e-5
     new_share: float = 0.1
+    loss: float = 1.0
 
     def __post_init__(self) -> None:
         Gate.__post_init__(self)
@@ -165,6 +169,8 @@ class LikelihoodGate(Gate):
             raise ConfigError(f"detection probability is {self.detection_probability}; it must be above 0, at most 1")
         if self.new_density is not None and not self.new_density > 0:
             raise ConfigError(f"density of new targets is {self.new_density}; it must be above zero")
+        if not self.loss > 0:
+            raise ConfigError(f"loss is {self.loss}; it must be above zero")
         if self.distance != "mahalanobis":
             raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
 
@@ -175,7 +181,7 @@ class LikelihoodGate(Gate):
         seen = detection if self.detection_probability is None else self.detection_probability
         density = clutter * (1 + self.new_share) if self.new_density is None else self.new_density
         with np.errstate(divide="ignore"):  # P_D of one, or no clutter: everything is likelier than a miss
-            odds = np.log(seen) - np.log(1 - seen) - np.log(density)
+            odds = np.log(self.loss * seen) - np.log(1 - seen) - np.log(density)
         log_s = np.linalg.slogdet(S)[1]
         return np.maximum(0.0, 2 * odds - dim * np.log(TURN) - log_s)
 
