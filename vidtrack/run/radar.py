@@ -47,7 +47,7 @@ from vidtrack.tracking.unresolved.unresolved import Unresolved
 from vidtrack.tracks import Tracks
 
 LOSS = 10.0
-"""What a refused plot of the target costs a track, in costs of an admitted false one: the track, and not one position."""
+"""What refusing the target's plot costs, in costs of admitting a false one: the track may be lost, not a position."""
 
 
 def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 0) -> Iterator[tuple[int, Tracks]]:
