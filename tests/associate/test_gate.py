@@ -214,8 +214,6 @@ def test_likelihood_gate_admits_what_is_likelier_than_a_miss_and_a_new_target():
     np.testing.assert_allclose(pairs.limit, [12.58829543076271], rtol=1e-12)
     np.testing.assert_array_equal(pairs.measurement, [1, 3])
     np.testing.assert_allclose(gate.inside(pairs.limit, 2), chdtr(2, pairs.limit))
-    wider = LikelihoodGate(detection_probability=0.9, new_density=1e-3, loss=10.0)
-    np.testing.assert_allclose(wider.pairs(np.zeros((1, 2)), cov, scan).limit, pairs.limit + 2 * np.log(10.0))
     hopeless = LikelihoodGate(detection_probability=0.1, new_density=1.0)
     assert len(hopeless.pairs(np.zeros((1, 2)), cov, scan)) == 0
 

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.amplitude.reduction import ball
 from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
@@ -148,14 +149,93 @@ class LikelihoodGate(Gate):
     """The maximum-likelihood gate, which is optimal for two hypotheses (SPEC 001; Blackman 1986, section 4.2).
 
     A pair is admitted if it is likelier than its alternative, that the target is missed and the measurement is false or
-    of a new target, or less likely by no more than a factor:
-    v' S^-1 v <= 2 ln(loss P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
+    of a new target: v' S^-1 v <= 2 ln(P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
     Among few false measurements the gate is wide, and holds a target that manoeuvres; in dense ones it is narrow.
+    With a `loss` above one it is wider, by 2 ln(loss), as long as it holds one false measurement at most on average.
 
     detection_probability, new_density [per unit of measurement space]   P_D, and the density of false measurements and
     new targets. None: the P_D and clutter density of the tracker, the latter with new_share of new targets in addition
-    loss   what it costs to refuse a target's measurement, in costs of admitting a false one: the least expected cost
-           admits whatever is not as many times less likely than its alternative
+    loss  what it costs to refuse a target's measurement, in costs of admitting a false one. The least expected cost
+          admits what is less than so many times less likely than its alternative
+    """
+
+    detection_probability: float | None = 0.9
+    new_density: float | None = 1e-5
+    new_share: float = 0.1
+    loss: float = 1.0
+
+    def __post_init__(self) -> None:
+        Gate.__post_init__(self)
+        if self.detection_probability is not None and not 0 < self.detection_probability <= 1:
+            raise ConfigError(f"detection probability is {self.detection_probability}; it must be above 0, at most 1")
+        if self.new_density is not None and not self.new_density > 0:
+            raise ConfigError(f"density of new targets is {self.new_density}; it must be above zero")
+        if not self.loss > 0:
+            raise ConfigError(f"loss is {self.loss}; it must be above zero")
+        if self.distance != "mahalanobis":
+            raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
+
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
+        """(T,) largest admitted squared distance of each row; zero where no measurement is likely enough."""
+        dim = cov.shape[1]
+        S = cov if scan.noise is None else cov + scan.noise
+        seen = detection if self.detection_probability is None else self.detection_probability
+        density = clutter * (1 + self.new_share) if self.new_density is None else self.new_density
+        log_s = np.linalg.slogdet(S)[1]
+        with np.errstate(divide="ignore", over="ignore"):  # P_D of one, or no clutter: all is likelier than a miss
+            odds = np.log(seen) - np.log(1 - seen) - np.log(density)
+            one_false = np.exp(-(np.log(density * ball(dim)) + log_s / 2) * 2 / dim)
+        likelier = 2 * odds - dim * np.log(TURN) - log_s
+        return np.maximum(0.0, np.maximum(likelier, np.minimum(likelier + 2 * np.log(self.loss), one_false)))
+
+    def inside(self, limit: Floats, dim: int) -> Floats:
+        """(T,) P_G, the share of a target's own measurements that gates of these limits admit: `probability`.
+
+        The axes of a box are taken as independent.
+        """
+        return each(self.probability ** (dim if self.distance == "box" else 1), len(limit))
+
+    def pairs(
+        self,
+        zhat: Floats,
+        cov: Floats,
+        scan: Scan,
+        run: Ints | None = None,
+        angles: tuple[int, ...] = (),
+        detection: float | Floats = 0.9,
+        clutter: float | Floats = 1e-5,
+    ) -> Pairs:
+        """All pairs inside the gate, both sides of the same Monte Carlo run.
+
+        zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each measurement's R.
+        `angles` are components in -pi..pi that wrap. `detection` and `clutter` are P_D and the density of false
+        measurements, one for all or (T,). Candidates come from a grid over the first two axes, so the time grows with
+        the number of pairs and not with T times M.
+        """
+        rows = len(zhat)
+        limit = self.limits(cov, scan, each(detection, rows), each(clutter, rows))
+        mode = _MODES[self.distance]
+        runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
+        own = np.zeros(len(zhat), np.int64) if run is None else run
+        gated = _gated(zhat.shape[1], angles)
+        row, measurement, d2, nis, log_s, log_l, start = gated(mode, zhat, cov, own, limit, scan.z, scan.R, runs)
+        cost = d2 if mode == EUCLIDEAN else d2 + log_s
+        return Pairs(row, measurement, d2, nis, log_s, log_l, cost, limit, start)
+
+
+@dataclass(frozen=True, slots=True)
+class LikelihoodGate(Gate):
+    """The maximum-likelihood gate, which is optimal for two hypotheses (SPEC 001; Blackman 1986, section 4.2).
+
+    A pair is admitted if it is likelier than its alternative, that the target is missed and the measurement is false or
+    of a new target: v' S^-1 v <= 2 ln(P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
+    Among few false measurements the gate is wide, and holds a target that manoeuvres; in dense ones it is narrow.
+    With a `loss` above one it is wider, by 2 ln(loss), as long as it holds one false measurement at most on average.
+
+    detection_probability, new_density [per unit of measurement space]   P_D, and the density of false measurements and
+    new targets. None: the P_D and clutter density of the tracker, the latter with new_share of new targets in addition
+    loss  what it costs to refuse a target's measurement, in costs of admitting a false one. The least expected cost
+          admits what is less than so many times less likely than its alternative
     """
 
     detection_probability: float | None = 0.9
@@ -181,9 +261,12 @@ class LikelihoodGate(Gate):
         seen = detection if self.detection_probability is None else self.detection_probability
         density = clutter * (1 + self.new_share) if self.new_density is None else self.new_density
         with np.errstate(divide="ignore"):  # P_D of one, or no clutter: everything is likelier than a miss
-            odds = np.log(self.loss * seen) - np.log(1 - seen) - np.log(density)
-        log_s = np.linalg.slogdet(S)[1]
-        return np.maximum(0.0, 2 * odds - dim * np.log(TURN) - log_s)
+            odds = np.log(seen) - np.log(1 - seen) - np.log(density)
+            log_s = np.linalg.slogdet(S)[1]
+            likely = np.maximum(0.0, 2 * odds - dim * np.log(TURN) - log_s)
+            # a gate of d2 has the volume pi^(M/2) |S|^(1/2) d2^(M/2) / (M/2)!
+            of_one = np.exp(2 / dim * (gammaln(dim / 2 + 1) - np.log(density) - log_s / 2)) / np.pi
+        return np.maximum(likely, np.minimum(likely + 2 * np.log(self.loss), of_one))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
         """(T,) P_G, the share of a target's own measurements that gates of these limits admit; chi-square."""
