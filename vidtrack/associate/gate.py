@@ -105,8 +105,8 @@ class Gate:
             return self.radius**2
         return quantile(self.probability, 1 if self.distance == "box" else dim)
 
-    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
-        """(T,) largest admitted squared distance of each row; P_D (T,) and clutter density (T,) do not count."""
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats, weight: Floats) -> Floats:
+        """(T,) largest admitted squared distance of each row; P_D, clutter density and weight (T,) do not count."""
         return each(self.limit(cov.shape[1]), len(cov))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
@@ -125,16 +125,17 @@ class Gate:
         angles: tuple[int, ...] = (),
         detection: float | Floats = 0.9,
         clutter: float | Floats = 1e-5,
+        weight: float | Floats = 1.0,
     ) -> Pairs:
         """All pairs inside the gate, both sides of the same Monte Carlo run.
 
         zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each measurement's R.
         `angles` are components in -pi..pi that wrap. `detection` and `clutter` are P_D and the density of false
-        measurements, one for all or (T,). Candidates come from a grid over the first two axes, so the time grows with
-        the number of pairs and not with T times M.
+        measurements, `weight` the probability of these predictions, one for all or (T,). Candidates come from a grid
+        over the first two axes, so the time grows with the number of pairs and not with T times M.
         """
         rows = len(zhat)
-        limit = self.limits(cov, scan, each(detection, rows), each(clutter, rows))
+        limit = self.limits(cov, scan, each(detection, rows), each(clutter, rows), each(weight, rows))
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
@@ -175,7 +176,7 @@ class LikelihoodGate(Gate):
         if self.distance != "mahalanobis":
             raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
 
-    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats, weight: Floats) -> Floats:
         """(T,) largest admitted squared distance of each row; zero where no measurement is likely enough."""
         dim = cov.shape[1]
         S = cov if scan.noise is None else cov + scan.noise
@@ -183,7 +184,7 @@ class LikelihoodGate(Gate):
         density = clutter * (1 + self.new_share) if self.new_density is None else self.new_density
         log_s = np.linalg.slogdet(S)[1]
         with np.errstate(divide="ignore", over="ignore"):  # P_D of one, or no clutter: all is likelier than a miss
-            odds = np.log(seen) - np.log(1 - seen) - np.log(density)
+            odds = np.log(weight * seen) - np.log(1 - seen) - np.log(density)
             one_false = np.exp(-(np.log(density * ball(dim)) + log_s / 2) * 2 / dim)
         likelier = 2 * odds - dim * np.log(TURN) - log_s
         return np.maximum(0.0, np.maximum(likelier, np.minimum(likelier + 2 * np.log(self.loss), one_false)))
