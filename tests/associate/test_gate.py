@@ -219,7 +219,14 @@ def test_likelihood_gate_admits_what_is_likelier_than_a_miss_and_a_new_target():
 
 
 @pytest.mark.parametrize(
-    "bad", [{"detection_probability": 0.0}, {"new_density": -1.0}, {"distance": "euclidean"}, {"probability": 2.0}]
+    "bad",
+    [
+        {"detection_probability": 0.0},
+        {"new_density": -1.0},
+        {"loss": 0.0},
+        {"distance": "euclidean"},
+        {"probability": 2.0},
+    ],
 )
 def test_a_likelihood_gate_that_makes_no_sense_is_refused(bad):
     with pytest.raises(ConfigError, match=str(next(iter(bad.values())))):

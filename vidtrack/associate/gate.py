@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import gammainc, gammaincinv
 
+from vidtrack.amplitude.reduction import ball
 from vidtrack.arrays.rows import each, starts
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.associate.grid import cells
@@ -104,8 +105,8 @@ class Gate:
             return self.radius**2
         return quantile(self.probability, 1 if self.distance == "box" else dim)
 
-    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
-        """(T,) largest admitted squared distance of each row; P_D (T,) and clutter density (T,) do not count."""
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats, weight: Floats) -> Floats:
+        """(T,) largest admitted squared distance of each row; P_D, clutter density and weight (T,) do not count."""
         return each(self.limit(cov.shape[1]), len(cov))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
@@ -124,16 +125,17 @@ class Gate:
         angles: tuple[int, ...] = (),
         detection: float | Floats = 0.9,
         clutter: float | Floats = 1e-5,
+        weight: float | Floats = 1.0,
     ) -> Pairs:
         """All pairs inside the gate, both sides of the same Monte Carlo run.
 
         zhat (T, m) predicted measurements and cov (T, m, m) their covariance H P H'; S adds each measurement's R.
         `angles` are components in -pi..pi that wrap. `detection` and `clutter` are P_D and the density of false
-        measurements, one for all or (T,). Candidates come from a grid over the first two axes, so the time grows with
-        the number of pairs and not with T times M.
+        measurements, `weight` the probability of these predictions, one for all or (T,). Candidates come from a grid
+        over the first two axes, so the time grows with the number of pairs and not with T times M.
         """
         rows = len(zhat)
-        limit = self.limits(cov, scan, each(detection, rows), each(clutter, rows))
+        limit = self.limits(cov, scan, each(detection, rows), each(clutter, rows), each(weight, rows))
         mode = _MODES[self.distance]
         runs = np.zeros(len(scan), np.int64) if scan.run is None else scan.run
         own = np.zeros(len(zhat), np.int64) if run is None else run
@@ -150,14 +152,18 @@ class LikelihoodGate(Gate):
     A pair is admitted if it is likelier than its alternative, that the target is missed and the measurement is false or
     of a new target: v' S^-1 v <= 2 ln(P_D / ((1 - P_D) density (2 pi)^(M/2) |S|^(1/2))), with S from the scan's mean R.
     Among few false measurements the gate is wide, and holds a target that manoeuvres; in dense ones it is narrow.
+    With a `loss` above one it is wider, by 2 ln(loss), as long as it holds one false measurement at most on average.
 
     detection_probability, new_density [per unit of measurement space]   P_D, and the density of false measurements and
     new targets. None: the P_D and clutter density of the tracker, the latter with new_share of new targets in addition
+    loss  what it costs to refuse a target's measurement, in costs of admitting a false one. The least expected cost
+          admits what is less than so many times less likely than its alternative
     """
 
     detection_probability: float | None = 0.9
     new_density: float | None = 1e-5
     new_share: float = 0.1
+    loss: float = 1.0
 
     def __post_init__(self) -> None:
         Gate.__post_init__(self)
@@ -165,19 +171,23 @@ class LikelihoodGate(Gate):
             raise ConfigError(f"detection probability is {self.detection_probability}; it must be above 0, at most 1")
         if self.new_density is not None and not self.new_density > 0:
             raise ConfigError(f"density of new targets is {self.new_density}; it must be above zero")
+        if not self.loss > 0:
+            raise ConfigError(f"loss is {self.loss}; it must be above zero")
         if self.distance != "mahalanobis":
             raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
 
-    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats) -> Floats:
+    def limits(self, cov: Floats, scan: Scan, detection: Floats, clutter: Floats, weight: Floats) -> Floats:
         """(T,) largest admitted squared distance of each row; zero where no measurement is likely enough."""
         dim = cov.shape[1]
         S = cov if scan.noise is None else cov + scan.noise
         seen = detection if self.detection_probability is None else self.detection_probability
         density = clutter * (1 + self.new_share) if self.new_density is None else self.new_density
-        with np.errstate(divide="ignore"):  # P_D of one, or no clutter: everything is likelier than a miss
-            odds = np.log(seen) - np.log(1 - seen) - np.log(density)
         log_s = np.linalg.slogdet(S)[1]
-        return np.maximum(0.0, 2 * odds - dim * np.log(TURN) - log_s)
+        with np.errstate(divide="ignore", over="ignore"):  # P_D of one, or no clutter: all is likelier than a miss
+            odds = np.log(weight * seen) - np.log(1 - seen) - np.log(density)
+            one_false = np.exp(-(np.log(density * ball(dim)) + log_s / 2) * 2 / dim)
+        likelier = 2 * odds - dim * np.log(TURN) - log_s
+        return np.maximum(0.0, np.maximum(likelier, np.minimum(likelier + 2 * np.log(self.loss), one_false)))
 
     def inside(self, limit: Floats, dim: int) -> Floats:
         """(T,) P_G, the share of a target's own measurements that gates of these limits admit; chi-square."""

@@ -36,8 +36,7 @@ def mixture_pairs(
     """
     weight, zhat, cov = modes
     count, rows, dim = zhat.shape
-    with np.errstate(divide="ignore"):  # a mode of weight w against clutter is one of weight 1 against 1 / w of it
-        each = [gate.pairs(zhat[j], cov[j], scan, run, angles, detection, clutter / weight[j]) for j in range(count)]
+    each = [gate.pairs(zhat[j], cov[j], scan, run, angles, detection, clutter, weight[j]) for j in range(count)]
     open_to = [weight[j, pairs.row] >= LEAST_MODE for j, pairs in enumerate(each)]
     keys = [(pairs.row * len(scan) + pairs.measurement)[mask] for pairs, mask in zip(each, open_to, strict=True)]
     key = np.unique(np.concatenate(keys))

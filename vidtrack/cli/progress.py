@@ -56,7 +56,7 @@ def _lines(items: Iterable[Item], expected: int | None, name: str, unit: str) ->
         if now - told > LINE_EVERY_S:
             click.echo(f"{name}: {unit} {done}{of}, {done / (now - began):.0f} {unit}s/s", err=True)
             told = now
-    click.echo(f"{name}: {done} {unit}s in {time.monotonic() - began:.1f} s", err=True)
+    click.echo(f"{name}: {done} {unit}{'s' * (done != 1)} in {time.monotonic() - began:.1f} s", err=True)
 
 
 def report_outcome(folder: Path, quiet: bool, none: str = "no tracks") -> None:

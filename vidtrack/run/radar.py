@@ -46,6 +46,9 @@ from vidtrack.tracking.unresolved.cell import PolarCell
 from vidtrack.tracking.unresolved.unresolved import Unresolved
 from vidtrack.tracks import Tracks
 
+LOSS = 10.0
+"""What refusing the target's plot costs, in costs of admitting a false one: the track may be lost, not a position."""
+
 
 def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 0) -> Iterator[tuple[int, Tracks]]:
     """Yields the number of each scan of a plot table (CSV, Parquet) and the tracks after it, lazily.
@@ -204,7 +207,7 @@ def _gate_and_threshold(settings: Settings, found: Measurements) -> tuple[Gate, 
     """The gate, and the controller of the detection threshold, whose gate has a fixed width."""
     radar, common = settings.radar, settings.tracker
     if radar.snr_db is None:
-        return gate(common, radar.euclidean_radius_m, adaptive=True), None
+        return gate(common, radar.euclidean_radius_m, adaptive=True, loss=LOSS), None
     if common.distance != "mahalanobis":
         raise ConfigError(
             f"radar.snr_db needs the distance mahalanobis, and not {common.distance}; leave one of them out"

@@ -35,13 +35,13 @@ def rule(settings: TrackerSettings, *, unresolved: bool = False) -> Associator |
     return methods.METHODS[settings.method]()
 
 
-def gate(settings: TrackerSettings, radius: float, *, adaptive: bool = False) -> Gate:
+def gate(settings: TrackerSettings, radius: float, *, adaptive: bool = False, loss: float = 1.0) -> Gate:
     """The gate of these settings; radius [px or m] of the euclidean distance.
 
-    adaptive  without a probability given, the gate follows P_D and clutter density
+    adaptive  without a probability given, the gate follows P_D and clutter density; `loss` as in LikelihoodGate
     """
     if settings.gate_probability is None and adaptive and settings.distance == "mahalanobis":
-        return LikelihoodGate(detection_probability=None, new_density=None)
+        return LikelihoodGate(detection_probability=None, new_density=None, loss=loss)
     probability = PROBABILITY if settings.gate_probability is None else settings.gate_probability
     return Gate(probability, settings.distance, radius)
 

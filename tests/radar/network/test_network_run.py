@@ -62,6 +62,14 @@ def test_one_degree_of_bias_leaves_one_track_a_target(biased):
     assert sigma[0] == sigma[29] > sigma[-1]  # what was learnt ahead is not learnt again
 
 
+@pytest.mark.parametrize(("south_y_m", "told"), [(-15000.0, False), (15000.0, True)])
+def test_radars_at_wrong_places_learn_no_bias_and_this_is_said(biased, caplog, south_y_m, told):
+    text = (biased / "radars.toml").read_text()
+    (biased / "moved.toml").write_text(text.replace("y_m = -15000.0", f"y_m = {south_y_m}"))
+    finished(biased, ["north", "south"], f"moved-{told}", "moved.toml")
+    assert ("have told no bias" in caplog.text) is told
+
+
 def test_only_the_first_minute_is_learnt_ahead(biased):
     paths = [str(biased / "north.csv"), str(biased / "south.csv")]
     network = Network(read_feeds(paths, read_radars(biased / "radars.toml"), load().radar))

@@ -150,6 +150,15 @@ class Network:
         self._told_s = t
         self.registration.begin_anew()
 
+    def warn_if_untold(self) -> None:
+        """A warning says so if by the end common targets have told no bias, though there may be some."""
+        unknown = self.registration.prior > 0
+        if unknown.any() and not self.registration.observed()[unknown].any():
+            _log.warning(
+                "targets that two radars see at a time have told no bias: were there none, or are the places and "
+                "directions of %s wrong?", _radars(self.feeds),
+            )  # fmt: skip
+
     def as_dict(self) -> dict[str, dict[str, float | bool]]:
         """The biases of each radar by name, with their standard deviations, and whether the targets have told them."""
         estimate, sigma, observed = self.registration.bias, self.registration.sigma(), self.registration.observed()
