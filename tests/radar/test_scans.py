@@ -53,6 +53,29 @@ def test_the_extended_filter_gets_range_and_azimuth(tmp_path):
     assert found.z[0] == pytest.approx([1000, -np.pi / 2])
 
 
+def test_errors_grow_by_the_extent_of_targets_in_all_directions(tmp_path):
+    """Echoes that wander on a vehicle near a radar have the errors that are stated, across the line of sight too."""
+    rng = np.random.default_rng(4)
+    true = np.array([20.0, 15.0])
+    echo = true + rng.normal(0, 0.7, (4000, 2))
+    polar = np.column_stack([np.hypot(*echo.T), np.degrees(np.arctan2(*echo.T))]) + rng.normal(0, (0.4, 1), (4000, 2))
+    rows = [f"{k},{k},{r},{a},0.4,1" for k, (r, a) in enumerate(polar)]
+    points, vehicles = read(tmp_path, *rows), read(tmp_path, *rows, extent_m=0.7)
+    nees = [np.einsum("ni,nij,nj->n", f.z - true, np.linalg.inv(f.R), f.z - true).mean() for f in (points, vehicles)]
+    assert nees[0] > 4
+    assert nees[1] == pytest.approx(2, abs=0.1)
+    assert vehicles.R[:, 0, 0] + vehicles.R[:, 1, 1] == pytest.approx(0.4**2 + (25 * np.radians(1)) ** 2 + 0.98, rel=0.2)
+
+
+def test_the_extent_in_positions_and_elevation(tmp_path):
+    flat = read(tmp_path, "0,0,100,50,3,4", header="scan,time_s,x_m,y_m,sigma_x_m,sigma_y_m", extent_m=4)
+    assert np.diag(flat.R[0]) == pytest.approx([25, 32])
+    header = "scan,time_s,range_m,azimuth_deg,elevation_deg,sigma_range_m,sigma_azimuth_deg,sigma_elevation_deg"
+    high = read(tmp_path, "0,0,100,50,3,3,1,2", header=header, extent_m=4, estimator="ekf")
+    one = np.radians([1, 2])
+    assert np.diag(high.R[0]) == pytest.approx([25, one[0] ** 2 + 0.04**2, one[1] ** 2 + 0.04**2])
+
+
 @pytest.mark.parametrize(
     ("estimator", "kind", "size"), [("kalman", PositionRangeRate, 4), ("ekf", RangeAzimuthElevation, 4)]
 )
