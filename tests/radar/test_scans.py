@@ -64,7 +64,9 @@ def test_errors_grow_by_the_extent_of_targets_in_all_directions(tmp_path):
     nees = [np.einsum("ni,nij,nj->n", f.z - true, np.linalg.inv(f.R), f.z - true).mean() for f in (points, vehicles)]
     assert nees[0] > 4
     assert nees[1] == pytest.approx(2, abs=0.1)
-    assert vehicles.R[:, 0, 0] + vehicles.R[:, 1, 1] == pytest.approx(0.4**2 + (25 * np.radians(1)) ** 2 + 0.98, rel=0.2)
+    assert vehicles.R[:, 0, 0] + vehicles.R[:, 1, 1] == pytest.approx(
+        0.4**2 + (25 * np.radians(1)) ** 2 + 0.98, rel=0.2
+    )
 
 
 def test_the_extent_in_positions_and_elevation(tmp_path):
