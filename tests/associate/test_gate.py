@@ -219,11 +219,30 @@ def test_likelihood_gate_admits_what_is_likelier_than_a_miss_and_a_new_target():
 
 
 @pytest.mark.parametrize(
+    ("clutter", "usual", "wider"),
+    [
+        (1e-6, 19.119, 19.119 + 2 * np.log(10)),  # few false ones: the whole loss counts
+        (5e-5, 11.295, 15.901),
+        (3e-4, 7.712, 10.505),  # between: one false measurement on average, pi d2 sqrt|S| clutter = 1
+        (1e-3, 5.304, 5.304),  # dense: no wider
+    ],
+)
+def test_refusing_a_measurement_costs_more_while_a_gate_holds_few_false_ones(clutter, usual, wider):
+    """S = 101 I, P_D = .9: d2 = 2 ln(.9 / (.1 clutter 2 pi 101)), and 2 ln 10 more."""
+    scan = Scan(0.0, np.zeros((1, 2)), np.eye(2))
+    for loss, limit in ((1.0, usual), (10.0, wider)):
+        gate = LikelihoodGate(detection_probability=None, new_density=None, new_share=0.0, loss=loss)
+        pairs = gate.pairs(np.zeros((1, 2)), 100 * np.eye(2)[None], scan, detection=0.9, clutter=clutter)
+        np.testing.assert_allclose(pairs.limit, [limit], atol=1e-3)
+
+
+@pytest.mark.parametrize(
     "bad",
     [
         {"detection_probability": 0.0},
         {"new_density": -1.0},
-        {"loss": 0.0},
+        {"loss": 0.5},
+        {"loss": np.inf},
         {"distance": "euclidean"},
         {"probability": 2.0},
     ],

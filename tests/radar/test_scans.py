@@ -75,7 +75,9 @@ def test_the_extent_in_positions_and_elevation(tmp_path):
     header = "scan,time_s,range_m,azimuth_deg,elevation_deg,sigma_range_m,sigma_azimuth_deg,sigma_elevation_deg"
     high = read(tmp_path, "0,0,100,50,3,3,1,2", header=header, extent_m=4, estimator="ekf")
     one = np.radians([1, 2])
-    assert np.diag(high.R[0]) == pytest.approx([25, one[0] ** 2 + 0.04**2, one[1] ** 2 + 0.04**2])
+    assert np.diag(high.R[0]) == pytest.approx(
+        [25, one[0] ** 2 + (0.04 / np.cos(np.radians(3))) ** 2, one[1] ** 2 + 0.04**2]
+    )
 
 
 @pytest.mark.parametrize(

@@ -171,8 +171,8 @@ class LikelihoodGate(Gate):
             raise ConfigError(f"detection probability is {self.detection_probability}; it must be above 0, at most 1")
         if self.new_density is not None and not self.new_density > 0:
             raise ConfigError(f"density of new targets is {self.new_density}; it must be above zero")
-        if not self.loss > 0:
-            raise ConfigError(f"loss is {self.loss}; it must be above zero")
+        if not 1 <= self.loss < np.inf:
+            raise ConfigError(f"loss is {self.loss}; it must be 1 or more, and finite")
         if self.distance != "mahalanobis":
             raise ConfigError(f"distance is {self.distance!r}; the maximum-likelihood gate needs mahalanobis")
 

@@ -68,10 +68,15 @@ class Plots:
         return replace(self, scan=self.scan[rows], time_s=self.time_s[rows], z=z, sigma=sigma, amplitude=amplitude)
 
     def of_extended_targets(self, extent: float) -> Plots:
-        """The plots with errors of targets whose echo comes from a place on them, of this standard deviation [m]."""
-        arm = np.ones((len(self), self.dim))  # m that a unit of a component moves a target
+        """Plots of targets whose echo comes from a place on them, with this standard deviation [m]: larger errors."""
+        if extent == 0:
+            return self
+        arm = np.ones((len(self), self.dim))  # m by which a unit of each component moves a target
         if self.polar:
-            arm[:, 1:] = np.maximum(self.z[:, :1], extent)
+            arm[:, 1:] = self.z[:, :1]
+            if self.dim == 3:
+                arm[:, 1] *= np.cos(self.z[:, 2])
+            arm[:, 1:] = np.maximum(arm[:, 1:], extent)
         sigma = self.sigma.copy()
         sigma[:, : self.dim] = np.hypot(sigma[:, : self.dim], extent / arm)
         return replace(self, sigma=sigma)

@@ -116,18 +116,17 @@ def measurements(plots: Plots, settings: RadarSettings) -> Measurements:
     """
     if settings.estimator == "alpha-beta" or settings.group_link_m is not None:
         plots = plots.without_range_rate()
-    if settings.extent_m > 0:
+    converted = plots.polar and settings.estimator not in NONLINEAR
+    if not converted:
         plots = plots.of_extended_targets(settings.extent_m)
     z, R = plots.z, np.einsum("ni,ij->nij", plots.sigma**2, np.eye(plots.sigma.shape[1]))
     sensor: Sensor = PositionRangeRate(settings.position[: plots.dim]) if plots.doppler else POSITION
-    if plots.polar:
-        polar = _polar(plots, settings)
-        if settings.estimator in NONLINEAR:
-            sensor = polar
-        else:
-            position, cov = polar.locate(z, R)
-            z = np.column_stack([position, z[:, plots.dim :]])
-            R[:, : plots.dim, : plots.dim] = cov
+    if converted:
+        position, cov = _polar(plots, settings).locate(z, R)
+        z = np.column_stack([position, z[:, plots.dim :]])
+        R[:, : plots.dim, : plots.dim] = cov + settings.extent_m**2 * np.eye(plots.dim)
+    elif plots.polar:
+        sensor = _polar(plots, settings)
     return Measurements(sensor, plots.dim, plots.scan, plots.time_s, settings.max_speed / 2, z, R, plots.amplitude)
 
 

@@ -188,9 +188,9 @@ def build_road_tracker(
     radar, common = settings.radar, settings.tracker
     if radar.group_link_m is not None or radar.snr_db is not None:
         raise ConfigError("radar.group_link_m and radar.snr_db are for one radar without a camera; leave them out")
+    refuse_smoothing(settings)
     if radar.estimator == "alpha-beta":
         raise ConfigError("alpha-beta has one gain, for scans at one rate; radar and camera have two, take kalman")
-    refuse_smoothing(settings)
     stations = [
         Station(
             Rates(
@@ -243,3 +243,5 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
         if isinstance(seen, Turn) and network is not None:
             network.learn(seen, tracks)
         yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})
+    if network is not None:
+        network.warn_if_untold()

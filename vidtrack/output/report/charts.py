@@ -134,8 +134,10 @@ def time_space(ways: Ways, clock: Clock, unit: str) -> bytes:
             axis.plot(t, along, color=BLUE, linewidth=0.9)
         for gate, name in ((0.0, f"entry, {ways.movement.start}"), (ways.length, f"exit, {ways.movement.end}")):
             axis.axhline(gate, color=SIGNAL, linewidth=0.9, linestyle="--")
-            place, above = {"xycoords": ("axes fraction", "data")}, {"xytext": (0, 2), "textcoords": "offset points"}
-            axis.annotate(name, (1, gate), **place, **above, ha="right", va="bottom", fontsize=7, color=SIGNAL)
+            axis.annotate(
+                name, (1, gate), xycoords=("axes fraction", "data"), xytext=(0, 2), textcoords="offset points",
+                ha="right", va="bottom", fontsize=7, color=SIGNAL,
+            )  # fmt: skip
         axis.set_ylim(-0.3 * ways.length, 1.3 * ways.length)
         axis.set_ylabel(f"along the way, {unit}")
         time_axis(axis, clock, np.array([ways.begin_s, ways.end_s]))

@@ -139,7 +139,8 @@ class Network:
         if turn.span.t <= self._told_s:
             return
         took = np.flatnonzero((tracks.status != TENTATIVE) & (tracks.measurement >= 0) & (tracks.group < 0))
-        plots = self.feeds[turn.station].plots.rows(turn.span.rows)
+        feed = self.feeds[turn.station]
+        plots = feed.plots.rows(turn.span.rows).of_extended_targets(feed.settings.extent_m)
         rows = tracks.measurement[took]
         R = np.einsum("ni,ij->nij", plots.sigma[rows, :2] ** 2, np.eye(2))
         taken = Plotted(turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.v[took])
@@ -151,11 +152,10 @@ class Network:
         self.registration.begin_anew()
 
     def warn_if_untold(self) -> None:
-        """A warning says so if by the end common targets have told no bias, though there may be some."""
-        unknown = self.registration.prior > 0
-        if unknown.any() and not self.registration.observed()[unknown].any():
+        """A warning says so if by the end there were fewer comparisons of common targets than biases to tell."""
+        if self.registration.used < np.count_nonzero(self.registration.prior):
             _log.warning(
-                "targets that two radars see at a time have told no bias: were there none, or are the places and "
+                "hardly any target of two radars told their biases: were there none at one time, or are the places and "
                 "directions of %s wrong?", _radars(self.feeds),
             )  # fmt: skip
 

@@ -188,7 +188,7 @@ class LiveReader:
 
     def read(self, table: pa.Table) -> Rows:
         """The rows of the next table; vehicles without a place are carried as in `Reader`."""
-        column = numbers_of(table)
+        column = numbers_of(table.select(ROAD_COLUMNS))
         track, t, unknown = table["track_id"].to_numpy(), column["time_s"], np.full((len(table), 4), np.nan)
         rows = _on_road(self._ground, column, track, t, *states(table), side_by_side(table, BOX), unknown, unknown)
         if len(t) == 0:
