@@ -30,7 +30,8 @@ class Scan:
     amplitude  (M,) signal strength in units of the noise
     score      (M,) detector confidence
     label      (M,) class, -1 unknown; a track of known class takes no measurement of another class
-    lasting    (M, m, m) the part of R due to errors that persist from scan to scan; None: all are independent
+    lasting    (M, m, m) the part of R due to errors that persist from scan to scan, for `noise.LASTING_S`; one that
+               persists for longer counts in proportion. None: all are independent
     run        (M,) Monte Carlo run of each measurement, numbered from 0 without gaps; pairs form only within a run
     surveyed   (4,) left, top, right, bottom of the sensor's field of view; None: the tracker's bounds
     pixel      size of the sensor's pixel in units of z

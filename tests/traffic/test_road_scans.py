@@ -7,8 +7,9 @@ import pytest
 from pinhole import HEIGHT, POINTS, WIDTH, Pinhole, site_of
 
 import vidtrack as vt
+from vidtrack.estimate.noise import LASTING_S
 from vidtrack.traffic.calibration.calibrate import calibrated
-from vidtrack.traffic.road_scans import InPicture, RoadScans
+from vidtrack.traffic.road_scans import LAMP_M, LAMP_S, InPicture, RoadScans
 
 CAMERA = Pinhole()
 PLACES = np.array([[0.0, 20.0], [-2.0, 30.0], [3.0, 40.0]])
@@ -44,6 +45,16 @@ def test_a_blob_is_where_its_vehicle_stands(ground):
     assert (d2 < 9).all()
     assert np.linalg.norm(off, axis=1).max() < 1.0
     assert (np.linalg.eigvalsh(scan.R - scan.lasting) > 0).all()
+
+
+def test_what_lamps_light_is_off_its_vehicle_for_a_while(ground):
+    blobs, tracks = blobs_and_tracks()
+    roads = RoadScans(ground, (WIDTH, HEIGHT))
+    day, night = (roads.scan(blobs, tracks, 0, dark=dark) for dark in (False, True))
+    np.testing.assert_array_equal(night.z, day.z)
+    lamps = np.broadcast_to(LAMP_M**2 * np.eye(2), (3, 2, 2))
+    np.testing.assert_allclose(night.R - day.R, lamps)
+    np.testing.assert_allclose(night.lasting - day.lasting, LAMP_S / LASTING_S * lamps)
 
 
 def test_a_blob_that_two_tracks_share_is_left_out(ground):

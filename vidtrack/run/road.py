@@ -237,7 +237,8 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
             scan = network.scan(seen)
         else:
             assert camera is not None
-            scan = camera.scans.scan(seen.scan, seen.tracks, number)
+            dark = seen.foreground is not None and seen.foreground.dark
+            scan = camera.scans.scan(seen.scan, seen.tracks, number, dark=dark)
         made = perf_counter()
         tracks = tracker.step(scan)
         if isinstance(seen, Turn) and network is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats
+from vidtrack.estimate.noise import LASTING_S
 from vidtrack.scan import Scan
 from vidtrack.tracks import Tracks
 from vidtrack.traffic.boxes import within
@@ -17,6 +18,8 @@ UNKNOWN_PX_S = 1e3
 """px/s; standard deviation of the velocity of a blob without a track."""
 EDGE_PX = 1.5
 """Processed pixels; standard deviation of the edges of a blob, which shadow and the like move for seconds."""
+LAMP_M, LAMP_S = 1.2, 2.0
+"""m, s; what lamps light by night is so far from the vehicle in each direction (standard deviation), for so long."""
 CELL_PX = 16.0
 """px; side of the squares by which the area of the picture on the road is added up."""
 
@@ -63,11 +66,12 @@ class RoadScans:
         self._ground = ground
         self._footprints = Footprints(ground, size)
 
-    def scan(self, blobs: Scan, tracks: Tracks, station: int) -> Scan:
+    def scan(self, blobs: Scan, tracks: Tracks, station: int, *, dark: bool = False) -> Scan:
         """The blobs of one vehicle each, on the road; those that the calibration does not cover are left out.
 
         The heading of a vehicle is that of its track. R is the error of the border, of the vehicle's shape and heading,
-        and of the calibration; all but the first last from picture to picture.
+        and of the calibration; all but the first last from picture to picture. In the dark a blob shows what lamps
+        light, which moves with the vehicle.
         """
         assert blobs.box is not None, "blobs have boxes"
         owner = np.full(len(blobs), -1)
@@ -93,4 +97,7 @@ class RoadScans:
         edges = (EDGE_PX * blobs.pixel) ** 2 * K @ K.transpose(0, 2, 1)
         R = own + edges + shared @ shared.transpose(0, 2, 1)
         lasting = R - K @ blobs.R[rows[good]] @ K.transpose(0, 2, 1)
+        if dark:  # errors that last longer weigh in proportion
+            lamps = LAMP_M**2 * np.eye(2)
+            R, lasting = R + lamps, lasting + LAMP_S / LASTING_S * lamps
         return Scan(blobs.t, xy, R, lasting=lasting, noise=np.eye(2), station=station)

@@ -27,6 +27,7 @@ class Foreground:
     warnings  new warnings for the user
     elsewhere whether the camera has changed its view, and the scene has been replaced
     surveyed  (4,) left, top, right, bottom of the area in view [source px of the scene]; None: not known
+    dark      whether lamps light the scene, so that vehicles show what is lit
     planes    luminance (h, w) and chroma of half its size, or of zero rows, in which the mask was found; None: not kept
     """
 
@@ -39,6 +40,7 @@ class Foreground:
     weak: Image | None = None
     warnings: tuple[str, ...] = ()
     elsewhere: bool = False
+    dark: bool = False
     planes: tuple[NDArray, NDArray, NDArray] | None = None
 
     def reduced(self, shape: tuple[int, int]) -> Image:

@@ -134,6 +134,7 @@ def test_headlamps_that_sweep_over_a_dark_road_are_no_motion_of_the_camera():
         u, v = planes[180:].reshape(2, 90, 160)
         foreground = found.apply(Frame(k, k / FPS, planes[:180], u, v, full_range=False), NONE_KNOWN)
         assert foreground.motion is None
+    assert foreground.dark
 
 
 def test_a_swaying_camera_sees_nothing_on_an_empty_street_and_a_vehicle_where_it_is_in_the_scene():

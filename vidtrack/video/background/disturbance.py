@@ -145,7 +145,7 @@ class Disturbance:
         if anew:
             self._scene = self._start(picture, time_s)
         warnings = self._camera.warnings()
-        return self._view.foreground(mask, strength, place, motion, weak, warnings, elsewhere, shown)
+        return self._view.foreground(mask, strength, place, motion, weak, warnings, elsewhere, shown, dark=self._dark)
 
     def _rewind(self, time_s: float, picture: Picture) -> None:
         """Begin with this picture, the last of the preview, and the scene learnt from it."""

@@ -82,12 +82,12 @@ class View:
     def foreground(
         self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY,
         weak: Image | None = None, warnings: tuple[str, ...] = (), elsewhere: bool = False,
-        planes: Picture | None = None,
+        planes: Picture | None = None, dark: bool = False,
     ) -> Foreground:  # fmt: skip
         """The Foreground of a mask (h, w), 0 and 255, cleared where `keep` is dark, and its strength (h, w).
 
         place, motion  (2, 3) from the mask to the scene and to the picture [processed px]
-        weak, warnings, elsewhere, planes  of the Foreground
+        weak, warnings, elsewhere, planes, dark  of the Foreground
         """
         if self.keep is not None:
             h, w = self.reduced
@@ -96,7 +96,8 @@ class View:
                 back, size = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST, (mask.shape[1], mask.shape[0])
                 keep = cv2.warpAffine(keep, place, size, flags=back, borderMode=cv2.BORDER_REPLICATE)
             mask = np.where(keep > 127, mask, np.uint8(0))
-        return Foreground(mask, strength, self.step, *self._views(place, motion), weak, warnings, elsewhere, planes)
+        views = self._views(place, motion)
+        return Foreground(mask, strength, self.step, *views, weak, warnings, elsewhere, dark, planes)
 
     def _views(self, place: Floats, motion: Floats) -> tuple[Floats | None, Floats | None, Floats]:
         """Maps from mask to scene and from scene to picture, None for the identity, and the picture's left, top, right,
