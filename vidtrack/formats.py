@@ -52,7 +52,7 @@ class Table:
     cov    (N, d, d) covariance of xy
     nis    (N,) normalised innovation squared; NaN for rows without a measurement
     unit   of xy: "px" or "m"
-    time_s (N,) time of a radar's scan; None for frames of a video
+    time_s (N,) time of a radar's scan, or of a frame with positions in metres
     """
 
     frame: Ints
@@ -240,7 +240,7 @@ def _from_columns(columns: pa.Table, path: str, place: Place) -> Table:
     nis = numbers("nis")[:, 0] if "nis" in names else None
     if box is not None and len(box) and np.isnan(box).all():
         box = None
-    timed = frame_column == "scan" and "time_s" in names and _is_numeric(columns["time_s"])
+    timed = (frame_column == "scan" or unit == "m") and "time_s" in names and _is_numeric(columns["time_s"])
     return Table(frame, identity, xy, box, conf, cov, nis, unit, numbers("time_s")[:, 0] if timed else None)
 
 

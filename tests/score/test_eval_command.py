@@ -57,9 +57,10 @@ def test_a_file_that_cannot_be_written_is_an_error(files):
         run(files / "run", files / "gt.txt", "--json", files)
 
 
-def test_a_truth_of_other_scans_is_refused(tmp_path):
-    for name, step_s in (("tracks", 4), ("truth", 2)):
+@pytest.mark.parametrize("counted", ["scan", "frame"])  # a frame's number is no scan's where a camera helps a radar
+def test_a_truth_of_other_scans_is_refused(tmp_path, counted):
+    for name, number, step_s in (("tracks", "scan", 4), ("truth", counted, 2)):
         rows = "".join(f"{k},{step_s * k},1,0,0\n" for k in range(9))
-        (tmp_path / f"{name}.csv").write_text("scan,time_s,track_id,x_m,y_m\n" + rows)
-    with pytest.raises(FormatError, match="scan 8 is at 32 s in the result and at 16 s in the truth"):
+        (tmp_path / f"{name}.csv").write_text(f"{number},time_s,track_id,x_m,y_m\n" + rows)
+    with pytest.raises(FormatError, match="number 8 is at 32 s in the result and at 16 s in the truth"):
         run(tmp_path / "tracks.csv", tmp_path / "truth.csv")

@@ -139,7 +139,7 @@ def test_scan_numbers_of_other_times_are_refused_and_another_zero_of_time_is_not
     same = replace(truth, time_s=4.0 * scan + 1.7 + 1e9)
     assert evaluate(same, truth)["idf1"] == 1.0
     assert evaluate(replace(truth, time_s=None), truth)["idf1"] == 1.0
-    with pytest.raises(FormatError, match=r"scan 9 is at 36 s in the result and at 18 s in the truth"):
+    with pytest.raises(FormatError, match=r"number 9 is at 36 s in the result and at 18 s in the truth"):
         evaluate(truth, replace(truth, time_s=2.0 * scan))
     with pytest.raises(FormatError, match="other scans"):
         evaluate(*pool([(truth, replace(truth, time_s=2.0 * scan))] * 2))

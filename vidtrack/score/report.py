@@ -79,7 +79,10 @@ def evaluate(
 
 
 def _refuse_other_scans(result: Table, truth: Table) -> None:
-    """Raise FormatError where most of the common scan numbers are of other times; the clocks may begin differently."""
+    """Raise FormatError where most of the common numbers of scans and frames are of other times.
+
+    The clocks may begin differently.
+    """
     if result.time_s is None or truth.time_s is None:
         return
     scan, in_result, in_truth = np.intersect1d(result.frame, truth.frame, return_indices=True)
@@ -91,8 +94,9 @@ def _refuse_other_scans(result: Table, truth: Table) -> None:
     if np.median(np.abs(off - np.median(off))) > step_s / 2:
         k = int(np.abs(off - off[0]).argmax())
         raise FormatError(
-            f"scan {scan[k]} is at {ours[k]:.10g} s in the result and at {theirs[k]:.10g} s in the truth, which "
-            "numbers other scans, such as those of a whole network of radars; give the truth at the scans of the result"
+            f"number {scan[k]} is at {ours[k]:.10g} s in the result and at {theirs[k]:.10g} s in the truth, which "
+            "numbers other scans or frames, such as those of a network of radars, or of a radar with a camera; give "
+            "the truth at the scans of the result"
         )
 
 
