@@ -65,7 +65,7 @@ def test_errors_grow_by_the_extent_of_targets_in_all_directions(tmp_path):
     assert nees[0] > 4
     assert nees[1] == pytest.approx(2, abs=0.1)
     assert vehicles.R[:, 0, 0] + vehicles.R[:, 1, 1] == pytest.approx(
-        0.4**2 + (25 * np.radians(1)) ** 2 + 0.98, rel=0.2
+        0.4**2 + (25 * np.radians(1)) ** 2 + 2 * 0.7**2, rel=0.2
     )
 
 

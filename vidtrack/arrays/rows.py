@@ -1,4 +1,4 @@
-"""Sparse entries sorted by row, rows found by name, values of each row, and room for more rows."""
+"""Sparse entries sorted by row, rows found by name, values and products of each row, and room for more rows."""
 
 from __future__ import annotations
 
@@ -29,6 +29,11 @@ def no_index(rows: int) -> Ints:
     none = np.empty(rows, np.int64)
     none.fill(-1)
     return none
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """(N,) scalar products of the rows of a and b (N, k)."""
+    return np.einsum("ni,ni->n", a, b)
 
 
 def replaced(value: np.ndarray, rows: Ints, other: np.ndarray, at: Ints) -> np.ndarray:

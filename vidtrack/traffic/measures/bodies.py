@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from vidtrack.arrays.rows import dot
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
 from vidtrack.traffic.measures.rows import Rows
@@ -84,7 +85,7 @@ class Bodies:
 
     def half(self, n: Floats) -> Floats:
         """(N,) how far the rectangles reach from their middles along n (N, 2), times its length."""
-        along, across = np.abs(_dot(self.ahead, n)), np.abs(_cross(self.ahead, n))
+        along, across = np.abs(dot(self.ahead, n)), np.abs(_cross(self.ahead, n))
         return np.asarray((self.table[:, LENGTH] * along + self.table[:, WIDTH] * across) / 2)
 
     def variance(self, n: Floats) -> Floats:
@@ -130,7 +131,7 @@ class Encounters:
     def at(cls, a: Bodies, b: Bodies, value: Floats, sigma: Floats, rank: Floats, t: Floats, xy: Floats) -> Encounters:
         """Those of vehicles a and b (E,), in this order."""
         speed = np.column_stack([np.linalg.norm(one.v, axis=1) for one in (a, b)])
-        angle = np.arccos(np.clip(_dot(a.ahead, b.ahead), -1, 1))
+        angle = np.arccos(np.clip(dot(a.ahead, b.ahead), -1, 1))
         return cls(a.track, b.track, value, sigma, rank, t, xy, angle, speed, a.merged | b.merged)
 
     def __len__(self) -> int:
@@ -208,13 +209,9 @@ def touching_place(a: Bodies, b: Bodies, n: Floats) -> Floats:
     """(N, 2) the middle of what two rectangles have in common, along unit vectors n (N, 2) and square to them."""
     place = np.zeros_like(n)
     for axis in (n, np.column_stack([-n[:, 1], n[:, 0]])):
-        low, high = ([_dot(one.xy, axis) + sign * one.half(axis) for one in (a, b)] for sign in (-1, 1))
+        low, high = ([dot(one.xy, axis) + sign * one.half(axis) for one in (a, b)] for sign in (-1, 1))
         place += ((np.maximum(*low) + np.minimum(*high)) / 2)[:, None] * axis
     return place
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("ni,ni->n", a, b)
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

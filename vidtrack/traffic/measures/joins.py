@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vidtrack.arrays.rows import dot
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.rows import Rows, off_road
 from vidtrack.traffic.measures.stretches import JOLT_PER_M_S, MODEL_M_S, STANDING_JOLT, End, Lives
@@ -115,13 +116,9 @@ def found_again(tail: End, head: End, a: Ints, b: Ints) -> Floats:
     sxv = xv + gap * vv + jolt * gap**2 / 2 + xv2
     svv = vv + jolt * gap + v2 + MODEL_M_S**2
     det = sxx * svv - sxv**2
-    square = (svv * _dot(place, place) - 2 * sxv * _dot(place, pace) + sxx * _dot(pace, pace)) / det
+    square = (svv * dot(place, place) - 2 * sxv * dot(place, pace) + sxx * dot(pace, pace)) / det
     density = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det / _LOST_S
     return np.asarray(density * np.exp(-(2 + _FREEDOM / 2) * np.log1p(square / _FREEDOM) - gap / _LOST_S))
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("ni,ni->n", a, b)
 
 
 def gap_rows(lives: Lives, joins: Joins) -> Rows:
