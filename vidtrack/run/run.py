@@ -40,6 +40,11 @@ class Extras:
         """Whether the tracker must keep each scan's choices."""
         return self.decisions or self.rerun is not None
 
+    @property
+    def shows(self) -> bool:
+        """Whether an output shows the pictures."""
+        return self.video is not None or self.rerun is not None
+
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:

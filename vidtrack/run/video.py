@@ -79,7 +79,7 @@ def _file_steps(path: str, settings: Settings, site: Path | None) -> Iterator[tu
         if site is not None and road is None:
             raise ConfigError(f"{site} has no section [calibration], so nobody knows the metres; track without a site")
         detector = build_detector(settings)
-        look_ahead(source, detector, settings)
+        look_ahead(source, detector, settings, whole=True)
         tracker = build_blob_tracker(settings.tracker, (source.width, source.height))
         for step in video_steps(source, detector, tracker, settings):
             assert step.frame is not None
@@ -115,7 +115,7 @@ def video_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pi
         if isinstance(source, Recording):
             source.restore = Checkpoint(detector, tracker, source.like).restore
         else:
-            look_ahead(source, detector, settings)
+            look_ahead(source, detector, settings, whole=extras.shows)
         subject = file_subject(extras.source or path, source, tracker.rates.as_dict, settings, detector.scene)
         link_s = settings.output.link_s if settings.output.link else None
         hold_s = LIVE_HOLD_S if recorded else HOLD_S
@@ -148,11 +148,15 @@ def kept(settings: Settings, masked: Sequence[Corners] = (), width: int = 0, hei
     return without(None if path is None else read_mask(path), masked, width, height)
 
 
-def look_ahead(source: Source, detector: Background, settings: Settings) -> None:
-    """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene."""
+def look_ahead(source: Source, detector: Background, settings: Settings, *, whole: bool = False) -> None:
+    """Show the first seconds of a video, of which the source may be a slice, to a detector that learns the scene.
+
+    whole  whether anything but the detector looks at the pictures: else they may be kept as it reduces them
+    """
     seconds = settings.detector.disturbance.preview_s
     if isinstance(detector, Disturbance) and seconds:
-        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S))
+        keep = Frame.copy if whole else detector.kept
+        detector.preview(source.opening(seconds, settings.source.end_s, PREVIEW_EVERY_S, keep))
 
 
 def video_steps(frames: Iterable[Frame], detector: Background, tracker: Tracker, settings: Settings) -> Iterator[Step]:

@@ -20,6 +20,7 @@ class Frame:
     y       (H, W) luminance
     u, v    ((H+1)//2, (W+1)//2) chroma planes (Cb, Cr), None for a grey source
     full_range  luminance spans 0..255 (JPEG), else 16..235 (video)
+    whole   (H, W) of the picture where the planes are the detector's reduction of it; None: they are whole
     """
 
     index: int
@@ -28,6 +29,7 @@ class Frame:
     u: Image | None = None
     v: Image | None = None
     full_range: bool = False
+    whole: tuple[int, int] | None = None
 
     @classmethod
     def blank(cls, shape: tuple[int, int], coloured: bool) -> Frame:
@@ -38,8 +40,8 @@ class Frame:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(H, W)."""
-        return self.y.shape[0], self.y.shape[1]
+        """(H, W) of the picture."""
+        return self.whole or (self.y.shape[0], self.y.shape[1])
 
     @property
     def nbytes(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import glob
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import chain
 from pathlib import Path
@@ -22,7 +22,7 @@ from vidtrack.video.span import ROUNDING_S, Span
 from vidtrack.video.stats import SourceStats
 
 _DEPTH = 4  # frames read ahead: enough to even out key frames, 50 MB at 4K
-_KEPT_BYTES = 100_000_000  # of an opening; ten seconds of 640x360 at 25 frames/s are 86 MB
+_KEPT_BYTES = 200_000_000  # of an opening; ten seconds of 960x540 at 25 frames/s are 194 MB
 
 
 def open_source(path: str, settings: SourceSettings) -> Source:
@@ -132,29 +132,35 @@ class Source:
     ) -> None:
         self.close()
 
-    def opening(self, seconds: float, end_s: float | None, every_s: float = 0.0) -> Iterator[Frame]:
+    def opening(
+        self,
+        seconds: float,
+        end_s: float | None,
+        every_s: float = 0.0,
+        keep: Callable[[Frame], Frame] = Frame.copy,
+    ) -> Iterator[Frame]:
         """The frames of its first seconds, at most to end_s, before it is iterated.
 
-        They are kept until then if they are few or small. Others are read twice: their numbers are 0, and some of those
-        less than `every_s` apart may be missing.
+        They are kept until then, as what `keep` makes of them, if they are few or small. Others are read twice: their
+        numbers are 0, and some of those less than `every_s` apart may be missing.
         """
         begin_s = self._span.start_s
         end_s = begin_s + seconds if end_s is None else min(end_s, begin_s + seconds)
-        size = (end_s - begin_s) * self.fps * self._first.nbytes
+        size = (end_s - begin_s) * self.fps * keep(self._first).nbytes
         if end_s <= self._span.end_s and size <= _KEPT_BYTES:
-            yield from self._kept(end_s)
+            yield from self._kept(end_s, keep)
             return
         with closing(_pictures(self._path, self._settings, SourceStats(told=True))) as again:
             for picture in again.between(begin_s, end_s, every_s):
                 yield matched(to_frame(0, *picture), self._first)
 
-    def _kept(self, end_s: float) -> Iterator[Frame]:
+    def _kept(self, end_s: float, keep: Callable[[Frame], Frame]) -> Iterator[Frame]:
         """The frames to end_s, each kept for the reading; so is the one after them, since it is read by then.
 
         There are fewer where pictures come so much faster than the stated rate that they would be too large.
         """
         held = 0
-        for frame in map(Frame.copy, self._ahead):
+        for frame in map(keep, self._ahead):
             self._opened.append(frame)
             held += frame.nbytes
             if frame.time_s > end_s + ROUNDING_S or held > _KEPT_BYTES:

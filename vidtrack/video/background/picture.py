@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -79,6 +80,14 @@ class View:
             self.black = 0 if frame.full_range else _VIDEO_BLACK
         return reduce(frame, self.step)
 
+    def kept(self, frame: Frame) -> Frame:
+        """The frame with the planes that `reduce` makes of it, in memory of their own."""
+        picture = self.reduce(frame)
+        if self.step == 1:
+            return frame.copy()
+        u, v = (None if plane is None else small for plane, small in zip((frame.u, frame.v), picture[1:], strict=True))
+        return replace(frame, y=picture.luma, u=u, v=v, whole=frame.shape)
+
     def foreground(
         self, mask: Image, strength: NDArray, place: Floats = affine.IDENTITY, motion: Floats = affine.IDENTITY,
         weak: Image | None = None, warnings: tuple[str, ...] = (), elsewhere: bool = False,
@@ -144,10 +153,10 @@ def reduce(frame: Frame, step: int) -> Picture:
     """The frame's planes as area averages of step x step pixels.
 
     Rows and columns that do not fill a window at the lower and right edge are left out; h and w are then even,
-    so that chroma still covers the picture. The frame has at least 2 step rows and columns.
+    so that chroma still covers the picture. The frame has at least 2 step rows and columns, or is reduced already.
     """
     cb, cr = (np.empty((0, 0), np.uint8) if plane is None else plane for plane in (frame.u, frame.v))
-    if step == 1:
+    if step == 1 or frame.whole is not None:
         return Picture(frame.y, cb, cr)
     h, w = reduced_shape(frame.shape, step)
     half = (h // 2, w // 2)
