@@ -36,6 +36,8 @@ def relit(picture: Picture, scene: Scene, black: np.float32) -> Picture:
     """The picture in the light of the scene, of which no pixel is covered."""
     lit = scene._replace(luma=scene.luma.copy(), former=scene.former[:0])
     follow_gain(picture, lit, black)
+    if np.array_equal(lit.luma, scene.luma):
+        return picture
     light, shown = ((plane - black).sum() for plane in (scene.luma, lit.luma))
     if light <= 0 or abs(shown / light - 1) < _SEEN:
         return picture

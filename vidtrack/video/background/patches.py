@@ -26,7 +26,6 @@ _BESIDE = 0.2  # share of the known patches around that a picture may hide, and 
 _ELSE = 0.5  # share of a picture that differs, above which it is of another light or view
 _PICTURES = 2  # that must show a patch alike
 _APART = 3  # px over which steps are taken
-_EVERYWHERE = slice(None)
 _SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 _AROUND = (*_SIDES, (-1, -1), (-1, 1), (1, -1), (1, 1))
 
@@ -82,7 +81,7 @@ class _Patchwork:
         now = _whole(Picture(*(np.rint(plane).astype(np.uint8) for plane in scene[:3])))
         self._now = _planes(now).astype(np.int16)
         differs = [(picture, _unlike(picture, now)) for picture in map(_whole, pictures)]
-        like = [(picture, unlike) for picture, unlike in differs if unlike.mean() <= 255 * _ELSE]
+        like = [(picture, unlike) for picture, unlike in differs if cv2.countNonZero(unlike) <= _ELSE * unlike.size]
         self._pictures = [picture for picture, _ in like]
         rows, columns = (side // _SIDE for side in now.luma.shape)
         self.hidden = np.empty((rows, columns, len(like)), np.float32)
@@ -146,7 +145,9 @@ class _Patchwork:
         """(T, c, 8, 8) what the pictures show there."""
         if place not in self._shown:
             rows, columns = _pixels(place)
-            self._shown[place] = np.stack([_planes(picture, rows, columns) for picture in self._pictures])
+            half = slice(rows.start // 2, rows.stop // 2), slice(columns.start // 2, columns.stop // 2)
+            planes = zip(((rows, columns), half, half), zip(*self._pictures, strict=True), strict=True)
+            self._shown[place] = _planes(Picture(*(np.stack([plane[part] for plane in of]) for part, of in planes)))
         return self._shown[place].astype(np.int16)
 
     def _roughness(self, place: Place, patch: Planes) -> NDArray[np.float64]:
@@ -187,17 +188,11 @@ def _whole(picture: Picture) -> Picture:
     return Picture(luma, *(np.pad(plane, half, "edge") for plane in picture[1:]))
 
 
-def _planes(picture: Picture, rows: slice = _EVERYWHERE, columns: slice = _EVERYWHERE) -> Image:
-    """(c, h, w) luminance, and both chromas if there are any, of these rows and columns; they begin at even ones."""
-    luma = picture.luma[rows, columns]
-    planes = [luma]
-    if picture.cb.size:
-        h, w = luma.shape
-        y, x = ((part.start or 0) // 2 for part in (rows, columns))
-        for plane in picture[1:]:
-            part = plane[y : y + (h + 1) // 2, x : x + (w + 1) // 2]
-            planes.append(part.repeat(2, 0).repeat(2, 1)[:h, :w])
-    return np.stack(planes)
+def _planes(picture: Picture) -> Image:
+    """(..., c, h, w) luminance, and both chromas if there are any, of pictures (..., h, w)."""
+    h, w = picture.luma.shape[-2:]
+    chroma = [plane.repeat(2, -2).repeat(2, -1)[..., :h, :w] for plane in picture[1:] if plane.size]
+    return np.stack([picture.luma, *chroma], -3)
 
 
 def _distance(a: Planes, b: Planes, axis: int = -3) -> Planes:
