@@ -86,7 +86,10 @@ def corners(width: float, height: float) -> Floats:
 @kernel
 def displacement(plane: Floats, width: float, height: float, since: Floats) -> float:
     """px; largest displacement of a picture's corner between this map and `since`."""
-    off = plane - since
+    off = np.empty((2, 3))
+    for i in range(2):
+        for j in range(3):
+            off[i, j] = plane[i, j] - since[i, j]
     most = 0.0
     for i in range(2):
         for j in range(2):

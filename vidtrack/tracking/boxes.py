@@ -92,7 +92,7 @@ def covers(inner: Floats, outer: Floats, order: Ints) -> tuple[Ints, Floats]:
         if not area > 0:
             continue
         right, bottom = inner[t, 0] + inner[t, 2], inner[t, 1] + inner[t, 3]
-        for k in range(np.searchsorted(left, inner[t, 0] - widest), len(left)):
+        for k in range(_first(left, inner[t, 0] - widest), len(left)):
             j = order[k]
             if left[k] >= right:
                 break
@@ -104,6 +104,19 @@ def covers(inner: Floats, outer: Floats, order: Ints) -> tuple[Ints, Floats]:
 
 
 @inlined
+def _first(values: Floats, least: float) -> int:
+    """Index of the first of the ascending values (N,) that is not below `least`; N if all are."""
+    low, high = 0, len(values)
+    while low < high:
+        middle = (low + high) // 2
+        if values[middle] < least:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@inlined
 def common(a: Floats, b: Floats) -> float:
     """Area that two boxes (4,) have in common; 0 where one of them is not known."""
     wide = min(a[0] + a[2], b[0] + b[2]) - max(a[0], b[0])
@@ -112,16 +125,15 @@ def common(a: Floats, b: Floats) -> float:
 
 
 @kernel
-def overlapping(inner: Floats, outer: Floats, one: Mask, other: Mask, least: float) -> Ints:
+def overlapping(inner: Floats, outer: Floats, one: Ints, other: Ints, least: float) -> Ints:
     """(T,) for each inner box the outer one that overlaps it most, if it does so most in turn; -1 for none.
 
-    Only inner boxes of the mask `one` (T,) and outer boxes of the mask `other` (M,) with an intersection over union of
-    at least `least` count.
+    Only inner boxes `one` (K,) and outer boxes `other` (L,) with an intersection over union of at least `least` count.
     """
     index, best = np.full(len(inner), -1), np.full(len(inner), least)
     partner, most = np.full(len(outer), -1), np.full(len(outer), least)
-    for t in np.flatnonzero(one):
-        for j in np.flatnonzero(other):
+    for t in one:
+        for j in other:
             a, b = inner[t], outer[j]
             both = common(a, b)
             if not both > 0:

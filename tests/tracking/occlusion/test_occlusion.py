@@ -197,7 +197,7 @@ def test_catch_gives_each_idle_track_the_free_blob_that_it_overlaps_most():
 def test_of_two_tracks_on_one_blob_the_one_that_overlaps_it_more_has_it():
     tracks = np.array([[0.0, 0, 40, 20], [6.0, 0, 40, 20], [np.nan, 0, 40, 20]])
     blob = np.array([[8.0, 0, 40, 20]])
-    assert overlapping(tracks, blob, np.ones(3, bool), np.ones(1, bool), 0.3).tolist() == [-1, 0, -1]
+    assert overlapping(tracks, blob, np.arange(3), np.arange(1), 0.3).tolist() == [-1, 0, -1]
 
 
 @pytest.mark.parametrize("cover", [0.0, -1.0, 1.1])

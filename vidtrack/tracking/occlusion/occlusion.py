@@ -107,7 +107,7 @@ class Occlusion:
         if not np.count_nonzero(idle):
             return shared, free
         untaken = free & (np.bincount(shared[shared >= 0], minlength=len(free)) == 0)
-        caught = overlapping(view.predicted, view.blobs, idle, untaken, self.overlap)
+        caught = overlapping(view.predicted, view.blobs, idle.nonzero()[0], untaken.nonzero()[0], self.overlap)
         free[caught[caught >= 0]] = False
         return np.where(caught >= 0, caught, shared), free
 

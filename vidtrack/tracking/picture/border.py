@@ -119,7 +119,7 @@ def _in_view(x: Floats, P: Floats, edges: tuple[float, float, float, float]) -> 
 def _cut(box: Floats, edges: tuple[float, float, float, float], reach: float) -> Mask:
     cut, sides = np.zeros(len(box), np.bool_), _sides(box, edges, reach)
     for i in range(len(box)):
-        cut[i] = sides[i].any()
+        cut[i] = sides[i, 0] or sides[i, 1] or sides[i, 2] or sides[i, 3]
     return cut
 
 

@@ -79,7 +79,9 @@ def _shares(mask: Image, columns: int, rows: int) -> tuple[float, float]:
                 count[x] += np.int32(mask[y, x] >> np.uint8(7))
         for i in range(columns):
             left, right = i * w // columns, (i + 1) * w // columns
-            inside = count[left:right].sum()
+            inside = 0
+            for x in range(left, right):
+                inside += count[x]
             total += inside
             touched += inside > _TOUCHED * (bottom - top) * (right - left)
     return total / (h * w), touched / (columns * rows)

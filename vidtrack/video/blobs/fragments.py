@@ -38,7 +38,9 @@ def links(row: Runs, start: Runs, stop: Runs, label: Ints, total: int, weak: Ima
         if i >= 0:
             inside[k] = region[i]
             filled[region[i]] += stop[k] - start[k]
-    link = -1 - np.arange(total)
+    link = np.empty(total, np.int64)
+    for i in range(total):
+        link[i] = -1 - i
     for k in range(len(row)):
         if inside[k] >= 0 and filled[inside[k]] > _FILLED * whole[inside[k]]:
             link[label[k]] = inside[k]

@@ -27,17 +27,19 @@ def nearest_box(inside: Image, box: Ints, predicted: Floats) -> tuple[Ints, int]
         used[k] = _filled(inside, box, predicted[k]) >= _COVERED
         for j in range(k):
             used[k] &= not (used[j] and _share(predicted[j], predicted[k]) > _SAME)
-    boxes = np.flatnonzero(used)
-    number = np.full(len(boxes), -1)
-    count = 0
-    if len(boxes) < 2:
+    boxes, number = np.empty(len(used), np.int64), np.full(len(used), -1)
+    some = count = 0
+    for k in range(len(used)):
+        boxes[some] = k
+        some += used[k]
+    if some < 2:
         return label, 0
     for y in range(h):
         for x in range(w):
             if not inside[y, x]:
                 continue
             best, least = -1, np.inf
-            for n in range(len(boxes)):
+            for n in range(some):
                 p = predicted[boxes[n]]
                 across = abs(x + box[0] + 0.5 - p[0] - p[2] / 2) / p[2]
                 along = abs(y + box[1] + 0.5 - p[1] - p[3] / 2) / p[3]
