@@ -11,7 +11,7 @@ ANY = np.ones(2)
 
 
 def cut(mask, border, neck, least):
-    return parts(half_width(mask, border), neck, least)
+    return parts(half_width(mask, border), neck, least)[:2]
 
 
 def discs(*radii, bar=3, gap=2):
@@ -53,6 +53,14 @@ def test_a_rectangle_is_one(size):
 def test_a_wide_neck_is_none():
     assert cut(discs(12, 12, bar=18), NO_BORDER, 0.5, ANY)[1] == 1
     assert cut(discs(12, 12, bar=9), NO_BORDER, 0.5, ANY)[1] == 2
+
+
+@pytest.mark.parametrize(("bar", "told"), [(3, True), (9, False), (15, False), (23, True)])
+def test_whether_a_wider_neck_leaves_the_parts_as_they_are_is_told(bar, told):
+    depth = half_width(discs(12, 12, bar=bar), NO_BORDER)
+    label, count, same = parts(depth, 0.3, ANY, 0.85)
+    wider, number, _ = parts(depth, 0.85, ANY)
+    assert same == told == (count == number and np.array_equal(label, wider))
 
 
 def test_a_part_smaller_than_the_least_joins_its_neighbour():

@@ -109,25 +109,25 @@ def cut_at_necks(regions: Regions, measure: _Measure, predicted: Floats) -> Regi
         depth = half_width(patch(regions, i, box[i]), border)
         if large[i]:
             least = typical[i] * np.sqrt(_CUT_PART if any(border) else _PART)
-            cut = _cut(depth, _NECK, least, box[i])
+            cut, same = _cut(depth, _NECK, least, box[i])
             if cut is None:
-                cut = _cut(depth, _SHALLOW, least, box[i])
+                cut = None if same else _cut(depth, _SHALLOW, least, box[i])[0]
                 if cut is None or not _likelier(cut, box[i], typical[i], measure.sizes):
                     continue
             if _breaks(cut, predicted):
                 continue
         else:
-            cut = _cut(depth, _NECK, np.ones(2), box[i])
+            cut, _ = _cut(depth, _NECK, np.ones(2), box[i])
             if cut is None or not _alike(cut):
                 continue
         regions = regions.parted(i, cut)
     return regions
 
 
-def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> Regions | None:
-    """The parts of a region; None: it has one."""
-    label, count = parts(depth, neck, least)
-    return of_labels(label, count, box) if count > 1 else None
+def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> tuple[Regions | None, bool]:
+    """The parts of a region, None: it has one; and whether it has the same at a neck of up to _SHALLOW."""
+    label, count, same = parts(depth, neck, least, _SHALLOW)
+    return of_labels(label, count, box) if count > 1 else None, same
 
 
 def _breaks(cut: Regions, predicted: Floats) -> bool:

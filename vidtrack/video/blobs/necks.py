@@ -30,18 +30,19 @@ def half_width(inside: Image, border: tuple[int, int, int, int]) -> NDArray[np.f
     return np.ascontiguousarray(cv2.distanceTransform(grown, cv2.DIST_L2, 5)[1:-1, 1:-1], np.float32)
 
 
-def parts(depth: NDArray[np.float32], neck: float, least: Floats) -> tuple[Ints, int]:
-    """Parts (h, w) of a region, numbered from 0, -1 outside, and the number of parts.
+def parts(depth: NDArray[np.float32], neck: float, least: Floats, wider: float = 1.0) -> tuple[Ints, int, bool]:
+    """Parts (h, w) of a region, numbered from 0, -1 outside, their number, and whether a wider neck gives the same.
 
     depth   (h, w) its half width at each pixel; parts are the basins of the watershed transform
     neck    largest half width of the region between two parts, as a share of the smaller one's
     least   (2,) width and height whose product is the smallest box area of a part; smaller parts join a neighbour
+    wider   the wider neck: they are the same parts if no two basins met where it would have kept them apart
     """
-    return _watershed(depth, neck, float(least[0] * least[1]))
+    return _watershed(depth, neck, wider, float(least[0] * least[1]))
 
 
 @kernel
-def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[Ints, int]:
+def _watershed(depth: NDArray[np.float32], neck: float, wider: float, least: float) -> tuple[Ints, int, bool]:
     h, w = depth.shape
     wide = w + 2  # with a rim on each side no pixel needs a look whether it has neighbours
     deep, label = np.zeros((h + 2) * wide, np.float32), np.full((h + 2) * wide, np.int32(-1))
@@ -51,7 +52,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
     order, across = _deepest_first(deep), np.uint64(wide)
     parent, peak = np.empty(len(order), np.int64), np.empty(len(order))
     one, other, saddle = [0 for _ in range(0)], [0 for _ in range(0)], [0.0 for _ in range(0)]
-    basins = 0
+    basins, same = 0, True
     for p in order:
         d = np.float64(deep[p])
         # Least and greatest of the neighbours' labels; most pixels have one, or none.
@@ -70,6 +71,7 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
                 root = _root(parent, np.int64(label[q]))
                 if best >= 0 and root != best:
                     if d > neck * min(peak[root], peak[best]):  # no neck: one part
+                        same &= d > wider * min(peak[root], peak[best])
                         keep, gone = (root, best) if peak[root] > peak[best] else (best, root)
                         parent[gone] = keep
                         best = keep
@@ -85,7 +87,8 @@ def _watershed(depth: NDArray[np.float32], neck: float, least: float) -> tuple[I
         label[p] = best
     basin, parent = label.reshape(h + 2, wide)[1:-1, 1:-1], parent[:basins]
     _absorb_small(_extents(basin, len(parent)), parent, one, other, saddle, least)
-    return _numbered(basin, parent)
+    label, count = _numbered(basin, parent)
+    return label, count, same
 
 
 @inlined
