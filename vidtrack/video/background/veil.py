@@ -68,6 +68,7 @@ class VeilByPlace:
         self._seen_s = np.zeros((_ROWS, _COLUMNS))
         self._since_s = 0.0
         self._last: tuple[Floats, Haze, Air] | None = None  # levels and haze that the last air was made of, and it
+        self._known: tuple[Floats, Haze, Floats] | None = None  # what the last levels were made of, and they
 
     def learn(self, luma: Image, mask: Image, dt: float) -> None:
         """Take a picture (h, w) and where it shows traffic, dt [s] after the last one."""
@@ -93,6 +94,12 @@ class VeilByPlace:
         return air
 
     def _levels(self, haze: Haze) -> Floats:
+        """Luminance of black in each cell; the same until something is learnt: `_darkest` is another array then."""
+        if self._known is None or self._known[0] is not self._darkest or self._known[1] != haze:
+            self._known = self._darkest, haze, self._of_cells(haze)
+        return self._known[2]
+
+    def _of_cells(self, haze: Haze) -> Floats:
         """Luminance of black in each cell; where it is not known that of the nearest known cells, if any is."""
         known = self._seen_s > _SEEN_S
         room = max(float(haze.light) - _DARK, 1.0)
