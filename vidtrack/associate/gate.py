@@ -232,67 +232,66 @@ def _gated(m: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, F
         reach = _reach(cov, R, limit, mode)
         order, first, origin, cell, shape = cells(z, run, reach)
         runs = (len(first) - 1) // (shape[0] * shape[1])
-        size = 4 * rows + 16
-        pair, value = np.empty((size, 2), np.int64), np.empty((size, 3))
-        n = 0
         L, v = np.empty((m, m)), np.empty(m)
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
-        seen = np.full(len(z) if turns else 0, -1)
-        for t in range(rows):
-            if limit[t] == 0.0 or own[t] >= runs:
-                continue
-            for turn in range(-turns, turns + 1):
-                outside = False
-                for a in range(2):
-                    at = zhat[t, a] + turn * TURN * wraps[a] if a < m else 0.0
-                    below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
-                    above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
-                    outside |= not (below < shape[a] and above >= 0)
-                    low[a] = max(0.0, min(below, shape[a] - 1.0))
-                    high[a] = max(0.0, min(above, shape[a] - 1.0))
-                if outside:
+        size, n = 0, 16 * rows + 16
+        while n > size:  # there were more pairs than room: once more, with room for all
+            size, n = n, 0
+            pair, value = np.empty((size, 2), np.int64), np.empty((size, 3))
+            seen = np.full(len(z) if turns else 0, -1)
+            for t in range(rows):
+                if limit[t] == 0.0 or own[t] >= runs:
                     continue
-                for line in range(low[1], high[1] + 1):
-                    base = (own[t] * shape[1] + line) * shape[0]
-                    for at_point in range(first[base + low[0]], first[base + high[0] + 1]):
-                        j = order[at_point]
-                        if turns:  # a gate wider than a full turn finds a measurement from both sides
-                            if seen[j] == t:
+                for turn in range(-turns, turns + 1):
+                    outside = False
+                    for a in range(2):
+                        at = zhat[t, a] + turn * TURN * wraps[a] if a < m else 0.0
+                        below = np.floor((at - reach[t, a] - origin[a]) / cell[a])
+                        above = np.floor((at + reach[t, a] - origin[a]) / cell[a])
+                        outside |= not (below < shape[a] and above >= 0)
+                        low[a] = max(0.0, min(below, shape[a] - 1.0))
+                        high[a] = max(0.0, min(above, shape[a] - 1.0))
+                    if outside:
+                        continue
+                    for line in range(low[1], high[1] + 1):
+                        base = (own[t] * shape[1] + line) * shape[0]
+                        for at_point in range(first[base + low[0]], first[base + high[0] + 1]):
+                            j = order[at_point]
+                            if turns:  # a gate wider than a full turn finds a measurement from both sides
+                                if seen[j] == t:
+                                    continue
+                                seen[j] = t
+                            distance, whitened, det = 0.0, 0.0, 1.0
+                            for a in range(m):  # S = L L' and L^-1 v, row by row
+                                v[a] = z[j, a] - zhat[t, a]
+                                if wraps[a]:
+                                    v[a] -= TURN * np.rint(v[a] / TURN)
+                                variance = cov[t, a, a] + R[j, a, a]
+                                if mode == EUCLIDEAN:
+                                    distance += v[a] * v[a]
+                                elif mode == DECOUPLED:
+                                    distance += v[a] * v[a] / variance
+                                elif mode == BOX:
+                                    distance = max(distance, v[a] * v[a] / variance)
+                                for b in range(a):
+                                    entry = cov[t, a, b] + R[j, a, b]
+                                    for c in range(b):
+                                        entry -= L[a, c] * L[b, c]
+                                    L[a, b] = entry / L[b, b]
+                                    variance -= L[a, b] * L[a, b]
+                                    v[a] -= L[a, b] * v[b]
+                                L[a, a] = np.sqrt(variance)
+                                v[a] /= L[a, a]
+                                whitened += v[a] * v[a]
+                                det *= L[a, a]
+                            if mode == FULL:
+                                distance = whitened
+                            if not distance <= limit[t]:
                                 continue
-                            seen[j] = t
-                        distance, whitened, det = 0.0, 0.0, 1.0
-                        for a in range(m):  # S = L L' and L^-1 v, row by row
-                            v[a] = z[j, a] - zhat[t, a]
-                            if wraps[a]:
-                                v[a] -= TURN * np.rint(v[a] / TURN)
-                            variance = cov[t, a, a] + R[j, a, a]
-                            if mode == EUCLIDEAN:
-                                distance += v[a] * v[a]
-                            elif mode == DECOUPLED:
-                                distance += v[a] * v[a] / variance
-                            elif mode == BOX:
-                                distance = max(distance, v[a] * v[a] / variance)
-                            for b in range(a):
-                                entry = cov[t, a, b] + R[j, a, b]
-                                for c in range(b):
-                                    entry -= L[a, c] * L[b, c]
-                                L[a, b] = entry / L[b, b]
-                                variance -= L[a, b] * L[a, b]
-                                v[a] -= L[a, b] * v[b]
-                            L[a, a] = np.sqrt(variance)
-                            v[a] /= L[a, a]
-                            whitened += v[a] * v[a]
-                            det *= L[a, a]
-                        if mode == FULL:
-                            distance = whitened
-                        if not distance <= limit[t]:
-                            continue
-                        if n == size:
-                            size *= 2
-                            pair, value = _grown(pair, size), _grown(value, size)
-                        pair[n, 0], pair[n, 1] = t, j
-                        value[n, 0], value[n, 1], value[n, 2] = distance, whitened, 2.0 * np.log(det)
-                        n += 1
+                            if n < size:
+                                pair[n, 0], pair[n, 1] = t, j
+                                value[n, 0], value[n, 1], value[n, 2] = distance, whitened, 2.0 * np.log(det)
+                            n += 1
         # the order in the grid depends on the cell size; results must not
         order, start = _ascending(pair, n, rows, len(z))
         row, measurement = np.empty(n, np.int64), np.empty(n, np.int64)
@@ -328,13 +327,3 @@ def _ascending(pair: Ints, count: int, rows: int, measurements: int) -> tuple[In
         order[place[pair[index, 0]]] = index
         place[pair[index, 0]] += 1
     return order, start
-
-
-@inlined
-def _grown(table: np.ndarray, size: int) -> np.ndarray:
-    """A copy with room for `size` rows."""
-    wider = np.empty((size, table.shape[1]), table.dtype)
-    for i in range(len(table)):
-        for column in range(table.shape[1]):
-            wider[i, column] = table[i, column]
-    return wider
