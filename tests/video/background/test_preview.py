@@ -171,6 +171,26 @@ def test_an_opening_is_read_twice_only_if_it_is_large_or_longer_than_the_source(
     assert len(begun) == again
 
 
+@pytest.mark.parametrize("rim", [0, 1, 3])
+def test_an_opening_that_is_kept_reduced_shows_the_detector_what_the_whole_one_does(tmp_path, rim):
+    for k, frame in enumerate(frames(2, drives_off)):
+        y = cv2.copyMakeBorder(frame.y, 0, rim, 0, rim, cv2.BORDER_REPLICATE)
+        cv2.imwrite(str(tmp_path / f"{k:03d}.png"), cv2.merge([y, y, 255 - y]))
+    settings = load(assignments=["source.fps=10", "source.scale=0.5"])
+    shapes, masks = [], []
+    for whole in (True, False):
+        with open_source(str(tmp_path), settings.source) as source:
+            detector = build_detector(settings)
+            look_ahead(source, detector, settings, whole=whole)
+            shown = list(source)
+        shapes.append([(frame.shape, frame.y.shape) for frame in shown])
+        masks.append([detector.apply(frame, NONE_KNOWN).mask for frame in shown])
+    full, half = (SHAPE[0] + rim, SHAPE[1] + rim), (SHAPE[0] // 2, SHAPE[1] // 2)  # the rim fills no window
+    assert shapes == [[(full, full)] * 20, [(full, half)] * 20]
+    assert masks[0][0].any()
+    np.testing.assert_array_equal(masks[0], masks[1])
+
+
 def test_a_camera_has_no_preview_and_zero_seconds_are_none(tmp_path):
     for setting in ("preview_s=3", "patches=false"):
         with pytest.raises(ConfigError, match="has no effect on a camera"):
