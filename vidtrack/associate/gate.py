@@ -234,7 +234,7 @@ def _gated(m: int, angles: tuple[int, ...]) -> Callable[..., tuple[Ints, Ints, F
         runs = (len(first) - 1) // (shape[0] * shape[1])
         L, v = np.empty((m, m)), np.empty(m)
         low, high = np.empty(2, np.int64), np.empty(2, np.int64)
-        size, n = 0, 16 * rows + 16
+        size, n = 0, 4 * rows + 16
         while n > size:  # there were more pairs than room: once more, with room for all
             size, n = n, 0
             pair, value = np.empty((size, 2), np.int64), np.empty((size, 3))
