@@ -156,6 +156,15 @@ def test_a_site_without_metres_has_no_queues_and_no_speeds(tmp_path, unpainted):
     assert "The angles are those of the picture" in text
 
 
+def test_a_day_without_a_queue_has_no_empty_axes(tmp_path, made, unpainted):
+    left_out = "Left out: no vehicle was seen to queue."
+    assert left_out not in words(made[1])
+    out = report(write_day(tmp_path / "day", [4, 5]))
+    assert left_out in words(out)
+    assert not (out / "queues.png").exists()
+    assert {row["queue"] for row in table(out / "flow_and_queues.csv")} == {"0"}
+
+
 def test_less_than_an_hour_has_no_peak_hour(tmp_path, unpainted):
     made = report(write_day(tmp_path / "day", [4, 5, 6]))
     assert "Left out: no hour of whole intervals was watched." in words(made)

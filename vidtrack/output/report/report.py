@@ -72,6 +72,7 @@ def _missing(page: Page, gone: str) -> dict[str, str]:
     no_movement = "" if page.sheet.movements else "the site has no entry gate with an exit gate on another leg"
     no_entry = "" if page.legs else "the site has no entry gate"
     no_metres = "" if page.found.metres else "without a calibration nobody knows whether a vehicle stands"
+    no_queue = "" if any((leg.queue > 0).any() for leg in page.legs) else "no vehicle was seen to queue"
     no_speed = "no speed was measured: without a calibration only sections with a length give speeds"
     ways = None if page.paths is None else page.paths.ways
     reasons = {
@@ -79,7 +80,7 @@ def _missing(page: Page, gone: str) -> dict[str, str]:
         "origin_destination": no_movement,
         "speeds": "" if page.speeds else no_speed,
         "flow": no_entry,
-        "queues": no_entry or no_metres,
+        "queues": no_entry or no_metres or no_queue,
         "heat_map": gone,
         "time_space": gone or ("" if ways is not None and len(ways.t) else "there is no whole trip to draw"),
     }
