@@ -59,7 +59,7 @@ def wanted(run: RoadRun, name: str) -> dict[tuple[int, int], tuple[float, float]
         if x is None or row["frame"] > until[row["track_id"]]:
             continue
         if name == "sumo":
-            if heading is None:
+            if heading is None or row["length_m"] is None:
                 continue
             ahead = row["length_m"] / 2
             x, y = x + ahead * np.sin(np.radians(heading)), y + ahead * np.cos(np.radians(heading))

@@ -85,6 +85,7 @@ def usual_ways():
     car = hide(way(7, range(100)), range(40, 50))
     lorry = way(9, range(20, 71), length=10.0, heading_deg=210.0, start=(EAST + 20, NORTH + 40))
     hide(lorry, range(20, 23), "heading_deg", "length_m", "length_sigma_m", "width_m")
+    hide(lorry, range(23, 25), "length_m", "length_sigma_m", "width_m")  # hidden by another one
     lorry["status"][10:13] = "coasting"
     lorry["status"][-10:] = "coasting"
     return car, lorry, way(11, [5])

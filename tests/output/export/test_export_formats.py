@@ -171,7 +171,7 @@ def test_sumo_has_front_bumpers_by_time(run, tmp_path, expected):
             assert float(vehicle.get("angle")) == pytest.approx(truth["heading_deg"], abs=0.01)
             assert float(vehicle.get("speed")) == pytest.approx(10, abs=1e-3)
             assert vehicle.get("type") == ("truck" if key[0] == 9 else "car")
-    assert found == {key for key, row in expected.items() if np.isfinite(row["heading_deg"])}
+    assert found == {key for key, row in expected.items() if np.isfinite(row["length_m"])}
 
 
 def read_trj(path):
@@ -227,7 +227,7 @@ def test_ssam_has_fronts_and_rears_from_a_near_origin(run, tmp_path, expected):
         assert width == pytest.approx(truth["width_m"])
         assert speed == pytest.approx(10)
         assert np.degrees(np.arctan2(fx - rx, fy - ry)) % 360 == pytest.approx(truth["heading_deg"], abs=1e-3)
-    assert found == {key for key, row in expected.items() if np.isfinite(row["heading_deg"])}
+    assert found == {key for key, row in expected.items() if np.isfinite(row["length_m"])}
 
 
 @pytest.mark.parametrize("name", [name for name, form in FORMATS.items() if not (form.measures or form.radar)])

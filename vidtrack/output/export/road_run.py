@@ -36,7 +36,7 @@ class Rows:
     xy             (N, 2) m, middles of the footprints
     speed          (N,) m/s
     heading        (N,) rad, clockwise from north; NaN before the vehicle has moved
-    length, width  (N,) m; NaN without a heading
+    length, width  (N,) m; NaN without a heading, and while others hide the vehicle from the first
     """
 
     frame: Ints

@@ -35,7 +35,7 @@ def write(run: RoadRun, folder: Path) -> None:
 
     Numbers there have 24 bits, so places are counted from the south-west corner. Links and lanes are 0, not known:
     then SSAM tells kinds of conflicts by their angle. Accelerations are 0: those from video are too noisy to be of use.
-    Rows without a heading are left out: front and rear are not known.
+    Rows without a heading or a length are left out: front and rear are not known.
     """
     origin = np.floor(run.corner)
     far = np.ceil(run.corner + run.extent - origin).astype(int) + 1

@@ -14,14 +14,14 @@ from vidtrack.output.folder import replacing
 def write(run: RoadRun, folder: Path) -> None:
     """Write fcd.xml: x, y in metres are the middle of the front bumper, angle is in degrees clockwise from north.
 
-    Rows without a heading have no front bumper and are left out.
+    Rows without a heading or a length have no front bumper and are left out.
     """
     types = {str(kind): quoteattr(str(kind)) for kind in np.unique(run.vehicles.kind)}
     with replacing(folder / "fcd.xml") as path, path.open("w", encoding="utf-8") as file:
         file.write('<?xml version="1.0" encoding="UTF-8"?>\n<fcd-export>\n')
         frame = -1
         for rows in run.batches():
-            rows = rows.select(np.isfinite(rows.heading))
+            rows = rows.select(np.isfinite(rows.heading) & np.isfinite(rows.length))
             kinds = run.vehicles.kind[run.vehicles.row(rows.track)]
             for number, time, kind, line in zip(
                 rows.frame.tolist(), rows.time.tolist(), kinds.tolist(), _vehicles(rows), strict=True
