@@ -13,6 +13,9 @@ A crossing is found by one of the same gate and direction within 1 s, one to one
 same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
 Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
 
+The bounds of a count hold if the true number of crossings of that gate, in that direction and in the whole clip, lies
+within them; gates that nobody passes and nobody was counted at are left out.
+
 A queue is found by those of the same leg at an overlapping time; that with most vehicles tells how many there were. One
 that overlaps with none is false. In the events vehicles before the stop line queue, in the measures all that stand on
 their way in from a leg. Vehicles that stand in the first picture are not seen before they move, so queues are also
@@ -27,6 +30,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +43,7 @@ from vidtrack.simulate.roads.layout import ARMS
 from vidtrack.simulate.roads.scenarios import ROADS
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures.measure import measured
-from vidtrack.traffic.site import Calibration, Site, read_site
+from vidtrack.traffic.site import Calibration, Report, Site, read_site
 
 TOLERANCE_S, TOLERANCE_M = 1.0, 15.0
 FPS = 25.0
@@ -116,6 +120,14 @@ def queues(events: list[dict[str, str]], rows: list[dict]) -> dict[str, Any]:
     }
 
 
+def bounds(true: list[dict[str, str]], rows: list[dict]) -> dict[str, int]:
+    """Gates and directions that somebody passed or was counted at, and at how many the bounds of the count hold."""
+    passed = Counter((event["place"], event["direction"]) for event in true)
+    whole = [(passed[row["gate"], row["direction"]], row) for row in rows if row["begin_s"] <= 0]
+    busy = [(there, row) for there, row in whole if there or row["count"]]
+    return {"ways": len(busy), "held": sum(row["count_low"] <= there <= row["count_high"] for there, row in busy)}
+
+
 def tracked(clip: Path, run: Path, event: dict[str, str]) -> bool:
     """Whether a track lies on the vehicle of an event at that time, with an IoU of 0.3 or more."""
     boxes = np.loadtxt(clip / "gt.txt", delimiter=",", ndmin=2)
@@ -168,7 +180,8 @@ def tracked_again(clip: Path, site: Path, folder: Path) -> Path:
 def score(clip: Path, run: Path, site: Site) -> dict[str, Any]:
     """Crossings and movements: how many there were, were found, and were right; errors of speed [km/h]."""
     events = rows_of(clip / "road_events.csv")
-    found = measured([str(run)], site).tables
+    seconds = round(float(rows_of(clip / "road_truth.csv")[-1]["time_s"])) or 1
+    found = measured([str(run)], site.model_copy(update={"report": Report(interval_s=seconds)})).tables
     crossings, trips = found["crossings"].to_pylist(), found["trips"].to_pylist()
     true = [event for event in events if event["event"] == "crossing"]
     pairs = paired(
@@ -194,6 +207,7 @@ def score(clip: Path, run: Path, site: Site) -> dict[str, Any]:
         "movements": len(moved),
         "trips": len(whole),
         "right": len(right),
+        **bounds(true, found["intervals"].to_pylist()),
         "untracked": sum(not tracked(clip, run, true[i]) for i in set(range(len(true))) - {i for i, _ in pairs}),
         "off": np.array(off),
         "sigma": np.array(sigma),
@@ -203,7 +217,20 @@ def score(clip: Path, run: Path, site: Site) -> dict[str, Any]:
 
 
 def told(name: str, results: list[dict[str, Any]]) -> str:
-    counts = ("true", "found", "hit", "movements", "trips", "right", "untracked", "close", "said", "met")
+    counts = (
+        "true",
+        "found",
+        "hit",
+        "ways",
+        "held",
+        "movements",
+        "trips",
+        "right",
+        "untracked",
+        "close",
+        "said",
+        "met",
+    )
     total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
     off, sigma, pet, pet_sigma = (
         np.concatenate([result[key] for result in results]) for key in ("off", "sigma", "pet", "pet_sigma")
@@ -218,6 +245,7 @@ def told(name: str, results: list[dict[str, Any]]) -> str:
         speeds = f"| {np.median(off):+.2f}, {np.median(np.abs(off)):.2f} | {inside:.2f} |"
     return (
         f"| {name} | {total['true']:.0f} | {total['hit'] / total['true']:.3f} | {total['hit'] / total['found']:.3f} "
+        f"| {total['held']:.0f} of {total['ways']:.0f} "
         f"| {total['movements']:.0f} | {total['right'] / total['movements']:.3f} "
         f"| {total['right'] / total['trips']:.3f} {speeds} {len(off) / total['hit']:.2f} | {total['untracked']:.0f} "
         f"| {total['close']:.0f} | {total['met'] / total['close']:.3f} | {total['met'] / total['said']:.3f} "
@@ -253,7 +281,8 @@ def main() -> None:
     of, speed = "recall | precision", "speed error: median, median absolute | in 95 % | with speed"
     pet = "PET error: median, median absolute | in 95 %"
     print(
-        f"| clip | crossings | {of} | movements | {of} | {speed} | missed without a track | conflicts | {of} | {pet} |"
+        f"| clip | crossings | {of} | bounds of counts hold | movements | {of} | {speed} | missed without a track "
+        f"| conflicts | {of} | {pet} |"
     )
     exact, real = [], []
     lines = []
