@@ -18,8 +18,8 @@ def test_a_whole_trip_and_three_that_are_not(tmp_path):
         straight(1, 10.0, 50, 240, 100, 5),  # all the way
         straight(2, 57.0, 50, 200, 100, 2.9),  # still on its way at the end
         straight(3, 0.0, 300, 150, 100, 3),  # was there at the beginning
-        straight(4, 20.0, 50, 300, 100, 1),  # is lost
-        straight(5, 40.0, 400, 300, 100, 1.5),  # comes from nowhere
+        straight(4, 20.0, 50, 300, 100, 2),  # is lost
+        straight(5, 40.0, 250, 300, 100, 3),  # comes from nowhere
     ]
     found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE))
     rows = {row["track_id"]: row for row in found.tables["trips"].to_pylist()}
@@ -245,25 +245,11 @@ def test_a_gate_just_before_a_track_began_is_inferred(tmp_path):
     assert [row["complete"] for row in found.tables["trips"].to_pylist()] == [True] * 3
 
 
-def test_a_gate_two_seconds_off_is_inferred_where_a_trip_lacks_it(tmp_path):
-    """Tracks that end before the eastern gate, begin behind the western one, and are seen in the middle only."""
-    tracks = [
-        straight(1, 10.0, 50, 240, 100, 2.5),
-        straight(2, 30.0, 300, 240, 100, 2.5),
-        straight(3, 50.0, 280, 240, 100, 0.4),
-    ]
-    tables = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE)).tables
-    rows = [row for row in tables["crossings"].to_pylist() if row["reason"] == "inferred"]
-    assert [(row["track_id"], row["gate"]) for row in rows] == [(1, "east"), (2, "west")]
-    assert [row["time_s"] for row in rows] == pytest.approx([14.5, 28.0], abs=0.05)
-    assert [(row["track_id"], row["complete"]) for row in tables["trips"].to_pylist()] == [(1, True), (2, True)]
-
-
 def test_the_balance_is_of_what_was_lost_and_made(tmp_path):
     tracks = [
         straight(1, 2.0, 50, 240, 100, 5),
-        straight(2, 22.0, 50, 300, 100, 1),
-        straight(3, 32.0, 400, 100, 100, 1.5),
+        straight(2, 22.0, 50, 300, 100, 2),
+        straight(3, 32.0, 250, 100, 100, 3),
     ]
     rows = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE)).tables["checks"].to_pylist()
     assert [row["inflow"] for row in rows] == [1, 0, 1, 0, 0, 0]

@@ -16,13 +16,13 @@ from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing
 from vidtrack.traffic.measures.stretches import End, Lives
 from vidtrack.traffic.measures.trips import at_edge, first_of
 
+REACH_S = 1.5
+"""s; longest time between the passing and the track"""
 _LEAST_M_S, _SURE = 1.5, 3.0
 """m/s; of the vehicle, and standard deviations of its velocity in it"""
 _LIKELY = 0.5
 _ELSEWHERE_S = 4.0
 """s; the mean time in which a vehicle has come from elsewhere, such as out of another one's blob"""
-_REACH_S, _SOON_S = 4.0, 1.5
-"""s; longest time between the passing and the track where a trip lacks that gate, and else"""
 _AT_M = 3.0
 """m; from a gate, where a vehicle that began or ended there has passed it"""
 INFERRED_SURE = 0.8
@@ -39,13 +39,18 @@ def at_gates(
     passed  all that is known
     may     (L + 1, L + 1) whether a trip may go from a leg to another
     """
-    came, went = _legs(gates, passed, joins.vehicles(len(lives.track)))
-    begins, ends = np.ones((2, len(lives.track)), bool)
+    vehicle = joins.vehicles(len(lives.track))
+    enters, leaves = gates.ways(passed.gate, passed.side)
+    order, who, tracks = np.argsort(passed.t, kind="stable"), vehicle[passed.track], len(vehicle)
+    entry = first_of(who, order[enters[order]], tracks)
+    exit_ = first_of(who, order[leaves[order]][::-1], tracks)
+    leg = np.append(gates.leg[passed.gate], -1)
+    begins, ends = np.ones((2, tracks), bool)
     begins[joins.after] = ends[joins.before] = False
     parts = []
     for end, edges, lacks, other, inwards in (
-        (lives.head, spans[:, 0], begins & (came < 0) & (went >= 0), went, True),
-        (lives.tail, spans[:, 1], ends & (went < 0) & (came >= 0), came, False),
+        (lives.head, spans[:, 0], begins & (entry[vehicle] < 0) & (exit_[vehicle] >= 0), leg[exit_[vehicle]], True),
+        (lives.tail, spans[:, 1], ends & (exit_[vehicle] < 0) & (entry[vehicle] >= 0), leg[entry[vehicle]], False),
     ):
         track = np.flatnonzero(lacks & np.isfinite(end.t) & ~at_edge(end.t, edges))
         meant = gates.role("entry" if inwards else "exit", "both")
@@ -68,21 +73,10 @@ def _stood(gates: Gates, end: End, track: Ints, gate: Ints, along: Floats, far: 
     return Passed(end.t[track], gate, track, side, along, sigma, far, far, no, no, *speed, unknown, no)
 
 
-def _legs(gates: Gates, passed: Passed, vehicle: Ints) -> tuple[Ints, Ints]:
-    """(T,) the legs on which the vehicles of stretches first entered, and last left; -1: on none."""
-    enters, leaves = gates.ways(passed.gate, passed.side)
-    order, who, tracks = np.argsort(passed.t, kind="stable"), vehicle[passed.track], len(vehicle)
-    leg = np.append(gates.leg[passed.gate], -1)
-    entry = first_of(who, order[enters[order]], tracks)
-    exit_ = first_of(who, order[leaves[order]][::-1], tracks)
-    return leg[entry[vehicle]], leg[exit_[vehicle]]
-
-
-def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats, may: Mask) -> tuple[Passed, Floats]:
+def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floats) -> tuple[Passed, Floats]:
     """What stretches passed before they began and after they ended, and how likely (P,).
 
     passed  what they passed, also in gaps
-    may     (L + 1, L + 1) whether a trip may go from a leg to another
     """
     before, after = np.ones((2, len(lives.track)), bool)
     before[joins.after] = after[joins.before] = False
@@ -90,17 +84,15 @@ def beyond(gates: Gates, passed: Passed, lives: Lives, joins: Joins, spans: Floa
              ((lives.head, before, -1), (lives.tail, after, 1))]  # fmt: skip
     found = parts[0].and_also(parts[1])
     ends = np.where(found.t < lives.head.t[found.track], lives.head.t[found.track], lives.tail.t[found.track])
-    late = np.abs(found.t - ends)
-    sure = confidence(found) * np.exp(-late / _ELSEWHERE_S)
-    near = (late < _SOON_S) | _lacking(gates, found, *_legs(gates, passed, joins.vehicles(len(lives.track))), may)
-    likely = (sure > _LIKELY) & near & _as_meant(gates, found)
+    sure = confidence(found) * np.exp(-np.abs(found.t - ends) / _ELSEWHERE_S)
+    likely = (sure > _LIKELY) & _as_meant(gates, found)
     found, sure = found.only(likely), sure[likely]
     alone = _alone(found, passed)
     return found.only(alone), sure[alone]
 
 
 def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Passed:
-    """The gates on the way of stretches for _REACH_S before (way -1) or after (1) an end of theirs."""
+    """The gates on the way of stretches for REACH_S before (way -1) or after (1) an end of theirs."""
     speed = np.linalg.norm(end.v, axis=1)
     with np.errstate(invalid="ignore"):
         moves = (speed > _LEAST_M_S) & (speed > _SURE * np.sqrt(end.spread[:, 2]))
@@ -108,19 +100,11 @@ def _extended(gates: Gates, end: End, free: Mask, spans: Floats, way: int) -> Pa
     span = np.clip(np.searchsorted(spans[:, 0], end.t[who], side="right") - 1, 0, None)
     room = np.abs(spans[span, 0 if way < 0 else 1] - end.t[who])
     known = end.only(who)
-    far = known.after(way * np.minimum(_REACH_S, room))
+    far = known.after(way * np.minimum(REACH_S, room))
     passing = Passing(gates, REACH_M)
     passing.add(step_rows(far, known) if way < 0 else step_rows(known, far))
     found = passing.passed()
     return found.of(who[found.track]).nowhere()
-
-
-def _lacking(gates: Gates, found: Passed, came: Ints, went: Ints, may: Mask) -> Mask:
-    """(F,) passings without which a trip that may be would have no entry, or no exit; came, went (T,) legs."""
-    leg, came, went = gates.leg[found.gate], came[found.track], went[found.track]
-    enters, leaves = gates.ways(found.gate, found.side)
-    entry, exit_ = enters & (came < 0) & (went >= 0), leaves & (went < 0) & (came >= 0)
-    return np.asarray((entry & may[leg, went]) | (exit_ & may[came, leg]))
 
 
 def _as_meant(gates: Gates, found: Passed) -> Mask:

@@ -60,7 +60,7 @@ def journeys(
     reason = [*told, *(["joined"] * len(across))]
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
     if metres:
-        inferred, sure = beyond(gates, passed, lives, joins, spans, may)
+        inferred, sure = beyond(gates, passed, lives, joins, spans)
         probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
         passed = passed.and_also(inferred)
         inferred, sure = at_gates(gates, passed, lives, joins, spans, may)
