@@ -58,7 +58,6 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "gates within a gap": {(journeys, "_across"): lambda *given: given[3].only(np.zeros(len(given[3]), bool))},
     "gates just beyond the end of a track": {(beyond, "_extended"): lambda g, end, free, *_: beyond._stood(
         g, end, *np.zeros((2, 0), int), *np.zeros((2, 0)), True)},
-    "the same later than 1.5 s, where a trip lacks it": {(beyond, "_REACH_S"): beyond._SOON_S},
     "inferred passings only the right way": {(beyond, "_as_meant"): lambda gates, found: np.ones(len(found), bool)},
     "inferred passings only where nobody else passes": {(beyond, "_alone"): lambda found, _: np.ones(len(found), bool)},
     "gates where a track begins or ends": {(beyond, "_AT_M"): 0.0},
