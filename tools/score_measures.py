@@ -217,20 +217,8 @@ def score(clip: Path, run: Path, site: Site) -> dict[str, Any]:
 
 
 def told(name: str, results: list[dict[str, Any]]) -> str:
-    counts = (
-        "true",
-        "found",
-        "hit",
-        "ways",
-        "held",
-        "movements",
-        "trips",
-        "right",
-        "untracked",
-        "close",
-        "said",
-        "met",
-    )
+    counts = ("true", "found", "hit", "ways", "held", "movements", "trips", "right")
+    counts += ("untracked", "close", "said", "met")
     total = {key: max(sum(result[key] for result in results), 1e-9) for key in counts}
     off, sigma, pet, pet_sigma = (
         np.concatenate([result[key] for result in results]) for key in ("off", "sigma", "pet", "pet_sigma")
