@@ -140,8 +140,11 @@ NO_COLOUR = np.empty((0, 0), np.uint8)
 BLACK = np.float32(16)
 
 
-def road_with(body, rng_seed=3):
-    """Hits of `body`, called with the luminance of a rough road, at 20 x 40 px of shadow; before and after."""
+def road_with(body, passes=True, rng_seed=3):
+    """Hits of `body`, called with the luminance of a rough road, at 20 x 40 px, shadow where it passes for it.
+
+    Returns the hits before and after.
+    """
     rng = np.random.default_rng(rng_seed)
     road = np.clip(rng.normal(120, 12, (60, 80)), 60, 200).astype(np.uint8)
     luma = road.copy()
@@ -150,9 +153,9 @@ def road_with(body, rng_seed=3):
     scene = start(Picture(road, NO_COLOUR, NO_COLOUR))
     scene.noise[:] = 1
     hit = np.zeros(road.shape, np.uint8)
-    hit[20:40, 20:60] = SHADOW
+    hit[20:40, 20:60] = np.where(passes, SHADOW, VEHICLE)
     before = hit.copy()
-    find_dark(Picture(noisy, NO_COLOUR, NO_COLOUR), scene, np.full(road.shape, BLACK), False, hit)
+    find_dark(Picture(noisy, NO_COLOUR, NO_COLOUR), scene, np.full(road.shape, BLACK), hit)
     return before, hit
 
 
@@ -170,6 +173,36 @@ def test_a_dark_vehicle_with_windows_of_its_own_is_no_shadow():
         return body
 
     _, after = road_with(car)
-    assert (
-        np.mean(after[24:36, 24:56] == VEHICLE) > 0.8
-    )  # the rim, as soft as that of a shadow may be, is not looked at
+    # the rim, as soft as that of a shadow may be, is not looked at
+    assert np.mean(after[25:35, 25:55] == VEHICLE) > 0.8
+
+
+def test_a_dark_vehicle_of_which_a_part_does_not_pass_for_shadow_is_found_as_a_whole():
+    bright = np.zeros((20, 40), bool)
+    bright[:, :7] = True
+
+    def car(road):
+        body = np.where(bright, 200.0, 70.0)
+        body[6:10, 10:20] = body[6:10, 23:33] = 90.0
+        body[13:, 10:] = 55.0
+        return body
+
+    before, after = road_with(car, ~bright)
+    assert np.mean(before[before > 0] == VEHICLE) > 0.15
+    assert np.mean(after[25:35, 25:55] == VEHICLE) > 0.8
+
+
+def test_the_shadow_beside_a_bright_vehicle_with_dark_windows_stays_shadow():
+    window = np.zeros((20, 40), bool)
+    window[1:9, 3:37] = True
+    cast = np.zeros((20, 40), bool)
+    cast[10:] = True
+
+    def van(road):
+        body = np.where(cast, BLACK + 0.5 * (road - BLACK), 180.0)
+        body[window] = 70.0
+        body[1:9, 20:] += 20.0 * window[1:9, 20:]
+        return body
+
+    before, after = road_with(van, window | cast)
+    np.testing.assert_array_equal(after[30:], before[30:])

@@ -268,8 +268,7 @@ class Disturbance:
         if s.shadow and s.amid:
             reclaim(hit)
         if s.shadow and s.dark:
-            sunlit = self._sunlight.tolerance is not SOFT and not self._dark  # lamps cast hard shadows, too
-            find_dark(told, scene, air.black, sunlit, hit)
+            find_dark(told, scene, air.black, hit)
         return strength, hit, weak
 
     def _heal_ghosts(self, picture: Picture, scene: Scene, mask: Image) -> None:

@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
@@ -25,11 +26,10 @@ _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
 _ENCLOSED = 4  # the same from amid its edges, where nearly all of it passes for shadow
 _LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
-_HARDLY = 0.15  # the same of a region that is a vehicle's shadow as a whole, in sunlight
-_SOFT_PX = 3  # px
-_OWN = 0.05  # share of the pixels inside a shadow with edges of their own, from which it is a dark vehicle
+_RIM = np.ones((9, 9), np.uint8)  # px; the edges of a shadow, and of what is beside it, are soft over 4
+_OWN = 0.05  # share of the pixels inside connected shadow with edges of their own, from which it is a dark vehicle
 _FEW = 10.0  # px; fewer are no body
-_EDGE, _EDGE_NOISE = np.float32(4), np.float32(4)  # luminance differences of an edge: grey levels, and times the noise
+_EDGE, _EDGE_NOISE = np.float32(3), np.float32(2)  # luminance differences of an edge: grey levels, and times the noise
 _NEUTRAL = np.float32(128)  # chroma of grey
 _BINS = 20  # of the share of light that is left, from 0 to 1
 _HARDEST, _MILDEST = 5, 13  # the bins that the sun's shadows are in: there is always light of the sky
@@ -172,35 +172,35 @@ def reclaim(hit: Image) -> None:
     _fill(hit, row, start, stop, label, vehicle, _AMID)
 
 
-@kernel
-def find_dark(picture: Picture, scene: Scene, black: Levels, sunlit: bool, hit: Image) -> None:
-    """Set hit (h, w) uint8 from SHADOW back to 1 in regions that are nearly all shadow, but a dark vehicle.
+def find_dark(picture: Picture, scene: Scene, black: Levels, hit: Image) -> None:
+    """Set hit (h, w) uint8 from SHADOW back to 1 where connected shadow is a dark vehicle.
 
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
     on all four sides is vehicle, too.
-
-    sunlit  the sun casts hard shadows: a region with a part that is none is a vehicle beside its shadow
     """
-    row, start, stop = find_runs(hit, OBJECTS)
+    shadow = np.asarray(cv2.compare(hit, float(SHADOW), cv2.CMP_EQ), np.uint8)
+    inside = np.asarray(cv2.erode(shadow, _RIM, borderType=cv2.BORDER_CONSTANT, borderValue=0), np.uint8)
+    if cv2.countNonZero(inside):
+        _find_dark(picture, scene, black, shadow, inside, hit)
+
+
+@kernel
+def _find_dark(picture: Picture, scene: Scene, black: Levels, shadow: Image, inside: Image, hit: Image) -> None:
+    """The same for the `shadow` (h, w), and what of it is not near its rim."""
+    row, start, stop = find_runs(shadow, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
-    whole, lit, inside, own = np.zeros((4, count))
-    for k in range(len(row)):
-        whole[label[k]] += stop[k] - start[k]
-        lit[label[k]] += _lit(hit, row[k], start[k], stop[k])
-    most = _HARDLY if sunlit else _LIT
+    looked_at, own = np.zeros((2, count))
     edge = np.zeros(hit.shape, np.bool_)
     for k in range(len(row)):
-        y, region = row[k], label[k]
-        if lit[region] >= most * whole[region]:
-            continue
+        y = row[k]
         for x in range(start[k], stop[k]):
-            if hit[y, x] == SHADOW and _is_inside(hit, y, x):
-                inside[region] += 1
+            if inside[y, x]:
                 edge[y, x] = _is_own_edge(picture.luma, scene, black[y, x], y, x)
-                own[region] += edge[y, x]
+                looked_at[label[k]] += 1
+                own[label[k]] += edge[y, x]
     dark, found = np.empty(count, np.bool_), False
     for i in range(count):
-        dark[i] = own[i] > max(_OWN * inside[i], _FEW)
+        dark[i] = own[i] > max(_OWN * looked_at[i], _FEW)
         found |= dark[i]
     if not found:
         return
@@ -222,16 +222,6 @@ def _lit(hit: Image, y: int, start: int, stop: int) -> np.int32:
 
 
 @inlined
-def _is_inside(hit: Image, y: int, x: int) -> bool:
-    """Whether there are hits on all sides, farther off than the edge of a shadow is soft."""
-    h, w = hit.shape
-    if not (_SOFT_PX <= y < h - _SOFT_PX and _SOFT_PX <= x < w - _SOFT_PX):
-        return False
-    above, below = hit[y - _SOFT_PX, x] != 0, hit[y + _SOFT_PX, x] != 0
-    return above and below and hit[y, x - _SOFT_PX] != 0 and hit[y, x + _SOFT_PX] != 0
-
-
-@inlined
 def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -> bool:
     """Whether there is an edge that is neither the scene's nor noise."""
     r = (np.float32(luma[y, x]) - black) / (scene.luma[y, x] - black)
@@ -245,13 +235,13 @@ def _fill(hit: Image, row: Runs, start: Runs, stop: Runs, label: Ints, vehicle: 
     h = len(hit)
     side = np.zeros(hit.shape, np.uint8)
     for k in range(len(row)):
-        y, seen = row[k], False
+        y, seen = row[k], start[k] > 0 and hit[row[k], start[k] - 1] == 1
         for x in range(start[k], stop[k]):
             above = y > 0 and hit[y - 1, x] != 0 and (hit[y - 1, x] == 1 or side[y - 1, x] & _ABOVE != 0)
             side[y, x] = np.uint8(seen) * _LEFT | np.uint8(above) * _ABOVE
             seen |= hit[y, x] == 1
     for k in range(len(row) - 1, -1, -1):
-        y, seen = row[k], False
+        y, seen = row[k], stop[k] < hit.shape[1] and hit[row[k], stop[k]] == 1
         for x in range(stop[k] - 1, start[k] - 1, -1):
             below = y < h - 1 and hit[y + 1, x] != 0 and (hit[y + 1, x] == 1 or side[y + 1, x] & _BELOW != 0)
             side[y, x] |= np.uint8(seen) * _RIGHT | np.uint8(below) * _BELOW
