@@ -6,7 +6,6 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
@@ -26,7 +25,7 @@ _SIDES = np.array([bin(sides).count("1") for sides in range(16)])
 _AMID = 3  # sides on which the vehicle is seen from amid it
 _ENCLOSED = 4  # the same from amid its edges, where nearly all of it passes for shadow
 _LIT = 0.3  # share of a region that is no shadow if there is a vehicle in it
-_RIM = np.ones((9, 9), np.uint8)  # px; the edges of a shadow, and of what is beside it, are soft over 4
+_SOFT_PX = 5  # within which the edges of a shadow, and of what is beside it, are soft
 _OWN = 0.05  # share of the pixels inside connected shadow with edges of their own, from which it is a dark vehicle
 _FEW = 10.0  # px; fewer are no body
 _EDGE, _EDGE_NOISE = np.float32(3), np.float32(2)  # luminance differences of an edge: grey levels, and times the noise
@@ -172,35 +171,31 @@ def reclaim(hit: Image) -> None:
     _fill(hit, row, start, stop, label, vehicle, _AMID)
 
 
+@kernel
 def find_dark(picture: Picture, scene: Scene, black: Levels, hit: Image) -> None:
     """Set hit (h, w) uint8 from SHADOW back to 1 where connected shadow is a dark vehicle.
 
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
     on all four sides is vehicle, too.
     """
-    shadow = np.asarray(cv2.compare(hit, float(SHADOW), cv2.CMP_EQ), np.uint8)
-    inside = np.asarray(cv2.erode(shadow, _RIM, borderType=cv2.BORDER_CONSTANT, borderValue=0), np.uint8)
-    if cv2.countNonZero(inside):
-        _find_dark(picture, scene, black, shadow, inside, hit)
-
-
-@kernel
-def _find_dark(picture: Picture, scene: Scene, black: Levels, shadow: Image, inside: Image, hit: Image) -> None:
-    """The same for the `shadow` (h, w), and what of it is not near its rim."""
+    shadow = np.zeros_like(hit)
+    for y in range(len(hit)):
+        for x in range(hit.shape[1]):
+            shadow[y, x] = hit[y, x] == SHADOW
     row, start, stop = find_runs(shadow, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
-    looked_at, own = np.zeros((2, count))
+    inside, own = np.zeros((2, count))
     edge = np.zeros(hit.shape, np.bool_)
     for k in range(len(row)):
         y = row[k]
         for x in range(start[k], stop[k]):
-            if inside[y, x]:
+            if _is_inside(shadow, y, x):
                 edge[y, x] = _is_own_edge(picture.luma, scene, black[y, x], y, x)
-                looked_at[label[k]] += 1
+                inside[label[k]] += 1
                 own[label[k]] += edge[y, x]
     dark, found = np.empty(count, np.bool_), False
     for i in range(count):
-        dark[i] = own[i] > max(_OWN * looked_at[i], _FEW)
+        dark[i] = own[i] > max(_OWN * inside[i], _FEW)
         found |= dark[i]
     if not found:
         return
@@ -219,6 +214,18 @@ def _lit(hit: Image, y: int, start: int, stop: int) -> np.int32:
     for x in range(start, stop):
         lit += np.int32(hit[y, x] == 1)
     return lit
+
+
+@inlined
+def _is_inside(shadow: Image, y: int, x: int) -> bool:
+    """Whether there is shadow (h, w) on all sides, farther off than edges are soft. Lamps amid it do not count."""
+    h, w = shadow.shape
+    up, down, left, right = y - _SOFT_PX, y + _SOFT_PX, x - _SOFT_PX, x + _SOFT_PX
+    if up < 0 or down >= h or left < 0 or right >= w:
+        return False
+    sides = shadow[up, x] & shadow[down, x] & shadow[y, left] & shadow[y, right]
+    corners = shadow[up, left] & shadow[up, right] & shadow[down, left] & shadow[down, right]
+    return (sides & corners) != 0
 
 
 @inlined
