@@ -114,7 +114,7 @@ def test_a_track_that_no_station_may_see_ends_by_time_and_not_by_scans():
 
     def alive(coast_s, step_s):
         stations = [vt.Station(vt.Rates(0.9, 1e-6), Sector((0.0, 0.0), 100.0))]
-        life = vt.LogRatio(coast_s=coast_s, coast_scans=5)
+        life = vt.LogRatio(missed_track=1e-5, coast_s=coast_s, coast_scans=5)
         tracker = vt.Tracker(vt.ConstantVelocity(speed=20.0), picture=vt.NoPicture(), life=life, stations=stations)
         for k in range(10):
             tracker.step(vt.Scan(0.5 * k, np.array([[50.0 + 5 * k, 0.0]]), np.eye(2)))

@@ -114,7 +114,7 @@ class Gate:
 
         The axes of a box are taken as independent.
         """
-        return each(self.probability ** (dim if self.distance == "box" else 1), len(limit))
+        return np.full(limit.shape, self.probability ** (dim if self.distance == "box" else 1))
 
     def pairs(
         self,

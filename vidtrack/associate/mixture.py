@@ -27,18 +27,21 @@ def mixture_pairs(
     angles: tuple[int, ...] = (),
     detection: float | Floats = 0.9,
     clutter: float | Floats = 1e-5,
-) -> Pairs:
-    """Pairs inside the gate of any mode.
+) -> tuple[Pairs, Floats]:
+    """Pairs inside the gate of any mode, and P_G (T,).
 
     detection, clutter   P_D and clutter density, one for all or (T,)
     log_l  (N,) ln of the sum over the modes of weight N(v; 0, S); cost follows from it
     d2, nis, log_s  of the mode that explains the measurement best
+    limit  (T,) the largest of the modes'
     """
     weight, zhat, cov = modes
     count, rows, dim = zhat.shape
     each = [gate.pairs(zhat[j], cov[j], scan, run, angles, detection, clutter, weight[j]) for j in range(count)]
-    open_to = [weight[j, pairs.row] >= LEAST_MODE for j, pairs in enumerate(each)]
-    keys = [(pairs.row * len(scan) + pairs.measurement)[mask] for pairs, mask in zip(each, open_to, strict=True)]
+    limit = np.where(weight < LEAST_MODE, 0.0, np.stack([pairs.limit for pairs in each]))
+    keys = [
+        (pairs.row * len(scan) + pairs.measurement)[own[pairs.row] > 0] for pairs, own in zip(each, limit, strict=True)
+    ]
     key = np.unique(np.concatenate(keys))
     row, measurement = key // max(1, len(scan)), key % max(1, len(scan))
     v = np.stack([wrapped(scan.z[measurement] - mean[row], angles) for mean in zhat])
@@ -50,7 +53,7 @@ def mixture_pairs(
     best = log_l.argmax(axis=0)
     at = np.arange(len(key))
     total = logsumexp(log_l, axis=0)
-    return replace(
+    pairs = replace(
         each[0],
         row=row,
         measurement=measurement,
@@ -59,5 +62,22 @@ def mixture_pairs(
         log_s=log_s[best, at],
         log_l=total,
         cost=-2 * total - dim * np.log(TURN),
+        limit=limit.max(axis=0),
         start=starts(row, rows),
     )
+    return pairs, _share(gate, modes, limit, scan, angles)
+
+
+def _share(gate: Gate, modes: Modes, limit: Floats, scan: Scan, angles: tuple[int, ...]) -> Floats:
+    """(T,) P_G: the mean over the modes of what the gate that admits most of each mode's measurements admits.
+
+    limit (r, T) the modes' gates. In the gate of mode k a measurement of mode j has the mean squared distance
+    tr S_k^-1 (S_j + d d'), with d the difference of their predictions; it is taken as chi-square, scaled to that mean.
+    """
+    weight, zhat, cov = modes
+    S = cov if scan.noise is None else cov + scan.noise
+    known, d = np.linalg.inv(S), wrapped(zhat - zhat[:, None], angles)
+    mean = np.einsum("ktab,jtab->kjt", known, S) + np.einsum("ktab,kjta,kjtb->kjt", known, d, d)
+    dim = zhat.shape[2]
+    admitted = gate.inside(limit[:, None] * (dim / mean), dim)
+    return np.einsum("jt,jt->t", weight, admitted.max(axis=0))

@@ -65,12 +65,13 @@ class Problem:
         detection, clutter = each(detection, rows), each(clutter, rows)
         if modes is None:
             pairs = gate.pairs(zhat, cov, scan, run, angles, detection, clutter)
+            inside = gate.inside(pairs.limit, dim)
         else:
-            pairs = mixture_pairs(gate, modes, scan, run, angles, detection, clutter)
+            pairs, inside = mixture_pairs(gate, modes, scan, run, angles, detection, clutter)
         if label is not None and scan.label is not None:
             mine, theirs = label[pairs.row], scan.label[pairs.measurement]
             pairs = pairs.only((mine == theirs) | (mine < 0) | (theirs < 0))
-        return cls(pairs, scan, cov, detection, clutter, gate.inside(pairs.limit, dim))
+        return cls(pairs, scan, cov, detection, clutter, inside)
 
     @property
     def rows(self) -> int:

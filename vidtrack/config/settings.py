@@ -88,7 +88,7 @@ class TrackerSettings(Group):
     """N: scans of the window"""
     false_track: float = Field(1e-3, ge=1e-8, lt=0.5)
     """llr: probability that a track of false measurements is confirmed"""
-    missed_track: float = Field(1e-4, ge=1e-8, lt=0.5)
+    missed_track: float = Field(2e-4, ge=1e-8, lt=0.5)
     """llr: probability that the track of a real object is deleted"""
     detection_probability: float | None = Field(0.9, ge=0, le=1)
     """probability that a frame shows a vehicle; None: from earlier tracks. Radar has its own"""

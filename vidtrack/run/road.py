@@ -41,7 +41,8 @@ _log = logging.getLogger(__name__)
 
 ROAD: Mapping[str, Any] = {
     "radar": {"estimator": "kalman", "max_speed": 40.0, "accel": 1.5, "hold_s": 2.0, "extent_m": 0.7, "coast_scans": 40,
-              "unresolved": False, "detection_probability": 0.9}
+              "unresolved": False, "detection_probability": 0.9},
+    "tracker": {"missed_track": 1e-4},
 }  # fmt: skip
 """Defaults where vehicles are tracked and not aircraft."""
 CAMERA_DETECTION = 0.9

@@ -32,7 +32,7 @@ class LogRatio:
     """
 
     false_track: float = 1e-3
-    missed_track: float = 1e-4
+    missed_track: float = 2e-4
     new_share: float = 0.1
     confirm_s: float = 0.0
     confirm_travel: float = 0.0
