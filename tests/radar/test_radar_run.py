@@ -70,6 +70,7 @@ def test_a_run_writes_what_it_promises(tmp_path, scenario):
     assert summary["scans"] == 60
     assert summary["plots"] == len((scenario("radar-tws") / "plots.csv").read_text().splitlines()) - 1
     assert summary["tracks"] >= 8
+    assert "camera" not in summary  # only pictures have one
     assert (out / "tracks.png").read_bytes()[:4] == b"\x89PNG"
 
 

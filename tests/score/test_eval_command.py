@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from vidtrack.cli.eval import command
-from vidtrack.errors import FormatError, OutputError
+from vidtrack.errors import OutputError
 
 TRUTH = "".join(f"{f},1,10,10,20,20,1,1,1\n" for f in range(1, 11))
 RESULT = "".join(f"{f},{5 if f < 6 else 6},10,10,20,20,1,-1,-1,-1\n" for f in range(1, 11))
@@ -58,9 +58,10 @@ def test_a_file_that_cannot_be_written_is_an_error(files):
 
 
 @pytest.mark.parametrize("counted", ["scan", "frame"])  # a frame's number is no scan's where a camera helps a radar
-def test_a_truth_of_other_scans_is_refused(tmp_path, counted):
+def test_a_truth_of_other_scans_is_matched_by_time(tmp_path, counted):
     for name, number, step_s in (("tracks", "scan", 4), ("truth", counted, 2)):
-        rows = "".join(f"{k},{step_s * k},1,0,0\n" for k in range(9))
+        rows = "".join(f"{k},{step_s * k},1,{3 * step_s * k},0\n" for k in range(9))
         (tmp_path / f"{name}.csv").write_text(f"{number},time_s,track_id,x_m,y_m\n" + rows)
-    with pytest.raises(FormatError, match="number 8 is at 32 s in the result and at 16 s in the truth"):
-        run(tmp_path / "tracks.csv", tmp_path / "truth.csv")
+    scores = json.loads(run(tmp_path / "tracks.csv", tmp_path / "truth.csv", "--json", "-"))
+    assert (scores["frames"], scores["idf1"]) == (5, 1.0)
+    assert scores["matched_by"] == "distance up to 100 m, the truth at the times of the scans"

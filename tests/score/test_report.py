@@ -133,13 +133,33 @@ def test_pooled_sequences_count_as_one():
     assert together["mota"] == pytest.approx(1 - errors / sum(map(len, truths)))
 
 
-def test_scan_numbers_of_other_times_are_refused_and_another_zero_of_time_is_not():
-    scan = np.arange(10)
-    truth = Table(scan, np.ones(10, int), np.zeros((10, 2)), None, np.ones(10), unit="m", time_s=4.0 * scan)
-    same = replace(truth, time_s=4.0 * scan + 1.7 + 1e9)
-    assert evaluate(same, truth)["idf1"] == 1.0
+def drives(times_s, speed=(10.0, -7.0)):
+    """Two targets at constant speed at these times."""
+    scan = np.repeat(np.arange(len(times_s)), 2)
+    time_s, target = np.repeat(times_s, 2), np.tile([1, 2], len(times_s))
+    xy = np.column_stack([np.array(speed)[target - 1] * time_s, 50.0 * target])
+    return Table(scan, target, xy, None, np.ones(len(scan)), unit="m", time_s=time_s)
+
+
+def test_numbers_of_the_same_scans_count_whatever_the_zero_of_time():
+    truth = drives(4.0 * np.arange(10))
+    assert evaluate(replace(truth, time_s=truth.time_s + 1.7 + 1e9), truth)["idf1"] == 1.0
     assert evaluate(replace(truth, time_s=None), truth)["idf1"] == 1.0
-    with pytest.raises(FormatError, match=r"number 9 is at 36 s in the result and at 18 s in the truth"):
-        evaluate(truth, replace(truth, time_s=2.0 * scan))
+
+
+def test_numbers_of_other_times_are_matched_by_time():
+    """Scans of a radar at 1.3 s against frames ten times a second; the result goes on after the truth."""
+    truth, result = drives(0.1 * np.arange(200)), drives(0.05 + 1.3 * np.arange(20))
+    scores = evaluate(result, truth, max_distance=1.0)
+    assert (scores["frames"], scores["misses"], scores["false_positives"], scores["idf1"]) == (16, 0, 0, 1.0)
+    assert scores["gospa"] == pytest.approx(0.0, abs=1e-9)
+    away = truth.select((truth.id == 1) | (truth.time_s < 6) | (truth.time_s > 12))  # a gap is not bridged
+    assert evaluate(result, away, max_distance=1.0)["false_positives"] == 5
+
+
+def test_clocks_without_a_common_time_are_refused():
+    truth, result = drives(0.1 * np.arange(200)), drives(1e3 + 1.3 * np.arange(20))
+    with pytest.raises(FormatError, match=r"number 19 is at 1024.7 s in the result and at 1.9 s in the truth"):
+        evaluate(result, truth)
     with pytest.raises(FormatError, match="other scans"):
-        evaluate(*pool([(truth, replace(truth, time_s=2.0 * scan))] * 2))
+        evaluate(*pool([(drives(1.3 * np.arange(20)), truth)] * 2))

@@ -130,14 +130,17 @@ class Summary:
             **self._reading(),
             self._unit: self._frames,
             "media_s": round(self._media_s, 6),
-            **({"watched": self._watched.spans, "rim_px": self._rim_px} if self._unit == "frames" else {}),
+            **(self._of_pictures() if self._unit == "frames" else {}),
             "tracks": self._tracks,
             "counts": {} if self._counts is None else self._counts(),
-            "camera": self._camera.as_dict(),
             "warnings": self._warnings,
             "seconds": round(time.monotonic() - self._start, 3),
             "stages": {stage: round(seconds, 4) for stage, seconds in self._stage_s.items()},
         }
+
+    def _of_pictures(self) -> dict[str, object]:
+        """What only pictures have."""
+        return {"watched": self._watched.spans, "rim_px": self._rim_px, "camera": self._camera.as_dict()}
 
     def _write(self, interrupted: bool) -> None:
         parts = _entries(self._so_far()), self._given, _entries({"interrupted": interrupted})

@@ -15,6 +15,7 @@ from vidtrack.score.hota import hota
 from vidtrack.score.identity import identity
 from vidtrack.score.matching import Matchup, match_boxes, match_points
 from vidtrack.score.ospa import gospa, ospa
+from vidtrack.score.times import by_time
 
 MAX_DISTANCE = {"px": 20.0, "m": 100.0}
 POINT_THRESHOLD = 0.5  # the similarity of two points at the largest distance
@@ -38,8 +39,10 @@ def evaluate(
     OSPA and GOSPA use 1 - IoU or the distance, `cutoff` (None: 1 for boxes, max_distance for points)
     and `order`; they are means over the frames in which truth or result has a row, and so are their parts.
     NIS and NEES are from `states` (None: result) if it has the columns.
-    Raises FormatError for tables without identities, a truth without rows, and scan numbers that stand for other times
-    in the truth than in the result; ConfigError for bad options.
+    Where most scan numbers stand for other times in the truth than in the result, it is interpolated at the times of
+    the result, of which those within the truth's count.
+    Raises FormatError for tables without identities, a truth without rows, and clocks with no time in common;
+    ConfigError for bad options.
     """
     truth = truth.select(truth.conf != 0)
     if not len(truth):
@@ -48,7 +51,6 @@ def evaluate(
         if (table.id < 0).any():
             raise FormatError(f"the {name} has rows without identity (id -1); give tracks, not detections")
 
-    _refuse_other_scans(result, truth)
     if not 0 < iou <= 1:
         raise ConfigError(f"iou is {iou}; it must be above 0 and at most 1")
     if max_distance is None:
@@ -59,7 +61,13 @@ def evaluate(
     points = points or result.box is None or truth.box is None
     if cutoff is None:
         cutoff = max_distance if points else 1.0
-    matched_by = f"distance up to {max_distance:g} {truth.unit}" if points else f"IoU from {iou:g}"
+    timed = by_time(result, truth)
+    if timed is not None:
+        truth, scans = timed
+        result = result.select(np.isin(result.frame, scans))
+        states = None if states is None else states.select(np.isin(states.frame, scans))
+    at = "" if timed is None else ", the truth at the times of the scans"
+    matched_by = f"distance up to {max_distance:g} {truth.unit}{at}" if points else f"IoU from {iou:g}"
     threshold = POINT_THRESHOLD if points else iou
 
     def match(table: Table) -> Matchup:
@@ -76,28 +84,6 @@ def evaluate(
         **_set_distances(matchup, cutoff, order),
         **_consistency(states, truth, matchup if states is result else match(states), threshold),
     }
-
-
-def _refuse_other_scans(result: Table, truth: Table) -> None:
-    """Raise FormatError where most of the common numbers of scans and frames are of other times.
-
-    The clocks may begin differently.
-    """
-    if result.time_s is None or truth.time_s is None:
-        return
-    scan, in_result, in_truth = np.intersect1d(result.frame, truth.frame, return_indices=True)
-    if len(scan) < 2:
-        return
-    ours, theirs = result.time_s[in_result], truth.time_s[in_truth]
-    off = ours - theirs
-    step_s = max(np.median(np.diff(ours)), np.median(np.diff(theirs)))
-    if np.median(np.abs(off - np.median(off))) > step_s / 2:
-        k = int(np.abs(off - off[0]).argmax())
-        raise FormatError(
-            f"number {scan[k]} is at {ours[k]:.10g} s in the result and at {theirs[k]:.10g} s in the truth, which "
-            "numbers other scans or frames, such as those of a network of radars, or of a radar with a camera; give "
-            "the truth at the scans of the result"
-        )
 
 
 def _counts(matchup: Matchup) -> dict[str, int]:
