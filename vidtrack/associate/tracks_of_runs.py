@@ -45,6 +45,41 @@ def same_targets(histories: Histories) -> Ints:
     return np.unique(target, return_inverse=True)[1]
 
 
+def parallel(histories: Histories, target: Ints) -> Floats:
+    """(P,) mean distances [m] of pairs of tracks that move as one target does, but too far apart for their errors.
+
+    target (T,) of the tracks. Each has no partner in the other's run, and both go farther than they are apart: so it is
+    rather one target, of which a run has a bias, than two. The nearest pairs come first, each track once.
+    """
+    limit = 2 * float(gammaincinv(1.0, INSIDE))
+    found = []
+    for a in range(len(histories.run)):
+        for b in range(a + 1, len(histories.run)):
+            both = histories.there[a] & histories.there[b]
+            if both.sum() < LEAST_COMMON or _partnered(histories, target, a, b) or _partnered(histories, target, b, a):
+                continue
+            v = histories.xy[a, both] - histories.xy[b, both]
+            S = histories.cov[a, both] + histories.cov[b, both]
+            off = v - v.mean(axis=0)
+            d2 = np.einsum("ki,ki->k", off, np.linalg.solve(S, off[:, :, None])[:, :, 0]).mean()
+            apart_m = float(np.linalg.norm(v, axis=1).mean())
+            way_m = min(float(np.linalg.norm(np.ptp(histories.xy[k, both], axis=0))) for k in (a, b))
+            if d2 < limit and apart_m < way_m:
+                found.append((apart_m, a, b))
+    taken: set[int] = set()
+    apart = []
+    for apart_m, a, b in sorted(found):
+        if not taken & {a, b}:
+            taken |= {a, b}
+            apart.append(apart_m)
+    return np.array(apart)
+
+
+def _partnered(histories: Histories, target: Ints, a: int, b: int) -> bool:
+    """Whether track a is of one run with b, or of one target with a track of b's run."""
+    return bool((histories.run[target == target[a]] == histories.run[b]).any())
+
+
 def _by_distance(histories: Histories) -> list[tuple[int, int]]:
     """Pairs of tracks near enough to be of one target, the nearest first."""
     # errors of one track last, so that its times count as one: the mean is compared with the quantile of one

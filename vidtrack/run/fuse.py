@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.associate.tracks_of_runs import Histories, same_targets
+from vidtrack.associate.tracks_of_runs import Histories, parallel, same_targets
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.estimate.intersection import intersection
@@ -25,6 +26,8 @@ from vidtrack.radar.plane import Plane, plane_of_run
 from vidtrack.run.run import Pipeline, Run
 from vidtrack.scan import Scan
 from vidtrack.tracks import CONFIRMED, Tracks
+
+_log = logging.getLogger(__name__)
 
 STATE = ("x_m", "vx_m_s", "y_m", "vy_m_s")
 SIGMA = ("sigma_x_m", "sigma_vx_m_s", "sigma_y_m", "sigma_vy_m_s")
@@ -144,7 +147,9 @@ def fused_steps(runs: Sequence[RunTracks], times: Floats) -> Iterator[Step]:
     track_run, states, covs = _at(runs, times)
     there = ~np.isnan(states[:, :, 0])
     place = [0, 2]
-    target = same_targets(Histories(track_run, there, states[:, :, place], covs[:, :, place][:, :, :, place]))
+    histories = Histories(track_run, there, states[:, :, place], covs[:, :, place][:, :, :, place])
+    target = same_targets(histories)
+    _warn_if_biased(histories, target)
     for k, t in enumerate(times.tolist()):
         rows = np.flatnonzero(there[:, k])
         ids, first = np.unique(target[rows], return_index=True)
@@ -155,6 +160,18 @@ def fused_steps(runs: Sequence[RunTracks], times: Floats) -> Iterator[Step]:
             x[on], P[on] = intersection(x[on], P[on], states[mine, k], covs[mine, k])
         empty = Scan(t, np.empty((0, 2)), np.eye(2))
         yield Step(k, t, empty, _tracks(t, ids + 1, x, P), None, None, {})
+
+
+def _warn_if_biased(histories: Histories, target: Ints) -> None:
+    """A warning says so if more pairs of tracks only move alike than agree within their errors."""
+    apart = parallel(histories, target)
+    agreeing = len(target) - len(np.unique(target))
+    if len(apart) > agreeing:
+        _log.warning(
+            "tracks of different runs move as one target does, but %.0f m apart, far beyond their errors (%d pairs; %d "
+            "agree): a run may have a bias, or another clock, which fuse does not remove; track the plots of all together "
+            "with --radars", np.median(apart), len(apart), agreeing,
+        )  # fmt: skip
 
 
 def _at(runs: Sequence[RunTracks], times: Floats) -> tuple[Ints, Floats, Floats]:

@@ -130,7 +130,7 @@ def network_steps(network: Network, tracker: Tracker, redundant: float | None = 
         tracks = tracker.step(scan)
         network.learn(turn, tracks)
         yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})
-    network.warn_if_untold()
+    network.warn_of_biases()
 
 
 def build_network_tracker(settings: Settings, network: Network, *, explain: bool = False, seed: int = 0) -> Tracker:

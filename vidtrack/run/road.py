@@ -246,4 +246,4 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
             network.learn(seen, tracks)
         yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})
     if network is not None:
-        network.warn_if_untold()
+        network.warn_of_biases()

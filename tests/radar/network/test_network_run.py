@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -100,7 +101,30 @@ def test_a_known_bias_of_none_is_not_estimated(biased):
     np.testing.assert_array_equal(network.scan(turns[1]).z, feed.found.z[turns[1].span.rows])
 
 
-def test_runs_of_two_radars_are_fused(tmp_path):
+def test_a_clock_that_is_off_unexpectedly_is_named(biased, tmp_path, caplog):
+    for name in ("north.csv", "south.csv", "radars.toml"):
+        (tmp_path / name).write_text((biased / name).read_text())
+    with (tmp_path / "south.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    with (tmp_path / "south.csv").open("w") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows(row | {"time_s": float(row["time_s"]) + 1.0} for row in rows)
+    finished(tmp_path, ["north", "south"], "late")
+    off_s, of = re.search(r"the clock of south seems to be (.*) s ahead of that of (\w+)", caplog.text).groups()
+    assert (float(off_s), of) == (pytest.approx(1.0, abs=0.3), "north")
+
+
+def test_tracks_that_a_bias_keeps_apart_are_told_of(biased, tmp_path, caplog):
+    """One degree at 15 to 30 km; test_runs_of_two_radars_are_fused has none."""
+    runs = [finished(biased, [name], f"alone-{name}") for name in ("north", "south")]
+    with run_fusion(runs, tmp_path / "both") as run:
+        for _ in run:
+            pass
+    assert "move as one target does" in caplog.text
+
+
+def test_runs_of_two_radars_are_fused(tmp_path, caplog):
     write_network(simulate_network(500, bias=(0.0, 0.0, 0.0)), tmp_path)
     origin = (50.0, 8.0, 100.0)
     runs = [finished(tmp_path, [name], f"run-{name}", origin=origin) for name in ("north", "south")]
@@ -110,6 +134,7 @@ def test_runs_of_two_radars_are_fused(tmp_path):
     result = read(tmp_path / "both")
     assert json.loads((tmp_path / "both" / "summary.json").read_text())["origin"] == [50.0, 8.0, 100.0]
     assert len(np.unique(result.id)) == 2
+    assert "as one target does" not in caplog.text
     alone = [np.sqrt(np.median(distances_at(tmp_path, run) ** 2)) for run in runs]
     assert np.sqrt(np.median(distances_at(tmp_path, tmp_path / "both") ** 2)) < max(alone)
 

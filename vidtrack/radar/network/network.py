@@ -30,6 +30,11 @@ from vidtrack.tracking.blind import BlindZone
 from vidtrack.tracks import TENTATIVE, Tracks
 
 _log = logging.getLogger(__name__)
+
+CLOCK_S = 1.0
+"""s; standard deviation of the error of a clock that is expected to have none, by which one is found."""
+SURE = 3.3
+"""Standard deviations of the estimate beyond which a clock is off."""
 SAME_TIME_S = 0.01
 """s; delays of a copy that are shorter are not told."""
 _OWN = ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s", "scan_s", "sac", "sic")
@@ -104,9 +109,17 @@ class Network:
         if len(feeds) == 1:
             sigma[:] = 0.0
         self._told_s = -np.inf
-        settings = feeds[0].settings
-        self.registration = Registration(
-            [feed.placed.xyz[:2] for feed in feeds], sigma, np.array([feed.scan_s for feed in feeds]),
+        self.registration = self._registration(sigma)
+        unexpected = sigma[:, :2].any(axis=1) & (sigma[:, 2] == 0)
+        unexpected[0] = False
+        sigma[unexpected, 2] = CLOCK_S
+        self._with_clocks, self._unexpected = self._registration(sigma), np.flatnonzero(unexpected)
+
+    def _registration(self, sigma: Floats) -> Registration:
+        """A registration of all radars with these standard deviations of their biases (S, 3)."""
+        settings = self.feeds[0].settings
+        return Registration(
+            [feed.placed.xyz[:2] for feed in self.feeds], sigma, np.array([feed.scan_s for feed in self.feeds]),
             jerk=2 * settings.accel**2 * settings.hold_s,
         )  # fmt: skip
 
@@ -145,18 +158,31 @@ class Network:
         R = np.einsum("ni,ij->nij", plots.sigma[rows, :2] ** 2, np.eye(2))
         taken = Plotted(turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.v[took])
         self.registration.learn(turn.span.t, taken)
+        if len(self._unexpected):
+            self._with_clocks.learn(turn.span.t, taken)
 
     def learnt_until(self, t: float) -> None:
         """The scans up to t come once more: they have told what they can of the biases."""
         self._told_s = t
         self.registration.begin_anew()
+        self._with_clocks.begin_anew()
 
-    def warn_if_untold(self) -> None:
-        """A warning says so if by the end there were fewer comparisons of common targets than biases to tell."""
+    def warn_of_biases(self) -> None:
+        """A warning says so if by the end fewer common targets were compared than there are biases to tell.
+
+        Another one names each radar whose clock is off, though no error of it is expected.
+        """
         if self.registration.used < np.count_nonzero(self.registration.prior):
             _log.warning(
                 "hardly any target of two radars told their biases: were there none at one time, or are the places and "
                 "directions of %s wrong?", _radars(self.feeds),
+            )  # fmt: skip
+        off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
+        for k in self._unexpected[np.abs(off_s[self._unexpected]) > SURE * sigma_s[self._unexpected]].tolist():
+            _log.warning(
+                "the clock of %s seems to be %.2f s %s that of %s (+- %.2f s), which radars.toml does not expect: give "
+                "the radar bias_time_s there, and it is estimated", self.feeds[k].placed.name, abs(off_s[k]),
+                "ahead of" if off_s[k] > 0 else "behind", self.feeds[0].placed.name, sigma_s[k],
             )  # fmt: skip
 
     def as_dict(self) -> dict[str, dict[str, float | bool]]:
