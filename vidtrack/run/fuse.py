@@ -169,7 +169,7 @@ def _warn_if_biased(histories: Histories, target: Ints) -> None:
     if len(apart) > agreeing:
         _log.warning(
             "tracks of different runs move as one target does, but %.0f m apart, far beyond their errors (%d pairs; %d "
-            "agree): a run may have a bias, or another clock, which fuse does not remove; track the plots of all together "
+            "agree): a run may have a bias, or another clock, which fuse does not remove; track the plots together "
             "with --radars", np.median(apart), len(apart), agreeing,
         )  # fmt: skip
 

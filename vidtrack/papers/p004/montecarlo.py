@@ -142,8 +142,11 @@ def _figure(table: Table, wrong: dict[Pair, Floats]) -> Figure:
         style.title(ax, scenario)
     if wrong:
         _wrong(panels[4], wrong)
-    panels[5].set_axis_off()
-    handles, labels = panels[0].get_legend_handles_labels()
+    for ax in panels:
+        if not ax.has_data():  # not run yet, or the legend's
+            ax.set_axis_off()
+    both = [ax.get_legend_handles_labels() for ax in (panels[0], panels[4])]
+    handles, labels = both[0][0] + both[1][0], both[0][1] + both[1][1]
     panels[5].legend(handles, labels, frameon=False, fontsize=9, loc="center", title="outcome of the runs that fail")
     return drawing
 
@@ -179,9 +182,9 @@ def _wrong(ax: Axes, wrong: dict[Pair, Floats]) -> None:
         "o",
         markeredgecolor=style.GREY,
         markerfacecolor="none",
-        label="reference, from other starting points:\nnot to be compared bar by bar",
+        ls="none",
+        label="reference of nine targets, from other\nstarting points: not to be compared bar by bar",
     )
-    ax.legend(frameon=False, fontsize=8, loc="lower right")
     _name_rows(ax, y)
     ax.set_xlabel("mean wrong identities of 9")
     style.title(ax, "nine targets")

@@ -34,7 +34,7 @@ def read_truth(path: Path, run: Path) -> Table:
     named = (messages.kind == Kind.GEODETIC) & (messages.target != NO_TARGET)
     messages = Clock(Losses()).on_one_clock(messages.only(named))
     truth = Table(
-        np.zeros(len(messages), np.int64), messages.target, plane.metres(messages.u, messages.v), None,
+        np.zeros(len(messages), np.int64), messages.target.astype(np.int64), plane.metres(messages.u, messages.v), None,
         np.ones(len(messages)), unit="m", time_s=messages.time_s,
     )  # fmt: skip
     found = interpolated(truth, scan, time_s, LONGEST_GAP_S) if len(messages) else truth
