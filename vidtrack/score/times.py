@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints, Mask
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import FormatError
-from vidtrack.formats import Table
+from vidtrack.formats import Table, interpolated, scans_between
 
 STEPS = 2.0
 """Usual steps of a target of the truth; in a longer gap between two of its rows its place is not known."""
@@ -51,37 +51,3 @@ def _steps(target: Ints, time_s: Floats) -> Floats:
     """Times between rows of one target, over all targets (N,)."""
     order = np.lexsort((time_s, target))
     return np.diff(time_s[order])[np.diff(target[order]) == 0]
-
-
-def scans_between(frame: Ints, time_s: Floats) -> tuple[Ints, Floats]:
-    """Numbers and times (K,) of all scans from the first row to the last one; some may have no row (N,)."""
-    known, first = np.unique(frame, return_index=True)
-    number = np.arange(known[0], known[-1] + 1)
-    return number, np.interp(number, known, time_s[first])
-
-
-def interpolated(truth: Table, number: Ints, time_s: Floats, longest_gap_s: float) -> Table:
-    """The places of all targets at scans of these numbers and times (K,), linearly between rows of the truth.
-
-    Between rows that are farther apart than longest_gap_s a target's place is not known.
-    """
-    assert truth.time_s is not None
-    scans, ids, places = [], [], []
-    for target in np.unique(truth.id):
-        own = np.flatnonzero(truth.id == target)
-        own = own[np.argsort(truth.time_s[own], kind="stable")]
-        at_s = truth.time_s[own]
-        known = _known(at_s, time_s, longest_gap_s)
-        scans.append(number[known])
-        ids.append(np.full(len(scans[-1]), target))
-        places.append(np.column_stack([np.interp(time_s[known], at_s, place) for place in truth.xy[own].T]))
-    frame = np.concatenate(scans)
-    return Table(frame, np.concatenate(ids), np.concatenate(places), None, np.ones(len(frame)), unit=truth.unit)
-
-
-def _known(reported_s: Floats, time_s: Floats, longest_gap_s: float) -> Mask:
-    """(K,) times at a report, or between two that are at most longest_gap_s apart."""
-    after = np.clip(np.searchsorted(reported_s, time_s), 1, max(len(reported_s) - 1, 1))
-    before, after = after - 1, np.minimum(after, len(reported_s) - 1)
-    inside = (reported_s[before] <= time_s) & (time_s <= reported_s[after])
-    return np.asarray(inside & (reported_s[after] - reported_s[before] <= longest_gap_s))

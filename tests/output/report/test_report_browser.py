@@ -46,7 +46,7 @@ def test_every_picture_shows_and_nothing_is_wider_than_the_screen(tmp_path, out)
     command += ["--dump-dom", (out / "looked-at.html").as_uri()]
     dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
     seen, images, width = map(int, re.search(r"<title>pictures (\d+) of (\d+), wide (\d+)", dom).groups())
-    assert (seen, images) == (5, 5)
+    assert (seen, images) == (4, 4)  # nobody queues, so that there is no chart of queues
     assert width <= 500
 
 

@@ -10,12 +10,11 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import FormatError
-from vidtrack.formats import Table
+from vidtrack.formats import Table, interpolated, scans_between
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses
 from vidtrack.radar.feeds.recording import read_messages
 from vidtrack.radar.plane import Plane, plane_of_run
-from vidtrack.score.times import interpolated, scans_between
 
 LONGEST_GAP_S = 30.0
 """s; between reports that are farther apart a target's place is not known."""
