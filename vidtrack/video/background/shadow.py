@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
@@ -171,17 +172,18 @@ def reclaim(hit: Image) -> None:
     _fill(hit, row, start, stop, label, vehicle, _AMID)
 
 
-@kernel
 def find_dark(picture: Picture, scene: Scene, black: Levels, hit: Image) -> None:
     """Set hit (h, w) uint8 from SHADOW back to 1 where connected shadow is a dark vehicle.
 
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
     on all four sides is vehicle, too.
     """
-    shadow = np.zeros_like(hit)
-    for y in range(len(hit)):
-        for x in range(hit.shape[1]):
-            shadow[y, x] = hit[y, x] == SHADOW
+    shadow = np.asarray(cv2.compare(hit, float(SHADOW), cv2.CMP_EQ), np.uint8)
+    _find_dark(picture, scene, black, shadow, hit)
+
+
+@kernel
+def _find_dark(picture: Picture, scene: Scene, black: Levels, shadow: Image, hit: Image) -> None:
     row, start, stop = find_runs(shadow, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
     inside, own = np.zeros((2, count))
