@@ -89,18 +89,19 @@ def scans_between(frame: Ints, time_s: Floats) -> tuple[Ints, Floats]:
     return number, np.interp(number, known, time_s[first])
 
 
-def interpolated(truth: Table, number: Ints, time_s: Floats, longest_gap_s: float) -> Table:
+def interpolated(truth: Table, number: Ints, time_s: Floats, longest_gap_s: float | Floats) -> Table:
     """The places of all targets at scans of these numbers and times (K,), linearly between rows of the truth.
 
-    Between rows that are farther apart than longest_gap_s a target's place is not known.
+    longest_gap_s  between rows farther apart a target's place is not known; of all targets, or of each in order of ids
     """
     assert truth.time_s is not None
     scans, ids, places = [], [], []
-    for target in np.unique(truth.id):
+    targets = np.unique(truth.id)
+    for target, gap_s in zip(targets, np.broadcast_to(longest_gap_s, targets.shape), strict=True):
         own = np.flatnonzero(truth.id == target)
         own = own[np.argsort(truth.time_s[own], kind="stable")]
         at_s = truth.time_s[own]
-        known = _known(at_s, time_s, longest_gap_s)
+        known = _known(at_s, time_s, float(gap_s))
         scans.append(number[known])
         ids.append(np.full(len(scans[-1]), target))
         places.append(np.column_stack([np.interp(time_s[known], at_s, place) for place in truth.xy[own].T]))

@@ -11,6 +11,7 @@ from vidtrack.config.load import load
 from vidtrack.config.settings import Settings, SourceSettings, TrackerSettings
 from vidtrack.errors import ConfigError, SourceError
 from vidtrack.run.files import run_file
+from vidtrack.run.run import Extras
 from vidtrack.run.trackers import box_tracker, build_blob_tracker, build_box_tracker
 from vidtrack.run.video import build_detector, has_driven, track, video_steps
 from vidtrack.scan import Scan
@@ -32,6 +33,17 @@ def test_track_yields_each_frame_with_its_tracks():
     assert seen[0][0].bgr().shape == (240, 320, 3)
     known = {int(i) for _, tracks in seen for i in tracks.id[tracks.status != Status.TENTATIVE]}
     assert len(known) == 2
+
+
+def test_whoever_looks_at_the_pictures_gets_whole_ones_of_the_first_seconds_too(tmp_path):
+    """The detector looks at half of 320 x 240; what it has seen ahead may be kept so for itself alone."""
+    settings = load(assignments=["source.scale=0.5"])
+    frame, _ = next(track(CROSSING, settings))
+    assert frame.y.shape == (240, 320)
+    with run_file(str(CROSSING), settings, tmp_path / "out", Extras(video=tmp_path / "shown.mp4")) as run:
+        step = next(iter(run))
+    assert step.frame is not None
+    assert step.frame.y.shape == (240, 320)
 
 
 def test_track_is_lazy_and_may_be_left():

@@ -157,6 +157,29 @@ def test_numbers_of_other_times_are_matched_by_time():
     assert evaluate(result, away, max_distance=1.0)["false_positives"] == 5
 
 
+def test_what_a_result_lacks_of_the_time_of_its_truth_is_missed():
+    truth, result = drives(0.1 * np.arange(200)), drives(0.05 + 1.3 * np.arange(15))
+    late = result.select((result.frame >= 4) & (result.frame < 12))
+    scores = evaluate(late, truth, max_distance=1.0)
+    assert (scores["frames"], scores["misses"], scores["matches"]) == (16, 16, 16)
+
+
+def test_scans_of_two_sensors_may_have_the_same_time():
+    truth, result = drives(0.1 * np.arange(100)), drives(np.sort(np.append(0.04 * np.arange(200), 0.2 * np.arange(40))))
+    scores = evaluate(result, truth, max_distance=1.0)
+    assert (scores["frames"], scores["misses"], scores["false_positives"]) == (288, 96, 0)
+
+
+def test_targets_keep_their_own_steps_and_none_without_two_rows_counts():
+    """A target that is known every 5 s beside one ten times a second; and truth of one row a target."""
+    seldom, result = drives(0.1 * np.arange(200)), drives(0.05 + 1.3 * np.arange(15))
+    seldom = seldom.select((seldom.id == 1) | (seldom.frame % 50 == 0))
+    assert evaluate(result, seldom, max_distance=1.0)["false_positives"] == 3  # after the last row of the seldom one
+    once = drives(0.1 * np.arange(200))
+    with pytest.raises(FormatError, match="two rows"):
+        evaluate(result, replace(once, id=np.arange(len(once))))
+
+
 def test_clocks_without_a_common_time_are_refused():
     truth, result = drives(0.1 * np.arange(200)), drives(1e3 + 1.3 * np.arange(20))
     with pytest.raises(FormatError, match=r"number 19 is at 1024.7 s in the result and at 1.9 s in the truth"):

@@ -39,8 +39,8 @@ def evaluate(
     OSPA and GOSPA use 1 - IoU or the distance, `cutoff` (None: 1 for boxes, max_distance for points)
     and `order`; they are means over the frames in which truth or result has a row, and so are their parts.
     NIS and NEES are from `states` (None: result) if it has the columns.
-    Where most scan numbers stand for other times in the truth than in the result, it is interpolated at the times of
-    the result, of which those within the truth's count.
+    Where most scan numbers stand for other times in the truth than in the result, its positions are interpolated at the
+    times of the result, and points are matched; what it has before and after the result is missed.
     Raises FormatError for tables without identities, a truth without rows, and clocks with no time in common;
     ConfigError for bad options.
     """
@@ -58,15 +58,15 @@ def evaluate(
     if not 0 < max_distance < math.inf:
         raise ConfigError(f"max_distance is {max_distance}; it must be a finite number above 0")
 
-    points = points or result.box is None or truth.box is None
-    if cutoff is None:
-        cutoff = max_distance if points else 1.0
     timed = by_time(result, truth)
     if timed is not None:
         truth, scans = timed
         result = result.select(np.isin(result.frame, scans))
         states = None if states is None else states.select(np.isin(states.frame, scans))
     at = "" if timed is None else ", the truth at the times of the scans"
+    points = points or result.box is None or truth.box is None
+    if cutoff is None:
+        cutoff = max_distance if points else 1.0
     matched_by = f"distance up to {max_distance:g} {truth.unit}{at}" if points else f"IoU from {iou:g}"
     threshold = POINT_THRESHOLD if points else iou
 

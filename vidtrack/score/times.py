@@ -16,8 +16,9 @@ def by_time(result: Table, truth: Table) -> tuple[Table, Ints] | None:
     """The truth at the times of the result's scans, and the numbers of these scans, within the time of the truth.
 
     None where the numbers stand for the same times in both, or times are not known. Then the clocks may begin
-    differently, else they may not.
-    Raises FormatError if no time is common, or times do not rise with the numbers, as in pooled tables.
+    differently, else they may not. Where the truth begins before the result, or ends after it, there are more scans, in
+    its usual step.
+    Raises FormatError if no time is common, or times fall while the numbers rise, as in pooled tables.
     """
     if result.time_s is None or truth.time_s is None:
         return None
@@ -26,18 +27,38 @@ def by_time(result: Table, truth: Table) -> tuple[Table, Ints] | None:
     if len(common) < 2 or not _of_other_times(ours, theirs):
         return None
     scan, time_s = scans_between(result.frame, result.time_s)
-    steps_s = np.diff(truth.time_s[np.unique(truth.frame, return_index=True)[1]])
-    usual_s = float(np.median(_steps(truth.id, truth.time_s)))
-    inside = (truth.time_s.min() <= time_s) & (time_s <= truth.time_s.max())
-    if not inside.any() or np.diff(time_s).min() <= 0 or steps_s.min() <= 0:
+    begin_s, end_s = float(truth.time_s.min()), float(truth.time_s.max())
+    if time_s[0] > end_s or time_s[-1] < begin_s or _falls(result) or _falls(truth):
         k = int(np.abs(ours - theirs - (ours - theirs)[0]).argmax())
         raise FormatError(
             f"number {common[k]} is at {ours[k]:.10g} s in the result and at {theirs[k]:.10g} s in the truth, which "
             "numbers other scans or frames, and their clocks are not the same; give the truth at the scans of the "
             "result, or in its time"
         )
+    scan, time_s = _widened(scan, time_s, begin_s, end_s)
+    inside = (begin_s <= time_s) & (time_s <= end_s)
     scan, time_s = scan[inside], time_s[inside]
-    return interpolated(truth, scan, time_s, STEPS * usual_s), scan
+    found = interpolated(truth, scan, time_s, STEPS * _usual_steps(truth.id, truth.time_s))
+    if not len(found):
+        raise FormatError("no target of the truth has two rows in its usual step around a scan of the result")
+    return found, scan
+
+
+def _falls(table: Table) -> bool:
+    """Whether times fall while the numbers of scans or frames rise; a radar and a camera may have the same time."""
+    assert table.time_s is not None
+    return bool((np.diff(table.time_s[np.unique(table.frame, return_index=True)[1]]) < 0).any())
+
+
+def _widened(scan: Ints, time_s: Floats, begin_s: float, end_s: float) -> tuple[Ints, Floats]:
+    """These scans (K,), and more of them in the usual step back to begin_s and on to end_s."""
+    steps_s = np.diff(time_s)
+    step_s = float(np.median(steps_s[steps_s > 0]))
+    before = max(0, int((time_s[0] - begin_s) / step_s))
+    after = max(0, int((end_s - time_s[-1]) / step_s))
+    earlier, later = np.arange(-before, 0), np.arange(1, after + 1)
+    number = np.concatenate([scan[0] + earlier, scan, scan[-1] + later])
+    return number, np.concatenate([time_s[0] + earlier * step_s, time_s, time_s[-1] + later * step_s])
 
 
 def _of_other_times(ours: Floats, theirs: Floats) -> bool:
@@ -47,7 +68,7 @@ def _of_other_times(ours: Floats, theirs: Floats) -> bool:
     return bool(np.median(np.abs(off - np.median(off))) > step_s / 2)
 
 
-def _steps(target: Ints, time_s: Floats) -> Floats:
-    """Times between rows of one target, over all targets (N,)."""
-    order = np.lexsort((time_s, target))
-    return np.diff(time_s[order])[np.diff(target[order]) == 0]
+def _usual_steps(target: Ints, time_s: Floats) -> Floats:
+    """Median time between rows of each target, in ascending order of their ids; 0 where it has one row."""
+    steps = [np.diff(np.sort(time_s[target == one])) for one in np.unique(target)]
+    return np.array([np.median(each) if len(each) else 0.0 for each in steps])

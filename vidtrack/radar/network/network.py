@@ -180,8 +180,9 @@ class Network:
         off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
         for k in self._unexpected[np.abs(off_s[self._unexpected]) > SURE * sigma_s[self._unexpected]].tolist():
             _log.warning(
-                "the clock of %s seems to be %.2f s %s that of %s (+- %.2f s), which radars.toml does not expect: give "
-                "the radar bias_time_s there, and it is estimated", self.feeds[k].placed.name, abs(off_s[k]),
+                "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect: "
+                "give the radar bias_time_s there, and it is estimated", self.feeds[k].placed.name,
+                "more than " if abs(off_s[k]) > 3 * CLOCK_S else "", abs(off_s[k]),
                 "ahead of" if off_s[k] > 0 else "behind", self.feeds[0].placed.name, sigma_s[k],
             )  # fmt: skip
 

@@ -6,7 +6,6 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
@@ -178,12 +177,13 @@ def find_dark(picture: Picture, scene: Scene, black: Levels, hit: Image) -> None
     The inside of a shadow has the scene's edges, that of a vehicle others. These are where it is visible; what has them
     on all four sides is vehicle, too.
     """
-    shadow = np.asarray(cv2.compare(hit, float(SHADOW), cv2.CMP_EQ), np.uint8)
+    shadow = (hit == SHADOW).view(np.uint8)
     _find_dark(picture, scene, black, shadow, hit)
 
 
 @kernel
 def _find_dark(picture: Picture, scene: Scene, black: Levels, shadow: Image, hit: Image) -> None:
+    """The same, for the pixels of shadow (h, w)."""
     row, start, stop = find_runs(shadow, OBJECTS)
     label, count = connect(row, start, stop, CORNERS)
     inside, own = np.zeros((2, count))
@@ -220,7 +220,7 @@ def _lit(hit: Image, y: int, start: int, stop: int) -> np.int32:
 
 @inlined
 def _is_inside(shadow: Image, y: int, x: int) -> bool:
-    """Whether there is shadow (h, w) on all sides, farther off than edges are soft. Lamps amid it do not count."""
+    """Whether there is shadow (h, w) on all sides and across, farther off than edges are soft."""
     h, w = shadow.shape
     up, down, left, right = y - _SOFT_PX, y + _SOFT_PX, x - _SOFT_PX, x + _SOFT_PX
     if up < 0 or down >= h or left < 0 or right >= w:
