@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import gammaincinv
 
+from vidtrack.arrays.rows import dot
 from vidtrack.arrays.types import Floats, Ints, Mask
 
 LEAST_COMMON = 3
 """Fewest common times of two tracks that are compared."""
 INSIDE = 0.999
 """Share of pairs of one target that are found, if the errors are as stated."""
+LIMIT = 2 * float(gammaincinv(1.0, INSIDE))
+"""Of the mean squared distance. Errors of one track last, so that its times count as one: it is the quantile of one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +55,15 @@ def parallel(histories: Histories, target: Ints) -> Floats:
     target (T,) of the tracks. Each has no partner in the other's run, and both go farther than they are apart: so it is
     rather one target, of which a run has a bias, than two. The nearest pairs come first, each track once.
     """
-    limit = 2 * float(gammaincinv(1.0, INSIDE))
     found = []
-    for a in range(len(histories.run)):
-        for b in range(a + 1, len(histories.run)):
-            both = histories.there[a] & histories.there[b]
-            if both.sum() < LEAST_COMMON or _partnered(histories, target, a, b) or _partnered(histories, target, b, a):
-                continue
-            v = histories.xy[a, both] - histories.xy[b, both]
-            S = histories.cov[a, both] + histories.cov[b, both]
-            off = v - v.mean(axis=0)
-            d2 = np.einsum("ki,ki->k", off, np.linalg.solve(S, off[:, :, None])[:, :, 0]).mean()
-            apart_m = float(np.linalg.norm(v, axis=1).mean())
-            way_m = min(float(np.linalg.norm(np.ptp(histories.xy[k, both], axis=0))) for k in (a, b))
-            if d2 < limit and apart_m < way_m:
-                found.append((apart_m, a, b))
+    for a, b, both in _together(histories):
+        if _partnered(histories, target, a, b) or _partnered(histories, target, b, a):
+            continue
+        v, S = _difference(histories, a, b, both)
+        apart_m = float(np.linalg.norm(v, axis=1).mean())
+        way_m = min(float(np.linalg.norm(np.ptp(histories.xy[k, both], axis=0))) for k in (a, b))
+        if _mean_d2(v - v.mean(axis=0), S) < LIMIT and apart_m < way_m:
+            found.append((apart_m, a, b))
     taken: set[int] = set()
     apart = []
     for apart_m, a, b in sorted(found):
@@ -76,27 +74,32 @@ def parallel(histories: Histories, target: Ints) -> Floats:
 
 
 def _partnered(histories: Histories, target: Ints, a: int, b: int) -> bool:
-    """Whether track a is of one run with b, or of one target with a track of b's run."""
+    """Whether track a is of one target with a track of b's run."""
     return bool((histories.run[target == target[a]] == histories.run[b]).any())
 
 
 def _by_distance(histories: Histories) -> list[tuple[int, int]]:
     """Pairs of tracks near enough to be of one target, the nearest first."""
-    # errors of one track last, so that its times count as one: the mean is compared with the quantile of one
-    limit = 2 * float(gammaincinv(1.0, INSIDE))
-    found = []
+    found = [(_mean_d2(*_difference(histories, a, b, both)), a, b) for a, b, both in _together(histories)]
+    return [(a, b) for d2, a, b in sorted(found) if d2 < LIMIT]
+
+
+def _together(histories: Histories) -> Iterator[tuple[int, int, Mask]]:
+    """Tracks a and b of two runs, and their common times (K,), of which there are enough to compare them."""
     for a in range(len(histories.run)):
-        others = np.flatnonzero((histories.run > histories.run[a]) & (histories.there & histories.there[a]).any(axis=1))
-        for b in others:
-            both = histories.there[a] & histories.there[b]
-            if both.sum() < LEAST_COMMON:
-                continue
-            v = histories.xy[a, both] - histories.xy[b, both]
-            S = histories.cov[a, both] + histories.cov[b, both]
-            d2 = np.einsum("ki,ki->k", v, np.linalg.solve(S, v[:, :, None])[:, :, 0]).mean()
-            if d2 < limit:
-                found.append((float(d2), a, int(b)))
-    return [(a, b) for _, a, b in sorted(found)]
+        common = histories.there & histories.there[a]
+        for b in np.flatnonzero((histories.run > histories.run[a]) & (common.sum(axis=1) >= LEAST_COMMON)).tolist():
+            yield a, b, common[b]
+
+
+def _difference(histories: Histories, a: int, b: int, both: Mask) -> tuple[Floats, Floats]:
+    """(C, 2) difference of two tracks at their common times, and (C, 2, 2) its covariance."""
+    return histories.xy[a, both] - histories.xy[b, both], histories.cov[a, both] + histories.cov[b, both]
+
+
+def _mean_d2(v: Floats, S: Floats) -> float:
+    """Mean of the squared Mahalanobis distances of v (C, 2) with S (C, 2, 2)."""
+    return float(dot(v, np.asarray(np.linalg.solve(S, v[:, :, None])[:, :, 0], float)).mean())
 
 
 def _overlap(histories: Histories, one: Mask, other: Mask) -> bool:

@@ -27,8 +27,10 @@ def by_time(result: Table, truth: Table) -> tuple[Table, Ints] | None:
     if len(common) < 2 or not _of_other_times(ours, theirs):
         return None
     scan, time_s = scans_between(result.frame, result.time_s)
-    begin_s, end_s = float(truth.time_s.min()), float(truth.time_s.max())
-    if time_s[0] > end_s or time_s[-1] < begin_s or _falls(result) or _falls(truth):
+    _, truth_s = scans_between(truth.frame, truth.time_s)
+    begin_s, end_s = truth_s.min(), truth_s.max()
+    falls = any((np.diff(times) < 0).any() for times in (time_s, truth_s))  # a radar and a camera may have the same
+    if falls or time_s[0] > end_s or time_s[-1] < begin_s:
         k = int(np.abs(ours - theirs - (ours - theirs)[0]).argmax())
         raise FormatError(
             f"number {common[k]} is at {ours[k]:.10g} s in the result and at {theirs[k]:.10g} s in the truth, which "
@@ -42,12 +44,6 @@ def by_time(result: Table, truth: Table) -> tuple[Table, Ints] | None:
     if not len(found):
         raise FormatError("no target of the truth has two rows in its usual step around a scan of the result")
     return found, scan
-
-
-def _falls(table: Table) -> bool:
-    """Whether times fall while the numbers of scans or frames rise; a radar and a camera may have the same time."""
-    assert table.time_s is not None
-    return bool((np.diff(table.time_s[np.unique(table.frame, return_index=True)[1]]) < 0).any())
 
 
 def _widened(scan: Ints, time_s: Floats, begin_s: float, end_s: float) -> tuple[Ints, Floats]:
