@@ -41,6 +41,7 @@ FLOORS = (
     "config",
     "state",
     "errors",
+    "rehearsal",
     "beside",
     "compiled",
 )

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner
 from command_line import ROOT
+from numba.core.registry import CPUDispatcher
 from plot_files import GOOD, write
 
 from vidtrack import formats, score
@@ -20,7 +21,8 @@ from vidtrack.config.load import load
 from vidtrack.config.settings import Settings, TrackerSettings
 from vidtrack.errors import ConfigError, PlotFormatError
 from vidtrack.output.repair import repair
-from vidtrack.run.radar import run_plots, track_plots
+from vidtrack.rehearsal import rehearse
+from vidtrack.run.radar import first_plots, run_plots, track_plots
 from vidtrack.run.run import Extras, Run
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
@@ -48,6 +50,16 @@ def run(folder, out, *assignments, extras=None):
         for _ in result:
             pass
     return result.folder
+
+
+def test_the_first_scans_of_a_run_show_which_kernels_it_needs(scenario, monkeypatch):
+    table = str(scenario("radar-tws") / "plots.csv")
+    rehearse(first_plots, table, "{}")
+    compiled, compile_ = [], CPUDispatcher.compile
+    monkeypatch.setattr(CPUDispatcher, "compile", lambda self, types: compiled.append(self) or compile_(self, types))
+    for _ in track_plots(table):
+        pass
+    assert not compiled
 
 
 def scores(out, folder, max_distance):

@@ -67,11 +67,14 @@ def command(options: PredictOptions) -> None:
     in each of the last five scans.
     """
     from vidtrack.amplitude.densities import RAYLEIGH
-    from vidtrack.radar.performance.forecast import forecast, trial
+    from vidtrack.radar.performance.forecast import first_trial, forecast, trial
+    from vidtrack.rehearsal import rehearse_beside
 
     start_log(options.verbose, options.quiet)
     folder = options.folder("predict")
     kind, pfa, clutter = options.kind, options.pfa, options.weibull or RAYLEIGH
+    if options.runs is not None:
+        rehearse_beside(first_trial, kind)
     expected = forecast(kind, options.snr(), pfa, clutter, options.q, options.gate, options.cell, options.scans)
     tried = None if options.runs is None else trial(expected, options.runs, options.seed)
     if folder is not None:

@@ -111,8 +111,9 @@ def command(options: RadarOptions) -> None:
 
     from vidtrack.config.inputs import Input
     from vidtrack.radar.feeds.udp import is_address
+    from vidtrack.rehearsal import rehearse_beside
     from vidtrack.run.network import run_network
-    from vidtrack.run.radar import run_plots
+    from vidtrack.run.radar import first_plots, run_plots
     from vidtrack.run.radar_live import run_feed
     from vidtrack.run.run import Extras
 
@@ -136,6 +137,7 @@ def command(options: RadarOptions) -> None:
     elif len(options.plots) > 1:
         raise click.UsageError(f"{len(options.plots)} tables of plots need --radars, which says where the radars are")
     else:
+        rehearse_beside(first_plots, first, settings.model_dump_json(exclude_defaults=True))
         run = run_plots(first, settings, output, extras, force=force, seed=seed)
     finish(run, options.quiet, unit="scan")
 

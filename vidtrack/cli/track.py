@@ -49,6 +49,8 @@ def command(options: TrackOptions) -> None:
     from vidtrack.config.inputs import Input
     from vidtrack.detections.stored import is_detections
     from vidtrack.recording.source import is_recording, recorded_settings
+    from vidtrack.rehearsal import rehearse_beside
+    from vidtrack.run.boxes import first_boxes
     from vidtrack.run.files import run_file
     from vidtrack.run.run import Extras
 
@@ -58,6 +60,8 @@ def command(options: TrackOptions) -> None:
     stored = is_detections(source)
     settings = options.settings(Input.DETECTIONS if stored else Input.VIDEO, base)
     announce_compiling(options.quiet, video=not stored)
+    if stored:
+        rehearse_beside(first_boxes, source, settings.model_dump_json(exclude_defaults=True))
     extras = Extras(options.rerun, options.video, options.save_masks, options.decisions)
     run = run_file(source, settings, options.output, extras, force=options.force)
     finish(run, options.quiet, none="no tracks; vidtrack doctor SOURCE may say why")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 
 from vidtrack.config.settings import Settings
 from vidtrack.detections.stored import open_detections
@@ -12,7 +13,7 @@ from vidtrack.output.confirmed import HOLD_S
 from vidtrack.output.folder import refuse_overwriting
 from vidtrack.run.run import Extras, Pipeline
 from vidtrack.run.sinks import file_sinks, file_subject
-from vidtrack.run.steps import scan_steps
+from vidtrack.run.steps import REHEARSED, scan_steps
 from vidtrack.run.trackers import build_box_tracker
 
 
@@ -40,3 +41,10 @@ def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipe
         summary=subject.summary,
         sinks=partial(file_sinks, subject, extras, motion=tracker.model, smooth=smooth, link_s=link_s, hold_s=HOLD_S),
     )
+
+
+def first_boxes(path: str, settings: str) -> None:
+    """Track the first frames of a MOT file of detections, by settings in JSON: a rehearsal of its run."""
+    with box_pipeline(path, Settings.model_validate_json(settings), Extras()) as pipeline:
+        for _ in islice(pipeline.steps, REHEARSED):
+            pass

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ from vidtrack.radar.scans import Measurements, extent, measurements, surveyed
 from vidtrack.run.groups import Groups
 from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
-from vidtrack.run.steps import scan_steps
+from vidtrack.run.steps import REHEARSED, scan_steps
 from vidtrack.tracking.clutter import ClutterMap, EvenBox, EvenClutter
 from vidtrack.tracking.methods import gate, rule
 from vidtrack.tracking.occlusion.sharing import Exclusive, Sharing
@@ -59,6 +60,12 @@ def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 
     found = measurements(read(path, settings.radar), settings.radar)
     for step in scan_steps(found, build_radar_tracker(settings, found, seed=seed), settings.tracker.redundant):
         yield step.index, step.tracks
+
+
+def first_plots(path: str, settings: str) -> None:
+    """Track the first scans of a plot table, by settings in JSON: a rehearsal of its run."""
+    for _ in islice(track_plots(path, Settings.model_validate_json(settings)), REHEARSED):
+        pass
 
 
 def run_plots(

@@ -11,6 +11,9 @@ from vidtrack.output.sink import Step
 from vidtrack.scan import Scan
 from vidtrack.tracks import Tracks
 
+REHEARSED = 3
+"""Scans that show which kernels a run needs."""
+
 
 class Stepping(Protocol):
     """What takes scans and gives tracks: a tracker of targets or of groups."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from vidtrack.amplitude.densities import Weibull
+from vidtrack.amplitude.densities import RAYLEIGH, Weibull
 from vidtrack.amplitude.reduction import KE_DIM, KE_GATE
 from vidtrack.amplitude.strongest import Strongest
 from vidtrack.arrays.types import Floats, Ints
@@ -109,3 +109,8 @@ def trial(expected: Forecast, runs: int, seed: int) -> Trial:
         root_mean_square(outcome.error)[0],
         root_mean_square(kept)[0] if kept.size else None,
     )
+
+
+def first_trial(kind: Kind) -> None:
+    """Simulate a few runs of a filter: a rehearsal of `trial`."""
+    trial(forecast(kind, 40.0, 0.1, RAYLEIGH, 0.01, 4.0, 1.0, scans=3), runs=3, seed=0)
