@@ -47,10 +47,10 @@ class RestlessMap:
         self._time_s = tracks.t
         if len(self._id):
             _count_ended(self.starts, self._cell, located(tracks.id, self._id), self._xy)
-        tentative = tracks.status == TENTATIVE
-        rows = (tentative & (tracks.travel < longer(tracks.box))).nonzero()[0]
+        rows = (tracks.status == TENTATIVE).nonzero()[0]
         if len(rows):
-            rows = rows[best_cover(tracks.box[rows], tracks.box[~tentative])[1] < 0.3]
+            rows = rows[tracks.travel[rows] < longer(tracks.box[rows])]
+            rows = rows[best_cover(tracks.box[rows], tracks.box[tracks.status != TENTATIVE])[1] < 0.3]
             rows = rows[tracks.id[rows].argsort()]
         self._id, self._xy = tracks.id[rows], tracks.xy[rows]
 

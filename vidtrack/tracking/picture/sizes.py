@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vidtrack.arrays.median import median
 from vidtrack.arrays.rows import located
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.compiled import kernel
@@ -18,6 +19,7 @@ _ROUNDS = 6  # of reweighting
 _FLAT = 0.3  # prior standard deviation of a slope: shares of the typical size over one picture width
 _QUANTILE = 0.7  # what counts as typical: vehicles come in pieces more often than in pairs
 _SIGMAS = 1.95  # standard deviations of a normal variable in the median of what it exceeds that quantile by
+_SLOPES = np.diag([0.0, 1.0, 1.0])
 _LEAST = 0.5  # of the smallest sample: the field is not extrapolated to nothing
 
 
@@ -51,7 +53,7 @@ class SizeField:
         """(N, 2) width and height typical of vehicles whose bottom centre is that of boxes (N, 4); NaN if unknown."""
         if not self.known:
             return np.full((len(box), 2), np.nan)
-        return _fitted(_places(box, self._extent), self._fit, self._floor)
+        return _fitted(box, self._extent, self._fit, self._floor)
 
     def area(self, box: Floats) -> Floats:
         """(N,) area typical of vehicles at the place of boxes (N, 4); NaN if unknown."""
@@ -68,26 +70,26 @@ class SizeField:
             self._of = np.concatenate([self._of, tracks.id[rows]])[-_SAMPLES:]
         if tracks.t - self._fitted_s >= _REFIT_S:
             self._fitted_s = tracks.t
-            if len(np.unique(self._of)) >= _TRACKS:
-                self._refit()
+            _, of, number = np.unique(self._of, return_inverse=True, return_counts=True)
+            if len(number) >= _TRACKS:
+                self._refit(1 / np.sqrt(number[of]))
 
-    def _refit(self) -> None:
-        """Quantile regression of relative sizes by iteratively reweighted least squares; each vehicle counts alike."""
-        _, of, number = np.unique(self._of, return_inverse=True, return_counts=True)
-        vote = 1 / np.sqrt(number[of])
+    def _refit(self, vote: Floats) -> None:
+        """Quantile regression of relative sizes by iteratively reweighted least squares, votes (N,) of the samples."""
         for axis in range(2):
             size = self._size[:, axis]
-            median = float(np.median(size))
-            fit, scale = np.array([median, 0.0, 0.0]), 0.5
+            middle = median(size.copy())
+            fit, scale = np.array([middle, 0.0, 0.0]), 0.5
             self._floor[axis] = _LEAST * size.min()
             for _ in range(_ROUNDS):
                 expected = np.maximum(self._place @ fit, self._floor[axis])
                 error = np.log(size / expected)
                 above = error > 0
-                scale = max(_SIGMAS * float(np.median(error[above])), 0.02) if above.any() else 0.02
+                excess = error[above]
+                scale = max(_SIGMAS * median(excess), 0.02) if len(excess) else 0.02
                 side = np.where(above, _QUANTILE, 1 - _QUANTILE)
                 weight = vote * side / np.maximum(np.abs(error), 0.1 * scale) * scale / expected**2
-                flat = np.diag([0.0, 1.0, 1.0]) * (scale / (_FLAT * 10 * median)) ** 2
+                flat = _SLOPES * (scale / (_FLAT * 10 * middle)) ** 2
                 weighted = (self._place * weight[:, None]).T
                 fit = np.linalg.solve(weighted @ self._place + flat, weighted @ size)
             self._fit[:, axis], self.spread[axis] = fit, scale
@@ -104,9 +106,9 @@ def _places(box: Floats, extent: float) -> Floats:
 
 
 @kernel
-def _fitted(place: Floats, fit: Floats, floor: Floats) -> Floats:
-    """(N, 2) place (N, 3) times fit (3, 2), at least floor (2,); NaN stays NaN."""
-    size = np.empty((len(place), 2))
+def _fitted(box: Floats, extent: float, fit: Floats, floor: Floats) -> Floats:
+    """(N, 2) places (N, 3) of boxes (N, 4) times fit (3, 2), at least floor (2,); NaN stays NaN."""
+    place, size = _places(box, extent), np.empty((len(box), 2))
     for i in range(len(place)):
         for axis in range(2):
             value = place[i, 0] * fit[0, axis] + place[i, 1] * fit[1, axis] + place[i, 2] * fit[2, axis]

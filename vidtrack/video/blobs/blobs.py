@@ -20,6 +20,7 @@ from vidtrack.video.runs import Runs
 _RIM = 1.5
 """Processed pixels by which blobs reach beyond vehicles on each side, since the picture is smoothed before it is
 compared: the median at drawn sites (tools/score_speeds.py)."""
+_TWO = np.uint64(2)
 
 
 @dataclass(slots=True)
@@ -141,12 +142,18 @@ def _looks(
     """(B, 3) mean luminance and chroma of each region; chroma is 128 where the picture has none."""
     look, n, coloured = np.zeros((blobs, 3)), np.zeros(blobs), len(cb) > 0
     for k in range(len(row)):
-        i, y = label[k], row[k]
+        i, y, light, blue, red = label[k], row[k], 0, 0, 0
+        begin, end = np.uint64(start[k]), np.uint64(stop[k])
+        for x in range(begin, end):
+            light += luma[y, x]
+        for x in range(begin, end):
+            blue += cb[y // 2, x // _TWO] if coloured else 128
+        for x in range(begin, end):
+            red += cr[y // 2, x // _TWO] if coloured else 128
         n[i] += stop[k] - start[k]
-        for x in range(start[k], stop[k]):
-            look[i, 0] += luma[y, x]
-            look[i, 1] += cb[y // 2, x // 2] if coloured else 128
-            look[i, 2] += cr[y // 2, x // 2] if coloured else 128
+        look[i, 0] += light
+        look[i, 1] += blue
+        look[i, 2] += red
     for i in range(blobs):
         for c in range(3):
             look[i, c] /= n[i]

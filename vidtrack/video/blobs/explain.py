@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vidtrack.arrays import affine
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.config.video import BlobSettings
 from vidtrack.tracking.picture.road import Road
 from vidtrack.tracking.picture.sizes import SizeField
@@ -79,9 +79,9 @@ def explain(foreground: Foreground, expected: Tracks, road: Road | None, setting
     if settings.divide and measure.sizes.known:
         dividing = expected.box[known | (expected.age_s > _YOUNG_S)]
         regions = divided(regions, measure.predicted(dividing), measure)
-    box = regions.boxes().astype(float)
+    box, area = (each.astype(float) for each in regions.extents())
     group, count = together(
-        box, regions.areas().astype(float), _links(regions, foreground.weak),
+        box, area, _links(regions, foreground.weak),
         measure.predicted(expected.box[known]), measure.typical(box), measure.flake,
         settings.pieces, settings.join_overlap, settings.join_gap,
     )  # fmt: skip
@@ -100,11 +100,11 @@ def cut_at_necks(regions: Regions, measure: _Measure, predicted: Floats) -> Regi
 
     predicted  (K, 4) boxes of confirmed tracks [px of the mask]; of several vehicles in a region none is broken
     """
-    box, area = regions.boxes(), regions.areas()
+    box, area = regions.extents()
     typical = measure.typical(box)
-    large = np.any(box[:, 2:] > _LARGE * typical, axis=1)
+    large = _larger(box, typical)
     hollow = np.isnan(typical[:, 0]) & (area < _OPEN * box[:, 2] * box[:, 3])
-    for i in np.flatnonzero(large & (area >= _LEAST_PX) | hollow & (area >= _LEAST_HOLLOW_PX)).tolist():
+    for i in (large & (area >= _LEAST_PX) | hollow & (area >= _LEAST_HOLLOW_PX)).nonzero()[0].tolist():
         border = measure.border(box[i])
         depth = half_width(patch(regions, i, box[i]), border)
         if large[i]:
@@ -122,6 +122,12 @@ def cut_at_necks(regions: Regions, measure: _Measure, predicted: Floats) -> Regi
                 continue
         regions = regions.parted(i, cut)
     return regions
+
+
+def _larger(box: Ints, typical: Floats) -> Mask:
+    """(N,) boxes (N, 4) that may be of several vehicles of typical (N, 2) widths and heights; none if unknown."""
+    larger = box[:, 2:] > _LARGE * typical
+    return larger[:, 0] | larger[:, 1]
 
 
 def _cut(depth: NDArray[np.float32], neck: float, least: Floats, box: Ints) -> tuple[Regions | None, bool]:
@@ -169,7 +175,7 @@ def divided(regions: Regions, predicted: Floats, measure: _Measure) -> Regions:
     Vehicles nose to tail have no neck between them. Each pixel is assigned to the nearest box.
     """
     box = regions.boxes()
-    for i in np.flatnonzero((box[:, 2:] > _LARGE * measure.typical(box)).any(axis=1)).tolist():
+    for i in _larger(box, measure.typical(box)).nonzero()[0].tolist():
         label, count = nearest_box(patch(regions, i, box[i]), box[i], predicted)
         if count > 1:
             regions = regions.parted(i, of_labels(label, count, box[i]))

@@ -26,13 +26,17 @@ class Regions(NamedTuple):
     label: Ints
     total: int
 
+    def extents(self) -> tuple[Ints, Ints]:
+        """(total, 4) boxes left, top, width, height in pixels of the mask, and (total,) areas."""
+        return _extents(self.row, self.start, self.stop, self.label, self.total)
+
     def boxes(self) -> Ints:
-        """(total, 4) left, top, width, height in pixels of the mask."""
-        return _boxes(self.row, self.start, self.stop, self.label, self.total)
+        """(total, 4) those of `extents`."""
+        return self.extents()[0]
 
     def areas(self) -> Ints:
         """(total,) pixels."""
-        return np.bincount(self.label, self.stop - self.start, self.total).astype(np.int64)
+        return self.extents()[1]
 
     def joined(self, group: Ints, total: int) -> Regions:
         """The runs in `total` larger regions; group (self.total,) has the new number of each region."""
@@ -91,9 +95,10 @@ def _large(mask: Image, least: float) -> tuple[Runs, Runs, Runs, Ints, int]:
 
 
 @kernel
-def _boxes(row: Runs, start: Runs, stop: Runs, label: Ints, count: int) -> Ints:
-    box = np.zeros((count, 4), np.int64)  # first left, top, right, bottom
+def _extents(row: Runs, start: Runs, stop: Runs, label: Ints, count: int) -> tuple[Ints, Ints]:
+    box, area = np.zeros((count, 4), np.int64), np.zeros(count, np.int64)  # first left, top, right, bottom
     for k in range(len(row)):
+        area[label[k]] += stop[k] - start[k]
         i, empty = label[k], box[label[k], 2] == 0
         box[i, 0] = start[k] if empty else min(box[i, 0], start[k])
         box[i, 1] = row[k] if empty else min(box[i, 1], row[k])
@@ -101,7 +106,7 @@ def _boxes(row: Runs, start: Runs, stop: Runs, label: Ints, count: int) -> Ints:
     for i in range(count):
         for axis in range(2):
             box[i, 2 + axis] -= box[i, axis]
-    return box
+    return box, area
 
 
 @kernel
