@@ -5,9 +5,11 @@ Which ones it needs its first scans show, tracked with each kernel as the Python
 
 from __future__ import annotations
 
+import json
 import subprocess
 from atexit import register
 from collections.abc import Callable
+from contextlib import suppress
 from os import cpu_count
 from typing import Any
 
@@ -20,12 +22,24 @@ from vidtrack.compiled import first_run
 
 
 def rehearse_beside(play: Callable[..., object], *told: str) -> None:
-    """`rehearse` in a process of its own, which ends with ours, for the first run on a machine with a second core."""
+    """`rehearse` in a process of its own, which ends with ours, for the first run on a machine with a second core.
+
+    What it is told goes through a pipe: others may read the words of a command, and settings may hold passwords.
+    """
     if first_run() and (cpu_count() or 1) > 1:
         name = play.__name__
-        said = f"from {play.__module__} import {name}; from {__name__} import rehearse; rehearse({name}, *{told!r})"
-        helper = subprocess.Popen(python(said), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        said = f"import json; from {play.__module__} import {name}; from {__name__} import rehearse; "
+        helper = subprocess.Popen(
+            python(f"{said}rehearse({name}, *json.load(sys.stdin))"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
         register(helper.kill)
+        assert helper.stdin is not None
+        with suppress(BrokenPipeError), helper.stdin:
+            json.dump(told, helper.stdin)
 
 
 def rehearse(play: Callable[..., object], *told: str) -> None:
