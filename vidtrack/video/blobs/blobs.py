@@ -20,7 +20,7 @@ from vidtrack.video.runs import Runs
 _RIM = 1.5
 """Processed pixels by which blobs reach beyond vehicles on each side, since the picture is smoothed before it is
 compared: the median at drawn sites (tools/score_speeds.py)."""
-_TWO = np.uint64(2)
+_TWO = np.uint64(2)  # without a sign, as the columns: there is no question whether to count from the end
 
 
 @dataclass(slots=True)
