@@ -253,13 +253,25 @@ def test_modes_can_be_forgotten_but_not_the_kind_of_target():
     bank = IMMBank([QUIET, BRISK, QUIET, BRISK], rates=rates, prior=[0.8, 0.1, 0.05, 0.05], kinds=[0, 0, 1, 1])
     bank.append(np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)), np.ones(2))
     bank.predict(1.0)
-    kind = bank.mode[:, :2].sum(axis=1)
     bank.update(one_to_one(2), Scan(0.0, np.full((2, 2), 9.0), np.eye(2)), POSITION)
     told = bank.mode[1].copy()
     bank.forget(np.array([0]))
+    kind = told[:2].sum()  # as the measurement tells it, of both rows alike
     evenly, usual = np.full(4, 0.5), np.array([0.8, 0.2, 0.5, 0.5])  # within each kind, by 20, 5, 10 and 10 s
-    unseen = np.repeat([kind[0], 1 - kind[0]], 2) * (USUAL * usual + (1 - USUAL) * evenly)
+    unseen = np.repeat([kind, 1 - kind], 2) * (USUAL * usual + (1 - USUAL) * evenly)
     np.testing.assert_allclose(bank.mode, [unseen, told])
+
+
+def test_straight_flight_tells_the_kind_of_a_target_whose_modes_are_forgotten():
+    rates = np.array([[0, 0.001, 0, 0], [0.05, 0, 0, 0], [0, 0, 0, 0.05], [0, 0, 0.05, 0]])
+    bank = IMMBank([QUIET, BRISK, QUIET, BRISK], rates=rates, prior=np.full(4, 0.25), kinds=[0, 0, 1, 1])
+    bank.append(np.zeros((1, 2)), np.eye(2)[None], np.ones(1))
+    for _ in range(30):
+        bank.predict(1.0)
+        bank.update(one_to_one(1), Scan(0.0, bank.x[:, ::2], np.eye(2)), POSITION)
+        bank.forget(np.array([0]))
+    assert bank.mode[0, 2:].sum() < 0.05
+    assert bank.mode[0, 1] > 0.1 * bank.mode[0, 0]
 
 
 def test_a_manoeuvre_is_heeded_in_gates_and_weights_and_not_in_what_is_stated():

@@ -93,7 +93,6 @@ class IMMBank:
         self.model = models[0]
         self.banks = tuple(KalmanBank(model) for model in models)
         self.mode = np.empty((0, r))
-        self._expected = self.mode
         self.hits = np.empty(0, np.int64)
         self.scale = np.empty(0)
         self._known: _Mixed | None = None
@@ -151,19 +150,18 @@ class IMMBank:
             own = replace(decision, beta=share[j] / mode[j, row], beta0=missed[j] / mode[j])
             bank.update(own, scan, sensor)
         self.mode = (mode / mode.sum(axis=0)).T
-        self._expected = before.T
         self.hits = self.hits[parent] + decision.hit
         self.scale = self.scale[parent]
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def forget(self, rows: Ints) -> None:
-        """Nothing shows in which of the modes that it may switch to a target of these rows is; its kind stays known.
+        """Nothing shows in which of the modes that it may switch to a target of these rows is, but its kind does show.
 
         Their probabilities are between the usual ones, in proportion to the sojourn times, and equal ones. With equal
         ones two targets that have flown together seem to part all the time; with the usual ones which is which
         afterwards seems to be known.
         """
-        self.mode[rows] = self._expected[rows] @ self._unseen
+        self.mode[rows] = self.mode[rows] @ self._unseen
         self.x, self.P = self._moments(self.banks, self.mode)
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
