@@ -6,7 +6,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import FormatError
-from vidtrack.formats import Table, interpolated, scans_between
+from vidtrack.formats import Table, interpolated, more_scans, scans_between, usual_step
 
 STEPS = 2.0
 """Usual steps of a target of the truth; in a longer gap between two of its rows its place is not known."""
@@ -37,24 +37,15 @@ def by_time(result: Table, truth: Table) -> tuple[Table, Ints] | None:
             "numbers other scans or frames, and their clocks are not the same; give the truth at the scans of the "
             "result, or in its time"
         )
-    scan, time_s = _widened(scan, time_s, begin_s, end_s)
+    step_s = usual_step(time_s)
+    before, after = (max(0, int(off_s / step_s)) for off_s in (time_s[0] - begin_s, end_s - time_s[-1]))
+    scan, time_s = more_scans(scan, time_s, before, after)
     inside = (begin_s <= time_s) & (time_s <= end_s)
     scan, time_s = scan[inside], time_s[inside]
     found = interpolated(truth, scan, time_s, STEPS * _usual_steps(truth.id, truth.time_s))
     if not len(found):
         raise FormatError("no target of the truth has two rows in its usual step around a scan of the result")
     return found, scan
-
-
-def _widened(scan: Ints, time_s: Floats, begin_s: float, end_s: float) -> tuple[Ints, Floats]:
-    """These scans (K,), and more of them in the usual step back to begin_s and on to end_s."""
-    steps_s = np.diff(time_s)
-    step_s = float(np.median(steps_s[steps_s > 0]))
-    before = max(0, int((time_s[0] - begin_s) / step_s))
-    after = max(0, int((end_s - time_s[-1]) / step_s))
-    earlier, later = np.arange(-before, 0), np.arange(1, after + 1)
-    number = np.concatenate([scan[0] + earlier, scan, scan[-1] + later])
-    return number, np.concatenate([time_s[0] + earlier * step_s, time_s, time_s[-1] + later * step_s])
 
 
 def _of_other_times(ours: Floats, theirs: Floats) -> bool:

@@ -4,6 +4,8 @@ import json
 import shutil
 
 import numpy as np
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 from asterix_records import layout, sweeps, track
 
@@ -71,6 +73,15 @@ def test_a_table_of_plots_has_the_place_that_its_settings_say(scene):
     np.testing.assert_array_equal(
         read_truth(scene / "adsb.ast", scene / "table").xy, read_truth(scene / "adsb.ast", scene / "run").xy
     )
+
+
+def test_scans_before_the_first_row_and_after_the_last_one_count(scene):
+    shutil.copytree(scene / "run", scene / "short")
+    rows = pq.read_table(scene / "run" / "tracks.parquet")
+    pq.write_table(rows.filter((pc.field("scan") > 2) & (pc.field("scan") < 9)), scene / "short" / "tracks.parquet")
+    short, whole = (read_truth(scene / "adsb.ast", scene / name) for name in ("short", "run"))
+    np.testing.assert_array_equal(short.frame, whole.frame)
+    np.testing.assert_allclose(short.xy, whole.xy, atol=1.0)
 
 
 def test_another_time_is_refused(scene, tmp_path):

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import FormatError
-from vidtrack.formats import Table, interpolated, scans_between
+from vidtrack.formats import Table, interpolated, more_scans, scans_between
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses
 from vidtrack.radar.feeds.recording import read_messages
@@ -23,8 +23,8 @@ LONGEST_GAP_S = 30.0
 def read_truth(path: Path, run: Path) -> Table:
     """The places of all targets with numbers at the times of a run's scans, by linear interpolation, in metres.
 
-    run  folder of `vidtrack radar --radar-position`, with the same clock; its scans are those from its first to its
-         last row
+    run  folder of `vidtrack radar --radar-position`, with the same clock; its scans are all that were tracked, those
+         before its first row and after its last one in the usual step
 
     Raises FormatError for a folder that is no run or does not know its position, and if no target was there.
     """
@@ -45,7 +45,8 @@ def read_truth(path: Path, run: Path) -> Table:
 def _scans(run: Path) -> tuple[Ints, Floats, Plane]:
     """Numbers and times of a run's scans, and its plane."""
     try:
-        plane = plane_of_run(json.loads((run / "summary.json").read_text()))
+        summary = json.loads((run / "summary.json").read_text())
+        plane = plane_of_run(summary)
         table = pq.read_table(run / "tracks.parquet", columns=["scan", "time_s"])
     except (OSError, ValueError) as error:
         raise FormatError(f"{run} is not a run of vidtrack radar: {error}") from None
@@ -53,4 +54,7 @@ def _scans(run: Path) -> tuple[Ints, Floats, Plane]:
         raise FormatError(f"{run} does not know where its radar is; track again with --radar-position LAT,LON")
     if not len(table):
         raise FormatError(f"{run} has no tracks")
-    return *scans_between(table["scan"].to_numpy(), table["time_s"].to_numpy()), plane
+    scan, time_s = scans_between(table["scan"].to_numpy(), table["time_s"].to_numpy())
+    count = int(summary["scans"])
+    first = max(0, int(scan[-1]) - count + 1)  # 0 in recordings, some table's own number
+    return *more_scans(scan, time_s, int(scan[0]) - first, first + count - 1 - int(scan[-1])), plane
