@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from enum import StrEnum
 from typing import Any, get_args
 
-from vidtrack.config.names import Method
+from vidtrack.config.names import LaterMethod, Method
 
 
 class Input(StrEnum):
@@ -81,7 +81,7 @@ class _Such:
 
 GIVEN = _Such(lambda value: value is not None, "NUMBER")
 _ABOVE_ZERO = _Such(lambda value: value > 0, "a number above zero")
-_LATER = ("split", "mht")
+_LATER = get_args(LaterMethod)
 _AT_ONCE = tuple(method for method in get_args(Method) if method not in _LATER)
 
 _NEEDS: Mapping[str, tuple[str, tuple[Any, ...]]] = {

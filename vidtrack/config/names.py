@@ -6,7 +6,8 @@ from typing import Literal
 
 Decoder = Literal["auto", "software", "vaapi", "nvdec", "videotoolbox"]
 Detector = Literal["disturbance", "paper", "mog2", "knn"]
-Method = Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "jpda-star", "split", "mht"]
+LaterMethod = Literal["split", "mht"]
+Method = Literal["nn", "gnn", "generalized-nn", "sn", "psn", "pda", "jpda", "jpda-star", LaterMethod]
 Distance = Literal["mahalanobis", "decoupled", "euclidean"]
 Life = Literal["m-of-n", "llr"]
 Estimator = Literal["kalman", "converted", "ekf", "ukf", "imm", "alpha-beta", "particle"]
