@@ -32,7 +32,7 @@ from vidtrack.tracking.unresolved.correlations import Correlations
 from vidtrack.tracking.unresolved.joint import equivalent, exchange_probability
 
 Key = tuple[bool, int, int]
-"""What an explanation says but for the names of the targets: whether one plot is of both, and which plots there are."""
+"""What an explanation of a scan says: whether one plot is of both targets, and the plot of each."""
 
 KEPT = 4
 """Branches of a pair beside the tracker's own states."""
@@ -45,7 +45,7 @@ MARGIN = 1.0
 TOGETHER = float(np.log((1 - SURE) / SURE))
 """ln of the odds against two targets with one measurement at which they still share it, as in `claims`."""
 ALIKE = 3
-"""Scans with the same measurements after which two branches are one: they differ by the names of the targets only."""
+"""Scans with the same measurements after which two branches are one, also if the targets' names are exchanged in all."""
 PAIR = np.array([0, 1])
 
 
@@ -61,8 +61,13 @@ class Way(NamedTuple):
 
     @property
     def key(self) -> Key:
+        """What it says."""
+        return self.shared, *self.plots
+
+    @property
+    def nameless(self) -> tuple[Key, ...]:
         """The same if only the names of the targets differ."""
-        return self.shared, min(self.plots), max(self.plots)
+        return _nameless((self.key,))
 
 
 @dataclass(slots=True)
@@ -118,7 +123,7 @@ class Branch:
                 found.append(Way(False, (a, b), float(np.log1p(-p) + log_l)))
         found.sort(key=lambda way: way.log_p)
         if self.correlations.has(PAIR):  # which is which is not in the data
-            found = list({way.key: way for way in found}.values())
+            found = list({way.nameless: way for way in found}.values())
         return sorted(found, key=lambda way: -way.log_p)
 
     def after(self, way: Way, problem: Problem, cell: PolarCell, reference: float) -> Branch:
@@ -250,12 +255,13 @@ class Doubts:
         doubt.past = (chosen.key, *doubt.past)[:ALIKE]
         offers = [(branch, way) for branch, each in zip(doubt.branches, doubt.ways, strict=True) for way in each[:WAYS]]
         certain = own.correlations.has(PAIR)
-        offers += [(own, way) for way in ways[:WAYS] if way != chosen and not (certain and way.key == chosen.key)]
+        others = [way for way in ways[:WAYS] if way.key != chosen.key]
+        offers += [(own, way) for way in others if not (certain and way.nameless == chosen.nameless)]
         offers.sort(key=lambda offer: -(offer[0].log_odds + offer[1].log_p))
-        seen = {doubt.past} if len(doubt.past) == ALIKE else set()
+        seen = {_nameless(doubt.past)} if len(doubt.past) == ALIKE else set()
         branches: list[Branch] = []
         for branch, way in offers:
-            past = (way.key, *branch.past)[:ALIKE]
+            past = _nameless((way.key, *branch.past)[:ALIKE])
             if branch.log_odds + way.log_p - chosen.log_p < -SLACK or len(branches) == KEPT:
                 break
             if past not in seen:
@@ -294,6 +300,11 @@ class Doubts:
         self.of_pair = {
             other: each for other, each in self.of_pair.items() if other == pair or not set(other) & set(pair)
         }
+
+
+def _nameless(past: tuple[Key, ...]) -> tuple[Key, ...]:
+    """The same for explanations of some scans that differ by the names of the targets only, in all scans alike."""
+    return min(past, tuple((shared, other, one) for shared, one, other in past))
 
 
 def _owners(problem: Problem, rows: Ints) -> Ints:
