@@ -85,9 +85,13 @@ def test_the_middle_is_followed_and_the_difference_less_and_less_known():
     assert wide[-1] < 150**2
 
 
-@pytest.mark.parametrize("seed", [709, 717, 738], ids=["parted too early", "missed as they part", "parted late"])
-def test_what_later_scans_explain_otherwise_costs_no_track(tmp_path, seed):
-    seen = simulate_radar("radar-parting", seed)
+@pytest.mark.parametrize(
+    ("scenario", "seed"),
+    [("radar-parting", 709), ("radar-parting", 717), ("radar-parting", 738), ("radar-unresolved", 404)],
+    ids=["parted too early", "missed as they part", "parted late", "order in doubt in one scan"],
+)
+def test_what_later_scans_explain_otherwise_costs_no_track(tmp_path, scenario, seed):
+    seen = simulate_radar(scenario, seed)
     write_radar(seen, tmp_path)
     together = np.flatnonzero(seen.merged[0])
     snapshots = [tracks for _, tracks in track_plots(tmp_path / "plots.csv")]

@@ -45,7 +45,7 @@ MARGIN = 1.0
 TOGETHER = float(np.log((1 - SURE) / SURE))
 """ln of the odds against two targets with one measurement at which they still share it, as in `claims`."""
 ALIKE = 3
-"""Scans with the same measurements after which two branches are one, also if the targets' names are exchanged in all."""
+"""Scans with the same measurements after which two branches are one, also if the names of the targets differ in all."""
 PAIR = np.array([0, 1])
 
 
