@@ -58,7 +58,7 @@ CONDITIONS: dict[str, dict[str, object]] = {
     "clock": {"clock": True},
 }
 
-ON_ROADS = ("rain", "snow", "fog", "low-sun", "dusk", "night", "wet-night", "rainy-night")
+ON_ROADS = ("rain", "snow", "fog", "low-sun", "dusk", "night", "wet-night", "rainy-night", "day")
 SMALL: dict[str, object] = {"size": (640, 360), "seconds": 30.0}  # the roads in these conditions
 
 Cells = dict[str, str]
@@ -218,7 +218,7 @@ def weather_rows(options: argparse.Namespace, rivals: dict[str, Contender]) -> N
     total = {rival: Judged() for rival in rivals}
     seeds = range(options.first_seed, options.first_seed + options.road_seeds)
     for place, label in enumerate(ON_ROADS):
-        knobs = SMALL | CONDITIONS[label]
+        knobs = SMALL | CONDITIONS.get(label, {})
         clips = [
             clip
             for seed in seeds

@@ -47,7 +47,7 @@ class SizeField:
     @property
     def known(self) -> bool:
         """Whether the field is fitted."""
-        return bool(self.spread[0] < _SPREAD[0] and self.spread[1] < _SPREAD[1])
+        return bool(self.spread[0] < np.inf)
 
     def typical(self, box: Floats) -> Floats:
         """(N, 2) width and height typical of vehicles whose bottom centre is that of boxes (N, 4); NaN if unknown."""
@@ -75,14 +75,18 @@ class SizeField:
                 self._refit(1 / np.sqrt(number[of]))
 
     def _refit(self, vote: Floats) -> None:
-        """Quantile regression of relative sizes by iteratively reweighted least squares, votes (N,) of the samples."""
+        """Quantile regression of relative sizes by iteratively reweighted least squares, votes (N,) of the samples.
+
+        The field stays what it is while vehicles differ too much for another one.
+        """
+        fits, floors, spread = np.empty((3, 2)), np.empty(2), np.empty(2)
         for axis in range(2):
             size = self._size[:, axis]
             middle = median(size.copy())
             fit, scale = np.array([middle, 0.0, 0.0]), 0.5
-            self._floor[axis] = _LEAST * size.min()
+            floors[axis] = _LEAST * size.min()
             for _ in range(_ROUNDS):
-                expected = np.maximum(self._place @ fit, self._floor[axis])
+                expected = np.maximum(self._place @ fit, floors[axis])
                 error = np.log(size / expected)
                 above = error > 0
                 excess = error[above]
@@ -92,7 +96,9 @@ class SizeField:
                 flat = _SLOPES * (scale / (_FLAT * 10 * middle)) ** 2
                 weighted = (self._place * weight[:, None]).T
                 fit = np.linalg.solve(weighted @ self._place + flat, weighted @ size)
-            self._fit[:, axis], self.spread[axis] = fit, scale
+            fits[:, axis], spread[axis] = fit, scale
+        if (spread < _SPREAD).all():
+            self._fit, self._floor, self.spread = fits, floors, spread
 
 
 @kernel
