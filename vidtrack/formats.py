@@ -90,14 +90,17 @@ def scans_between(frame: Ints, time_s: Floats) -> tuple[Ints, Floats]:
 
 
 def usual_step(time_s: Floats) -> float:
-    """Median time between scans at these times (K,) in order; 0 if there is one."""
+    """Median time between scans at these times (K,) in order; 0 if all are the same."""
     steps_s = np.diff(time_s)
     return float(np.median(steps_s[steps_s > 0])) if (steps_s > 0).any() else 0.0
 
 
 def more_scans(number: Ints, time_s: Floats, before: int, after: int) -> tuple[Ints, Floats]:
-    """These scans (K,) in order, and so many more before and after them, in their usual step."""
-    step_s, earlier, later = usual_step(time_s), np.arange(-before, 0), np.arange(1, after + 1)
+    """These scans (K,) in order, and so many more before and after them in their usual step; none without a step."""
+    step_s = usual_step(time_s)
+    if not step_s:
+        return number, time_s
+    earlier, later = np.arange(-before, 0), np.arange(1, after + 1)
     return (
         np.concatenate([number[0] + earlier, number, number[-1] + later]),
         np.concatenate([time_s[0] + earlier * step_s, time_s, time_s[-1] + later * step_s]),

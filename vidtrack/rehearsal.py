@@ -5,44 +5,33 @@ Which ones it needs its first scans show, tracked with each kernel as the Python
 
 from __future__ import annotations
 
-import json
-import subprocess
-from atexit import register
 from collections.abc import Callable
-from contextlib import suppress
-from os import cpu_count
 from typing import Any
 
 import numpy as np
 from numba import typeof
 from numba.core.registry import CPUDispatcher
+from pydantic import BaseModel
 
-from vidtrack.beside import python
+from vidtrack.beside import help_beside
 from vidtrack.compiled import first_run
 
 
-def rehearse_beside(play: Callable[..., object], *told: str) -> None:
-    """`rehearse` in a process of its own, which ends with ours, for the first run on a machine with a second core.
+def rehearse_beside(play: Callable[..., object], *told: str | BaseModel) -> None:
+    """`rehearse` in a process of its own, for a first run on a machine with a second core.
 
-    What it is told goes through a pipe: others may read the words of a command, and settings may hold passwords.
+    play  a function of a module, which gets what is told; of a model, as settings are, the values that are not defaults
     """
-    if first_run() and (cpu_count() or 1) > 1:
+    if first_run():
         name = play.__name__
         said = f"import json; from {play.__module__} import {name}; from {__name__} import rehearse; "
-        helper = subprocess.Popen(
-            python(f"{said}rehearse({name}, *json.load(sys.stdin))"),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        register(helper.kill)
-        assert helper.stdin is not None
-        with suppress(BrokenPipeError), helper.stdin:
-            json.dump(told, helper.stdin)
+        values = [
+            each if isinstance(each, str) else each.model_dump(mode="json", exclude_defaults=True) for each in told
+        ]
+        help_beside(f"{said}rehearse({name}, *json.load(sys.stdin))", values)
 
 
-def rehearse(play: Callable[..., object], *told: str) -> None:
+def rehearse(play: Callable[..., object], *told: Any) -> None:
     """Call a function without compiled code, then compile the kernels that it called, the last one first.
 
     By then the run has compiled the first ones; half-way the two meet.

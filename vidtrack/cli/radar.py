@@ -137,7 +137,7 @@ def command(options: RadarOptions) -> None:
     elif len(options.plots) > 1:
         raise click.UsageError(f"{len(options.plots)} tables of plots need --radars, which says where the radars are")
     else:
-        rehearse_beside(first_plots, first, settings.model_dump_json(exclude_defaults=True))
+        rehearse_beside(first_plots, first, settings)
         run = run_plots(first, settings, output, extras, force=force, seed=seed)
     finish(run, options.quiet, unit="scan")
 

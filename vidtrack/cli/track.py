@@ -61,7 +61,7 @@ def command(options: TrackOptions) -> None:
     settings = options.settings(Input.DETECTIONS if stored else Input.VIDEO, base)
     announce_compiling(options.quiet, video=not stored)
     if stored:
-        rehearse_beside(first_boxes, source, settings.model_dump_json(exclude_defaults=True))
+        rehearse_beside(first_boxes, source, settings)
     extras = Extras(options.rerun, options.video, options.save_masks, options.decisions)
     run = run_file(source, settings, options.output, extras, force=options.force)
     finish(run, options.quiet, none="no tracks; vidtrack doctor SOURCE may say why")

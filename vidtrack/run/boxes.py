@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
+from typing import Any
 
 from vidtrack.config.settings import Settings
 from vidtrack.detections.stored import open_detections
@@ -43,8 +44,8 @@ def box_pipeline(path: str, settings: Settings, extras: Extras) -> Iterator[Pipe
     )
 
 
-def first_boxes(path: str, settings: str) -> None:
-    """Track the first frames of a MOT file of detections, by settings in JSON: a rehearsal of its run."""
-    with box_pipeline(path, Settings.model_validate_json(settings), Extras()) as pipeline:
+def first_boxes(path: str, settings: dict[str, Any]) -> None:
+    """Track the first frames of a MOT file, by the settings that are not defaults: a rehearsal of its run."""
+    with box_pipeline(path, Settings.model_validate(settings), Extras()) as pipeline:
         for _ in islice(pipeline.steps, REHEARSED):
             pass

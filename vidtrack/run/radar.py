@@ -62,9 +62,9 @@ def track_plots(path: str | Path, settings: Settings | None = None, seed: int = 
         yield step.index, step.tracks
 
 
-def first_plots(path: str, settings: str) -> None:
-    """Track the first scans of a plot table, by settings in JSON: a rehearsal of its run."""
-    for _ in islice(track_plots(path, Settings.model_validate_json(settings)), REHEARSED):
+def first_plots(path: str, settings: dict[str, Any]) -> None:
+    """Track the first scans of a plot table, by the settings that are not defaults: a rehearsal of its run."""
+    for _ in islice(track_plots(path, Settings.model_validate(settings)), REHEARSED):
         pass
 
 

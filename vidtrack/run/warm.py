@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
-from atexit import register
 from collections.abc import Iterator
 from itertools import islice
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from vidtrack.arrays.types import Ints
-from vidtrack.beside import python
+from vidtrack.beside import help_beside
 from vidtrack.compiled import CACHE
 from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.run.trackers import build_blob_tracker
@@ -55,10 +52,9 @@ def warm() -> None:
 
 
 def warm_beside() -> None:
-    """Start `warm` in a process of its own, for the first run on a machine with a second core; it ends with ours."""
-    if CACHE and (cpu_count() or 1) > 1:
-        helper = subprocess.Popen(python(f"from {__name__} import warm; warm()"), stderr=subprocess.DEVNULL)
-        register(helper.kill)
+    """Start `warm` in a process of its own, for the first run on a machine with a second core."""
+    if CACHE:
+        help_beside(f"from {__name__} import warm; warm()")
 
 
 def _labelled(mask: Image, settings: Settings) -> Blobs:

@@ -75,12 +75,16 @@ def test_a_table_of_plots_has_the_place_that_its_settings_say(scene):
     )
 
 
-def test_scans_before_the_first_row_and_after_the_last_one_count(scene):
-    shutil.copytree(scene / "run", scene / "short")
+@pytest.mark.parametrize("first", [0, 1, 100])
+def test_scans_before_the_first_row_and_after_the_last_one_count(scene, first):
+    name = f"from-{first}"
+    shutil.copytree(scene / "run", scene / name)
     rows = pq.read_table(scene / "run" / "tracks.parquet")
-    pq.write_table(rows.filter((pc.field("scan") > 2) & (pc.field("scan") < 9)), scene / "short" / "tracks.parquet")
-    short, whole = (read_truth(scene / "adsb.ast", scene / name) for name in ("short", "run"))
-    np.testing.assert_array_equal(short.frame, whole.frame)
+    rows = rows.filter((pc.field("scan") > 2) & (pc.field("scan") < 9))
+    rows = rows.set_column(rows.column_names.index("scan"), "scan", pc.add(rows["scan"], first))
+    pq.write_table(rows, scene / name / "tracks.parquet")
+    short, whole = (read_truth(scene / "adsb.ast", scene / run) for run in (name, "run"))
+    np.testing.assert_array_equal(short.frame, whole.frame + first)
     np.testing.assert_allclose(short.xy, whole.xy, atol=1.0)
 
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.errors import FormatError
-from vidtrack.formats import Table, interpolated, more_scans, scans_between
+from vidtrack.formats import Table, interpolated, more_scans, scans_between, usual_step
 from vidtrack.radar.feeds.clock import Clock
 from vidtrack.radar.feeds.messages import NO_TARGET, Kind, Losses
 from vidtrack.radar.feeds.recording import read_messages
@@ -55,6 +55,8 @@ def _scans(run: Path) -> tuple[Ints, Floats, Plane]:
     if not len(table):
         raise FormatError(f"{run} has no tracks")
     scan, time_s = scans_between(table["scan"].to_numpy(), table["time_s"].to_numpy())
-    count = int(summary["scans"])
-    first = max(0, int(scan[-1]) - count + 1)  # 0 in recordings, some table's own number
-    return *more_scans(scan, time_s, int(scan[0]) - first, first + count - 1 - int(scan[-1])), plane
+    step_s, after = usual_step(time_s), 0
+    if step_s:
+        after = max(0, round((float(summary["media_s"]) - time_s[-1]) / step_s))
+    before = max(0, int(summary["scans"]) - len(scan) - after)
+    return *more_scans(scan, time_s, before, after), plane

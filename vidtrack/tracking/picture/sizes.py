@@ -47,7 +47,7 @@ class SizeField:
     @property
     def known(self) -> bool:
         """Whether the field is fitted."""
-        return bool(self.spread[0] < np.inf)
+        return bool((self.spread < _SPREAD).all())
 
     def typical(self, box: Floats) -> Floats:
         """(N, 2) width and height typical of vehicles whose bottom centre is that of boxes (N, 4); NaN if unknown."""
