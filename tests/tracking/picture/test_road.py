@@ -87,7 +87,7 @@ def test_a_field_stays_while_vehicles_differ_too_much_for_another_one():
     drive(road.learn, perspective, vehicles=6)
     before = road.sizes.typical(box)
     rng = np.random.default_rng(1)
-    drive(road.learn, lambda y: 2 * np.array(perspective(y)) * np.exp(rng.normal(0, 1.0, 2)), vehicles=20, first=6)
+    drive(road.learn, lambda y: np.array(perspective(y)) * np.exp(rng.normal(0, 1.0, 2)), vehicles=20, first=6)
     np.testing.assert_allclose(road.sizes.typical(box), before, rtol=0.15)
     drive(road.learn, lambda y: 1.5 * np.array(perspective(y)), vehicles=20, first=26)
     np.testing.assert_allclose(road.sizes.typical(box), 1.5 * np.array([perspective(140)]), rtol=0.1)
