@@ -95,11 +95,8 @@ def usual_step(time_s: Floats) -> float:
     return float(np.median(steps_s[steps_s > 0])) if (steps_s > 0).any() else 0.0
 
 
-def more_scans(number: Ints, time_s: Floats, before: int, after: int) -> tuple[Ints, Floats]:
-    """These scans (K,) in order, and so many more before and after them in their usual step; none without a step."""
-    step_s = usual_step(time_s)
-    if not step_s:
-        return number, time_s
+def more_scans(number: Ints, time_s: Floats, step_s: float, before: int, after: int) -> tuple[Ints, Floats]:
+    """These scans (K,) in order, and so many more before and after them, every step_s."""
     earlier, later = np.arange(-before, 0), np.arange(1, after + 1)
     return (
         np.concatenate([number[0] + earlier, number, number[-1] + later]),

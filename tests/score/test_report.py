@@ -170,6 +170,12 @@ def test_scans_of_two_sensors_may_have_the_same_time():
     assert (scores["frames"], scores["misses"], scores["false_positives"]) == (288, 96, 0)
 
 
+def test_a_result_of_one_time_is_scored_at_that_time():
+    truth = drives(np.arange(4.0))
+    once = replace(truth, time_s=np.ones(len(truth)))
+    assert evaluate(once, truth)["frames"] == 4
+
+
 def test_targets_keep_their_own_steps_and_none_without_two_rows_counts():
     """A target that is known every 5 s beside one ten times a second; and truth of one row a target."""
     seldom, result = drives(0.1 * np.arange(200)), drives(0.05 + 1.3 * np.arange(15))

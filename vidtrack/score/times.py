@@ -37,9 +37,10 @@ def by_time(result: Table, truth: Table) -> tuple[Table, Ints] | None:
             "numbers other scans or frames, and their clocks are not the same; give the truth at the scans of the "
             "result, or in its time"
         )
-    step_s = usual_step(time_s) or np.inf
-    before, after = (max(0, int(off_s / step_s)) for off_s in (time_s[0] - begin_s, end_s - time_s[-1]))
-    scan, time_s = more_scans(scan, time_s, before, after)
+    step_s = usual_step(time_s)
+    if step_s:
+        before, after = (max(0, int(off_s / step_s)) for off_s in (time_s[0] - begin_s, end_s - time_s[-1]))
+        scan, time_s = more_scans(scan, time_s, step_s, before, after)
     inside = (begin_s <= time_s) & (time_s <= end_s)
     scan, time_s = scan[inside], time_s[inside]
     found = interpolated(truth, scan, time_s, STEPS * _usual_steps(truth.id, truth.time_s))

@@ -24,7 +24,7 @@ def read_truth(path: Path, run: Path) -> Table:
     """The places of all targets with numbers at the times of a run's scans, by linear interpolation, in metres.
 
     run  folder of `vidtrack radar --radar-position`, with the same clock; its scans are all that were tracked, those
-         before its first row and after its last one in the usual step
+         before its first row and after its last one in the usual step, if its rows are of two scans or more
 
     Raises FormatError for a folder that is no run or does not know its position, and if no target was there.
     """
@@ -55,8 +55,9 @@ def _scans(run: Path) -> tuple[Ints, Floats, Plane]:
     if not len(table):
         raise FormatError(f"{run} has no tracks")
     scan, time_s = scans_between(table["scan"].to_numpy(), table["time_s"].to_numpy())
-    step_s, after = usual_step(time_s), 0
-    if step_s:
-        after = max(0, round((float(summary["media_s"]) - time_s[-1]) / step_s))
+    step_s = usual_step(time_s)
+    if not step_s:
+        return scan, time_s, plane
+    after = max(0, round((float(summary["media_s"]) - time_s[-1]) / step_s))
     before = max(0, int(summary["scans"]) - len(scan) - after)
-    return *more_scans(scan, time_s, before, after), plane
+    return *more_scans(scan, time_s, step_s, before, after), plane
