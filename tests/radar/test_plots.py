@@ -714,6 +714,22 @@ def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
             read_plots(path)
 
 
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("", "is empty"),
+        ("\n\n", "is empty"),
+        ("scan;time_s;x_m\n0;0,5;1\n", "semicolons"),
+        ("scan\tx_m\n0\t1\n", "tabs"),
+    ],
+)
+def test_an_empty_file_and_other_separators_are_named(tmp_path, content, named):
+    path = tmp_path / "plots.csv"
+    path.write_text(content)
+    with pytest.raises(PlotFormatError, match=named):
+        read_plots(path)
+
+
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-be"])
 @pytest.mark.parametrize("text", ["\n".join([HEADER, *GOOD]), "$RATTM,01,2.00,90.0,T,0,0,T,0,0,N,,T,,120000,A\n" * 40])
 def test_text_in_another_encoding_is_named(tmp_path, encoding, text):

@@ -23,6 +23,8 @@ WIDE = ("utf-32-le", "utf-32-be", "utf-16-le", "utf-16-be")
 """Encodings of text that are named, since they are not read."""
 PLAIN = 0.9
 """Share of characters of a table or of NMEA that are ASCII."""
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+"""What programs write between the cells of a line in place of commas."""
 LOOKED_AT = 4096
 """Octets from which an encoding is told."""
 
@@ -131,6 +133,10 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
             beginning = file.read(LOOKED_AT)
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
+    if not beginning.strip():
+        raise PlotFormatError(
+            f"{path} is empty; give a table of plots (CSV, Parquet) or a recording of ASTERIX or NMEA"
+        )
     wide = _wide(beginning)
     if wide is not None:
         raise PlotFormatError(f"{path} is text in {wide.upper()[:6]}; save it in UTF-8")
@@ -146,6 +152,9 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
             f"{path} is neither a table of plots (CSV, Parquet) nor a recording of ASTERIX or NMEA: {reason}; give one"
         ) from None
     table = table.rename_columns([name.strip() for name in table.column_names])
+    for mark, called in SEPARATORS.items():
+        if table.num_columns == 1 and mark in table.column_names[0]:
+            raise PlotFormatError(f"{path}: the cells of a line are separated by {called}; save it with commas")
     _refuse_repeated_names(path, table.column_names)
     if not len(table):
         raise PlotFormatError(

@@ -4,9 +4,12 @@ import struct
 
 import numpy as np
 import pytest
+from asterix_records import block, plot
 
+from vidtrack.errors import PlotFormatError
 from vidtrack.radar.feeds import packets
 from vidtrack.radar.feeds.messages import Losses
+from vidtrack.radar.feeds.recording import read_messages
 
 PAYLOADS = [b"first payload", b"2", b"the third one"]
 ETHERNET = bytes(12) + b"\x08\x00"
@@ -161,3 +164,25 @@ def test_with_damage_everywhere_each_octet_is_searched_once(monkeypatch, kind):
     assert not list(packets.payloads(content, losses))
     assert (searched == 1).all()
     assert losses.damaged > 20_000
+
+
+def test_a_capture_that_begins_with_other_traffic_is_read(tmp_path):
+    blocks = [block(plot(float(k), 30000, 10 * k)) for k in range(4)]
+    other = [b"\x12\x34" + b"query" * 6] * 60
+    (tmp_path / "capture").write_bytes(pcap([ETHERNET + ipv4(payload) for payload in [*other, *blocks]]))
+    assert read_messages(tmp_path / "capture", Losses()).time_s.tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        (pcap([]), "no packet"),
+        (pcap([bytes(80)], link=105), "link type 105; those that are read are 0, 1,"),
+        (pcap([ETHERNET + ipv4(b"over TCP", protocol=6)]), "no whole UDP datagram"),
+        (pcapng([ETHERNET + ipv4(payload) for payload in PAYLOADS]), "none of the 3 UDP datagrams"),
+    ],
+)
+def test_a_capture_without_plots_is_told_by_what_it_has(tmp_path, content, named):
+    (tmp_path / "capture").write_bytes(content)
+    with pytest.raises(PlotFormatError, match=named):
+        read_messages(tmp_path / "capture", Losses())

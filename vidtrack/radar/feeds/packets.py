@@ -38,20 +38,40 @@ def payloads(content: bytes, losses: Losses) -> Iterator[bytes]:
     What a capture holds beside UDP is passed over, and so are fragments of datagrams. A packet that the end cuts off is
     left out. After a damaged header it goes on with the next sound one; `losses` counts each such place, and the cut.
     """
-    if content[:4] in _PCAP:
-        frames = _pcap(content, _PCAP[content[:4]], losses)
-    elif content[:4] == _PCAPNG:
-        frames = _pcapng(content, losses)
+    if is_capture(content):
+        for link, frame in _frames(content, losses):
+            payload = _datagram(link, frame)
+            if payload:
+                yield payload
     elif _is_final(content):
         yield from _final(content, losses)
-        return
     else:
         yield content
-        return
-    for link, frame in frames:
-        payload = _datagram(link, frame)
-        if payload:
-            yield payload
+
+
+def is_capture(content: bytes) -> bool:
+    """Whether it begins as pcap and pcapng do."""
+    return content[:4] in _PCAP or content[:4] == _PCAPNG
+
+
+def lack(content: bytes) -> str:
+    """What a capture without any known message has instead."""
+    count, links = 0, set()
+    for link, frame in _frames(content, Losses()):
+        count += bool(_datagram(link, frame))
+        links.add(link)
+    if count:
+        return f"none of the {count} UDP datagrams in this capture is ASTERIX or NMEA"
+    if links and links.isdisjoint(_LINK_HEADS):
+        own, read = (", ".join(map(str, sorted(each))) for each in (links, _LINK_HEADS))
+        return f"the packets of this capture have link type {own}; those that are read are {read} (1: Ethernet)"
+    return f"this capture has no {'whole UDP datagram' if links else 'packet'}"
+
+
+def _frames(content: bytes, losses: Losses) -> Iterator[tuple[int, bytes]]:
+    """Link type and frame of each packet of a capture."""
+    order = _PCAP.get(content[:4])
+    return _pcapng(content, losses) if order is None else _pcap(content, order, losses)
 
 
 def _pcap(content: bytes, order: str, losses: Losses) -> Iterator[tuple[int, bytes]]:

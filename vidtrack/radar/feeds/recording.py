@@ -16,7 +16,7 @@ from vidtrack.errors import ConfigError, PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
 from vidtrack.radar.feeds.messages import Kind, Losses, Messages
 from vidtrack.radar.feeds.pace import Pace, is_unknown, paced
-from vidtrack.radar.feeds.packets import payloads
+from vidtrack.radar.feeds.packets import is_capture, lack, payloads
 from vidtrack.radar.feeds.plots import (
     Choice,
     Code,
@@ -38,19 +38,19 @@ _LOOKED_AT_AGAIN = 1 << 16
 """Octets of a payload from which a decoder learns the time of day, and in which the first block is looked for."""
 _PARQUET = b"PAR1"
 _PAYLOADS = 50
-"""Payloads of a capture from which the format is told: other things may be in it."""
+"""Payloads of a capture with a known format, from which it is told: other things may be in it."""
 
 Decoder = asterix.Decoder | nmea.Decoder
 
 
 def is_feed(path: str | Path) -> bool:
-    """Whether the file is a recording of ASTERIX, NMEA or AIS, by its content. False if it cannot be opened."""
+    """Whether the file is a capture or another recording, by its content. False if it cannot be opened."""
     try:
         with Path(path).open("rb") as file:
             beginning = file.read(_LOOKED_AT)
     except OSError:
         return False
-    return _kind(beginning) is not None or _before_blocks(beginning) > 0
+    return is_capture(beginning) or _kind(beginning) is not None or _before_blocks(beginning) > 0
 
 
 def decoder_of(payload: bytes) -> type[Decoder] | None:
@@ -61,9 +61,8 @@ def decoder_of(payload: bytes) -> type[Decoder] | None:
 
 
 def _kind(content: bytes) -> type[Decoder] | None:
-    """The decoder for most of the first payloads."""
-    found = Counter(decoder_of(payload) for payload in islice(payloads(content, Losses()), _PAYLOADS))
-    found.pop(None, None)
+    """The decoder for most of the first payloads that have one."""
+    found = Counter(islice(filter(None, map(decoder_of, payloads(content, Losses()))), _PAYLOADS))
     return found.most_common(1)[0][0] if found else None
 
 
@@ -87,7 +86,10 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
         content = Path(path).read_bytes()
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}") from None
-    kind = _kind(content[:_LOOKED_AT])
+    captured = is_capture(content)
+    kind = _kind(content if captured else content[:_LOOKED_AT])
+    if kind is None and captured:
+        raise PlotFormatError(f"{path}: {lack(content)}")
     if kind is None and (trash := _before_blocks(content[:_LOOKED_AT])):
         _log.warning("%s: the first block of ASTERIX is at octet %d; what is before it is left out", path, trash)
         losses.damaged += 1
@@ -116,7 +118,8 @@ def senders(path: str | Path, known: Collection[Code] = ()) -> list[Code]:
 def _informed(kind: type[Decoder], content: bytes) -> Decoder:
     """A decoder that has read the beginning: some messages need a time of day that others say later."""
     decoder = kind(Losses())
-    for payload in islice(payloads(content, Losses()), _PAYLOADS):
+    own = (payload for payload in payloads(content, Losses()) if decoder_of(payload[:_LOOKED_AT]) is kind)
+    for payload in islice(own, _PAYLOADS):
         deque(decoder.messages(payload[:_LOOKED_AT_AGAIN]), maxlen=0)
     return decoder
 
