@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 
-from vidtrack.associate.redundancy import combined
 from vidtrack.config.radar import RadarSettings
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError
@@ -21,6 +19,7 @@ from vidtrack.radar.network.network import Feed, Network, read_feeds, warn_if_ap
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.run.radar import build_point_tracker, radar_sinks, rates
 from vidtrack.run.run import Extras, Pipeline, Run
+from vidtrack.run.steps import scan_steps
 from vidtrack.tracking.station import Station
 from vidtrack.tracking.tracker import Tracker
 
@@ -121,15 +120,10 @@ def network_steps(network: Network, tracker: Tracker, redundant: float | None = 
 
     redundant  probability with which two measurements of one target are combined first; None: they are not combined
     """
-    for index, turn in enumerate(network):
-        began = perf_counter()
-        scan = network.scan(turn)
-        if redundant is not None:
-            scan, _ = combined(scan, redundant)
-        made = perf_counter()
-        tracks = tracker.step(scan)
-        network.learn(turn, tracks)
-        yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})
+    scans = ((index, network.scan(turn)) for index, turn in enumerate(network))
+    for turn, step in zip(network, scan_steps(scans, tracker, redundant), strict=True):
+        network.learn(turn, step.tracks)
+        yield step
     network.warn_of_biases()
 
 

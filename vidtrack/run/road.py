@@ -7,8 +7,8 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import tee
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from vidtrack.config.settings import Settings, SourceSettings
@@ -24,8 +24,10 @@ from vidtrack.radar.scans import surveyed
 from vidtrack.run.radar import radar_sinks, refuse_smoothing
 from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
+from vidtrack.run.steps import scan_steps
 from vidtrack.run.trackers import build_blob_tracker
 from vidtrack.run.video import build_detector, look_ahead, video_steps
+from vidtrack.scan import Scan
 from vidtrack.tracking.methods import gate, rule
 from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.rates import Rates
@@ -231,19 +233,19 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
         (step.time_s, 1, step) for step in (camera.steps if camera else ())
     )
     number = 0 if network is None else len(network.feeds)
-    for index, (_, _, seen) in enumerate(heapq.merge(plots, pictures, key=lambda one: one[:2])):
-        began = perf_counter()
+
+    def scan_of(seen: Turn | Step) -> Scan:
         if isinstance(seen, Turn):
             assert network is not None
-            scan = network.scan(seen)
-        else:
-            assert camera is not None
-            dark = seen.foreground is not None and seen.foreground.dark
-            scan = camera.scans.scan(seen.scan, seen.tracks, number, dark=dark)
-        made = perf_counter()
-        tracks = tracker.step(scan)
-        if isinstance(seen, Turn) and network is not None:
-            network.learn(seen, tracks)
-        yield Step(index, scan.t, scan, tracks, None, None, {"read": made - began, "track": perf_counter() - made})
+            return network.scan(seen)
+        assert camera is not None
+        dark = seen.foreground is not None and seen.foreground.dark
+        return camera.scans.scan(seen.scan, seen.tracks, number, dark=dark)
+
+    seen, again = tee(one for _, _, one in heapq.merge(plots, pictures, key=lambda one: one[:2]))
+    for one, step in zip(seen, scan_steps(enumerate(map(scan_of, again)), tracker), strict=True):
+        if isinstance(one, Turn) and network is not None:
+            network.learn(one, step.tracks)
+        yield step
     if network is not None:
         network.warn_of_biases()

@@ -62,7 +62,8 @@ def decoder_of(payload: bytes) -> type[Decoder] | None:
 
 def _kind(content: bytes) -> type[Decoder] | None:
     """The decoder for most of the first payloads that have one."""
-    found = Counter(islice(filter(None, map(decoder_of, payloads(content, Losses()))), _PAYLOADS))
+    known = (kind for payload in payloads(content, Losses()) if (kind := decoder_of(payload)))
+    found = Counter(islice(known, _PAYLOADS))
     return found.most_common(1)[0][0] if found else None
 
 
