@@ -715,6 +715,19 @@ def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    "damage",
+    [lambda content: content.replace(b"scan", b"\xe1can"), lambda content: content[:4] + bytes(40) + content[44:]],
+    ids=["name", "page"],
+)
+def test_parquet_that_is_damaged_within_is_refused(tmp_path, damage):
+    path = tmp_path / "p.parquet"
+    pq.write_table(pa.table({"scan": np.arange(50), "x_m": np.arange(50.0)}), path)
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(PlotFormatError, match="is a damaged Parquet file"):
+        read_plots(path)
+
+
+@pytest.mark.parametrize(
     ("content", "named"),
     [
         ("", "is empty"),

@@ -133,10 +133,8 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
             beginning = file.read(LOOKED_AT)
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
-    if not beginning.strip():
-        raise PlotFormatError(
-            f"{path} is empty; give a table of plots (CSV, Parquet) or a recording of ASTERIX or NMEA"
-        )
+    if not beginning.strip() and len(beginning) < LOOKED_AT:
+        raise PlotFormatError(f"{path} is empty; give a table of plots (CSV, Parquet) or a recording (ASTERIX, NMEA)")
     wide = _wide(beginning)
     if wide is not None:
         raise PlotFormatError(f"{path} is text in {wide.upper()[:6]}; save it in UTF-8")
@@ -145,13 +143,15 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
     unit = "row" if parquet else "line"
     try:
         table = pyarrow.parquet.read_table(path) if parquet else _read_csv(path, faults)
-    except (pa.ArrowException, UnicodeDecodeError) as error:
+        table = table.rename_columns([name.strip() for name in table.column_names])
+    except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         binary = isinstance(error, UnicodeDecodeError)
         reason = "its content is not text" if binary else str(error).strip().splitlines()[0]
+        if parquet:
+            raise PlotFormatError(f"{path} is a damaged Parquet file: {reason}") from None
         raise PlotFormatError(
             f"{path} is neither a table of plots (CSV, Parquet) nor a recording of ASTERIX or NMEA: {reason}; give one"
         ) from None
-    table = table.rename_columns([name.strip() for name in table.column_names])
     for mark, called in SEPARATORS.items():
         if table.num_columns == 1 and mark in table.column_names[0]:
             raise PlotFormatError(f"{path}: the cells of a line are separated by {called}; save it with commas")

@@ -229,6 +229,15 @@ def test_system_tracks_are_in_the_plane_of_the_radar(tmp_path):
     np.testing.assert_allclose(plots.z[:, 1], 111.27 * np.arange(4), atol=0.7)
 
 
+def test_a_position_beyond_a_pole_is_damage(tmp_path):
+    blocks = [track(4.0 * k, 52.0, 13.0, number=7) for k in range(4)]
+    at = blocks[0].index(round(52 / 180 * 2**25).to_bytes(4, "big"))
+    blocks[0] = blocks[0][:at] + b"\x40" + blocks[0][at + 1 :]  # 360 degrees
+    plots = seconds(recorded(tmp_path, *blocks))
+    assert len(plots) == 3
+    assert plots.losses["damaged"] == 1
+
+
 def test_damage_is_counted_in_one_line_and_the_rest_is_read(tmp_path, caplog):
     good = [block(plot(4.0 * k, 20000 + k, 1.0)) for k in range(8)]
     torn = bytearray(b"".join(good))

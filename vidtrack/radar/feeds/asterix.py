@@ -281,7 +281,7 @@ def _track_062(body: bytes, place: Place, _now: float) -> Message | None:
     clock_s, target = _clock(body, place, "070"), _whole(body, place["040"], 2) if "040" in place else -1
     height = _signed(_whole(body, place["130"], 2), 16) * 6.25 * FEET if "130" in place else NAN
     if "105" in place:
-        lat, lon = (_signed(_whole(body, place["105"] + k, 4), 32) * 180 / 2**25 for k in (0, 4))
+        lat, lon = _degrees(body, place["105"], 4, 25)
         return Message(Kind.GEODETIC, 0, 62, clock_s, lat, lon, height, target=target)
     if "100" in place:
         x, y = (_signed(_whole(body, place["100"] + k, 3), 24) * 0.5 for k in (0, 3))
@@ -292,9 +292,9 @@ def _track_062(body: bytes, place: Place, _now: float) -> Message | None:
 def _adsb_021(body: bytes, place: Place, _now: float) -> Message | None:
     name = next((name for name in ("073", "071", "077") if name in place), "073")
     if "131" in place:
-        lat, lon = (_signed(_whole(body, place["131"] + k, 4), 32) * 180 / 2**30 for k in (0, 4))
+        lat, lon = _degrees(body, place["131"], 4, 30)
     elif "130" in place:
-        lat, lon = (_signed(_whole(body, place["130"] + k, 3), 24) * 180 / 2**23 for k in (0, 3))
+        lat, lon = _degrees(body, place["130"], 3, 23)
     else:
         return None
     height = _signed(_whole(body, place["140"], 2), 16) * 6.25 * FEET if "140" in place else NAN
@@ -320,6 +320,14 @@ def _clock(body: bytes, place: Place, name: str) -> float:
     if clock_s > 86400:
         raise Damaged
     return clock_s
+
+
+def _degrees(body: bytes, at: int, size: int, power: int) -> tuple[float, float]:
+    """Latitude and longitude, of so many octets each, in units of 180 / 2^power. Raises Damaged beyond a pole."""
+    latitude, longitude = (_signed(_whole(body, at + k, size), 8 * size) * 180 / 2**power for k in (0, size))
+    if abs(latitude) > 90 or abs(longitude) > 180:
+        raise Damaged
+    return latitude, longitude
 
 
 def _whole(body: bytes, at: int, size: int) -> int:
