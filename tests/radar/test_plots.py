@@ -723,7 +723,7 @@ def test_parquet_that_is_damaged_within_is_refused(tmp_path, damage):
     path = tmp_path / "p.parquet"
     pq.write_table(pa.table({"scan": np.arange(50), "x_m": np.arange(50.0)}), path)
     path.write_bytes(damage(path.read_bytes()))
-    with pytest.raises(PlotFormatError, match="is a damaged Parquet file"):
+    with pytest.raises(PlotFormatError, match="is not a readable Parquet file"):
         read_plots(path)
 
 

@@ -148,7 +148,7 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
         binary = isinstance(error, UnicodeDecodeError)
         reason = "its content is not text" if binary else str(error).strip().splitlines()[0]
         if parquet:
-            raise PlotFormatError(f"{path} is a damaged Parquet file: {reason}") from None
+            raise PlotFormatError(f"{path} is not a readable Parquet file: {reason}") from None
         raise PlotFormatError(
             f"{path} is neither a table of plots (CSV, Parquet) nor a recording of ASTERIX or NMEA: {reason}; give one"
         ) from None

@@ -26,6 +26,7 @@ from vidtrack.radar.plane import Plane, plane_of_run
 from vidtrack.run.run import Pipeline, Run
 from vidtrack.scan import Scan
 from vidtrack.tracks import CONFIRMED, Tracks
+from vidtrack.traffic.measures.blocks import damaged
 
 _log = logging.getLogger(__name__)
 
@@ -123,7 +124,7 @@ def read_tracks(folder: Path) -> RunTracks:
     try:
         table = pyarrow.parquet.read_table(path)
     except (pa.ArrowException, OSError) as error:
-        raise FormatError(f"{path} is not a readable Parquet file: {error}") from None
+        raise damaged(path, error) from None
     missing = [name for name in COLUMNS if name not in table.column_names]
     if missing:
         raise FormatError(f"{path} has no column {missing[0]!r}; fuse takes the runs of vidtrack radar, in metres")

@@ -1,6 +1,7 @@
 """A radar run as ASTERIX CAT 062, read back by libasterix."""
 
 import json
+import shutil
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -10,7 +11,10 @@ from click.testing import CliRunner
 
 from vidtrack.cli.export import command
 from vidtrack.config.settings import Settings
+from vidtrack.errors import FormatError
+from vidtrack.output.export.radar_run import open_radar_run
 from vidtrack.radar.plane import Plane
+from vidtrack.run.fuse import read_tracks
 from vidtrack.run.radar import run_plots
 from vidtrack.simulate.radar_scenarios import simulate_radar
 from vidtrack.simulate.radar_write import write_radar
@@ -117,3 +121,14 @@ def test_options_without_sense_are_refused(run, options, said):
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     done = CliRunner().invoke(command, [str(tmp_path), "--as", "asterix"])
     assert "is not a finished run" in str(done.exception)
+
+
+def test_a_table_that_is_damaged_within_is_named_with_what_to_do(run, tmp_path):
+    shutil.copytree(run, tmp_path / "run")
+    table = tmp_path / "run" / "tracks.parquet"
+    content = table.read_bytes()
+    table.write_bytes(content[:4] + bytes(200) + content[204:])
+    with pytest.raises(FormatError, match=r"tracks\.parquet is damaged: .*; vidtrack repair .* makes it from"):
+        list(open_radar_run(tmp_path / "run").tables())
+    with pytest.raises(FormatError, match=r"tracks\.parquet is damaged"):
+        read_tracks(tmp_path / "run")

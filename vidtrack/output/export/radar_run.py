@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.errors import ConfigError, FormatError
 from vidtrack.radar.plane import Plane, plane_of_run
+from vidtrack.traffic.measures.blocks import damaged
 
 _BATCH = 1 << 16
 _NEEDED = ("scan", "time_s", "track_id", "status", "x_m", "y_m", "vx_m_s", "vy_m_s", "sigma_x_m", "sigma_y_m")
@@ -34,10 +35,14 @@ class RadarRun:
     rows: int
 
     def tables(self) -> Iterator[pa.Table]:
-        """All rows in order of scan."""
-        with pq.ParquetFile(self.folder / "tracks.parquet") as file:
-            for batch in file.iter_batches(_BATCH):
-                yield pa.Table.from_batches([batch])
+        """All rows in order of scan. Raises FormatError if the table is damaged."""
+        path = self.folder / "tracks.parquet"
+        try:
+            with pq.ParquetFile(path) as file:
+                for batch in file.iter_batches(_BATCH):
+                    yield pa.Table.from_batches([batch])
+        except (pa.ArrowInvalid, OSError) as error:
+            raise damaged(path, error) from None
 
 
 def open_radar_run(folder: Path, position: tuple[float, float, float] | None = None) -> RadarRun:

@@ -118,7 +118,7 @@ def damaged(path: Path, error: Exception) -> FormatError:
         advice = f"vidtrack repair {folder} may help"
     elif (folder / "tracks.csv").is_file():
         advice = f"vidtrack repair {folder} makes it from tracks.csv"
-    return FormatError(f"{path} is damaged: {str(error).strip()}; {advice}")  # some errors end in a new line
+    return FormatError(f"{path} is damaged: {' '.join(str(error).split())}; {advice}")  # some errors have several lines
 
 
 def numbers(table: pa.Table, name: str) -> Floats:
