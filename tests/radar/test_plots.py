@@ -714,6 +714,21 @@ def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
             read_plots(path)
 
 
+@pytest.mark.parametrize(("later_s", "told"), [(0.2, True), (40.0, False)])
+def test_plots_that_come_over_two_feeds_are_told(tmp_path, caplog, later_s, told):
+    range_m = np.random.default_rng(0).uniform(1e3, 5e4, 40)
+    rows = sorted((4 * k + late, f"{r:.1f},10") for k, r in enumerate(range_m) for late in (0, later_s))
+    path = write(tmp_path / "p.csv", *(f"{t},{plot}" for t, plot in rows), header="time_s,range_m,azimuth_deg")
+    read_plots(path)
+    assert ("40 of 80 plots come once more, 0.2 s later" in caplog.text) == told
+
+
+def test_an_object_that_stands_still_is_no_second_feed(tmp_path, caplog):
+    rows = [f"{k},{4 * k},1000,10" for k in range(9)]
+    read_plots(write(tmp_path / "p.csv", *rows, header="scan,time_s,range_m,azimuth_deg"))
+    assert "once more" not in caplog.text
+
+
 @pytest.mark.parametrize(
     "damage",
     [lambda content: content.replace(b"scan", b"\xe1can"), lambda content: content[:4] + bytes(40) + content[44:]],

@@ -30,6 +30,11 @@ from vidtrack.radar.table import Table, bare, names_sensors, nearest, read_table
 
 _log = logging.getLogger(__name__)
 
+LATEST_S = 30.0
+"""s; longest delay after which a second feed brings a plot again."""
+MOSTLY = 0.5
+"""Share of the plots that come twice, with more of which a table is of two feeds."""
+
 
 @dataclass(frozen=True, slots=True)
 class Plots:
@@ -110,7 +115,9 @@ def read_plots(path: str | Path, settings: RadarSettings | None = None) -> Plots
         raise PlotFormatError(f"{table.problem()}; no good row is left")
     if table.faults:
         _log.warning("%s; left out", table.problem())
-    return _sorted(table, measured, sigma)
+    plots = _sorted(table, measured, sigma)
+    _hint_at_copies(table, plots)
+    return plots
 
 
 def _sorted(table: Table, measured: list[str], sigma: dict[str, Floats]) -> Plots:
@@ -173,6 +180,21 @@ def _hint_at_several(table: Table) -> None:
                     "%s: column %r has %d values, but all plots are taken as of one radar; of several radars give a "
                     "table each, with --radars", table.path, name, count,
                 )  # fmt: skip
+
+
+def _hint_at_copies(table: Table, plots: Plots) -> None:
+    """Warn if most plots come exactly twice within LATEST_S: a second feed would confirm a radar's false plots."""
+    order = np.lexsort((plots.time_s, *plots.z.T))
+    z, time_s = plots.z[order], plots.time_s[order]
+    first = np.flatnonzero(np.append(True, (z[1:] != z[:-1]).any(axis=1)))
+    twice = first[np.diff(np.append(first, len(z))) == 2]
+    later_s = time_s[twice + 1] - time_s[twice]
+    later_s = later_s[later_s <= LATEST_S]
+    if 2 * len(later_s) > MOSTLY * len(z):
+        _log.warning(
+            "%s: %d of %d plots come once more, %.3g s later, as over two feeds of one radar: false plots then seem to "
+            "be confirmed; give each once", table.path, len(later_s), len(z), np.median(later_s),
+        )  # fmt: skip
 
 
 def _sigma(table: Table, name: str, settings: RadarSettings) -> Floats:
