@@ -96,7 +96,7 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
     """(P,) passings beside a gate without which a trip that may be would have no entry, or no exit."""
     drawn, beside = ~passed.beside, passed.beside.copy()
     k = np.flatnonzero(beside)
-    beside[k] = gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0] == passed.gate[k]
+    beside[k] = gates.leg[gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0]] == gates.leg[passed.gate[k]]
     leg, inwards = gates.leg[passed.gate], gates.inward[passed.gate] == passed.side
     enters, leaves = gates.ways(passed.gate, passed.side)
     entry, exit_ = _ends(passed, enters & drawn, leaves & drawn)
