@@ -138,8 +138,8 @@ def anywhere(a, b):
 def test_of_two_that_fit_alike_neither_is_joined():
     tail, head = end([1.0, 0, 0], [0.0, 0, 0], [10.0] * 3), end([0.0, 1.5, 1.5], [0.0, 5.0, 5.0], [10.0] * 3)
     one, two = np.array([True, False, False]), np.array([False, True, True])
-    assert len(joined(lives(tail, head), one, two, 3600.0, anywhere).before) == 0
-    alone = joined(lives(tail, head), one, np.array([False, True, False]), 3600.0, anywhere)
+    assert len(joined(lives(tail, head), one, two, one, 3600.0, anywhere).before) == 0
+    alone = joined(lives(tail, head), one, np.array([False, True, False]), one, 3600.0, anywhere)
     assert (alone.before.tolist(), alone.after.tolist()) == ([0], [1])
     assert alone.probability[0] > 0.7
 
@@ -147,14 +147,15 @@ def test_of_two_that_fit_alike_neither_is_joined():
 def test_one_that_comes_back_is_another():
     """At the place where the first one was heading for, but with the opposite velocity."""
     tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [-10.0] * 2)
-    assert len(joined(lives(tail, head), np.array([True, False]), np.array([False, True]), 60.0, anywhere).before) == 0
+    one, two = np.array([True, False]), np.array([False, True])
+    assert len(joined(lives(tail, head), one, two, one, 60.0, anywhere).before) == 0
 
 
 def test_a_movement_that_is_not_allowed_is_not_joined():
     tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [10.0] * 2)
     ends, begins = np.array([True, False]), np.array([False, True])
-    assert len(joined(lives(tail, head), ends, begins, 60.0, anywhere).before) == 1
-    assert len(joined(lives(tail, head), ends, begins, 60.0, lambda a, b: np.zeros(len(a), bool)).before) == 0
+    assert len(joined(lives(tail, head), ends, begins, ends, 60.0, anywhere).before) == 1
+    assert len(joined(lives(tail, head), ends, begins, ends, 60.0, lambda a, b: np.zeros(len(a), bool)).before) == 0
 
 
 @given(st.integers(0, 10_000))
@@ -182,7 +183,7 @@ def test_who_is_found_again_has_a_density_over_time_place_and_velocity():
     rng = np.random.default_rng(1)
     n = 200_000
     gap = rng.uniform(0, LONGEST_S, n)
-    wide = 3 * np.sqrt([2 + 2 * gap**2 + gap**3, 3 + gap])
+    wide = 3 * np.sqrt([2 + 2 * gap**2 + gap**3, 12 + gap])
     drawn = rng.standard_normal((2, n, 2))
     weight = LONGEST_S * (2 * np.pi) ** 2 * np.exp(np.sum(drawn**2, axis=(0, 2)) / 2) * np.prod(wide, axis=0) ** 2
     xy, v = (np.vstack([[0, 0], values]) for values in wide[:, :, None] * drawn)

@@ -141,7 +141,7 @@ def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask)
     def possible(a: Ints, b: Ints) -> Mask:
         return np.asarray(may[leg[last[a]], leg[first[b]]])
 
-    return joined(lives, ends, begins, float(np.diff(spans).sum()), possible)
+    return joined(lives, ends, begins, last >= 0, float(np.diff(spans).sum()), possible)
 
 
 def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
