@@ -91,6 +91,8 @@ def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dic
             late = abs(float(event["time_s"]) - row["time_s"])
             if at is None or late > TOLERANCE_S:
                 continue
+            if event["pet_s"] and row["pet_s"] is not None:  # the first vehicle, too, was there at that time
+                late += abs(float(event["pet_s"]) - row["pet_s"])
             far = np.hypot(float(at["x_m"]) - row[f"{kind}_x_m"], float(at["y_m"]) - row[f"{kind}_y_m"])
             cost[i, j] = late if far < TOLERANCE_M else 1e3
     pairs = [(i, j) for i, j in zip(*linear_sum_assignment(cost), strict=True) if cost[i, j] < 1e3]

@@ -140,7 +140,7 @@ def test_nobody_waits_before_a_gate_whose_inner_side_nothing_tells(tmp_path, lin
 
 def test_a_row_that_seems_to_stand_makes_no_queue():
     begin, xy, yes = np.array([0.0, 10.0]), np.zeros((2, 2)), np.ones(2, bool)
-    stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy)
+    stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy, xy)
     assert queues_of(stays, np.zeros(2, int), np.full(2, 4.0)).begin.tolist() == [10.0]
 
 
@@ -210,7 +210,7 @@ def test_queues_are_those_of_brute_force(events):
     n, yes = len(events), np.ones(len(events), bool)
     xy = np.column_stack([x, np.zeros(n)]).astype(float)
     stays = Stays(
-        np.zeros(n, int), np.arange(n), begin.astype(float), (begin + wait).astype(float), xy[:, 0], yes, yes, xy
+        np.zeros(n, int), np.arange(n), begin.astype(float), (begin + wait).astype(float), xy[:, 0], yes, yes, xy, xy
     )
     found = queues_of(stays, leg, np.full(n, 4.0))
     got = list(zip(found.leg, found.begin, found.end, found.vehicles, found.length, strict=True))
