@@ -39,8 +39,8 @@ _LEG = 16
 """Rows; with fewer there are more boxes to compare, with more the boxes hold more road where the vehicle is not"""
 _ROUNDING_S = 1e-6
 _SURE = 2.0
-"""Standard deviations of a time that must be less than PET_S: where ways are almost parallel nobody knows where they
-cross; and of the headings, by which more they may have to differ"""
+"""Standard deviations of a time by which it must be more than 0, and in all less than PET_S: where ways are almost
+parallel nobody knows where they cross; and of headings, by which more they may have to differ"""
 _SLOWEST = 0.5
 """m/s; for when a vehicle that is about to stand leaves or comes, since it does not go on with that speed"""
 
@@ -54,7 +54,8 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
 
-    Its value is NaN where they follow each other, or nobody knows where their ways cross: no other one counts for it.
+    Its value is NaN where they follow each other, nobody knows where their ways cross, or it does not differ from 0, as
+    that of two in one place at one time, which vehicles are not: no other one counts for it.
     """
     order = by_number(bodies.track)
     track, rectangle = _sorted(bodies.track, bodies.table, order)
@@ -64,12 +65,11 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
     steps = _step(track, rectangle, i, 1) + _step(track, rectangle, j, -1)
     first, second = bodies.only(order[i]), bodies.only(order[j])
     found = _details(first, second, steps)
+    counts = (found.rank > 0) & (found.value > _SURE * found.sigma) & (_SURE * found.sigma < PET_S)
+    counts[counts] = ~_follows(i[counts], j[counts], track, rectangle)
     turned = _SURE * np.hypot(first.heading_sigma, second.heading_sigma)
     by_heading = _longer(i, j, turned, track, rectangle) / _SURE
-    found = replace(found, sigma=np.hypot(found.sigma, by_heading))
-    counts = _SURE * found.sigma < PET_S
-    counts[counts] = ~_follows(i[counts], j[counts], track, rectangle)
-    return replace(found, value=np.where(counts, found.value, np.nan))
+    return replace(found, value=np.where(counts, found.value, np.nan), sigma=np.hypot(found.sigma, by_heading))
 
 
 def _met(track: Ints, rectangle: Floats, since: float, until: float) -> tuple[Ints, Ints]:
