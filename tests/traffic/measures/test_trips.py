@@ -260,11 +260,11 @@ def test_the_balance_is_of_what_was_lost_and_made(tmp_path):
 
 
 def test_who_passes_beside_an_entry_and_leaves_elsewhere_has_entered_there(tmp_path):
-    """The western gate reaches from 200 to 300 px, 10 px a metre: 1 m beside it is near enough, 3 m is not."""
+    """The western gate reaches from 200 to 300 px, 10 px a metre: 1 m beside it is near enough, 5 m is not."""
     gates = PLACE["gates"] | {"west": {"line": [[100, 200], [100, 300]], "role": "entry"}}
     tracks = [
         along(1, 10 + np.arange(0, 5, 0.04), np.arange(0, 5, 0.04) * 100 + 50, np.linspace(320, 220, 125)),
-        along(2, 20 + np.arange(0, 5, 0.04), np.arange(0, 5, 0.04) * 100 + 50, np.linspace(340, 240, 125)),
+        along(2, 20 + np.arange(0, 5, 0.04), np.arange(0, 5, 0.04) * 100 + 50, np.linspace(360, 260, 125)),
         straight(3, 30.0, 50, 310, 100, 2),  # never leaves
     ]
     found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE | {"gates": gates})).tables
