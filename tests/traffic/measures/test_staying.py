@@ -116,6 +116,19 @@ def test_who_waits_when_the_watching_ends_is_in_the_queue_of_the_nearest_entry(t
     assert queued(tmp_path, waiting(*ways), CALIBRATED) == [("west", 1)]
 
 
+def test_who_came_from_afar_outside_the_points_waits_where_it_stands(tmp_path):
+    """Its track began 61.5 m before the gate."""
+    t = np.arange(0, 16, 0.04)
+    run = write_run(tmp_path / "run", [along(1, t, 5 + 60 * np.clip(t, 0, 10))], metres=True)
+    without_metres_before(run, 640)
+    gates = {
+        "east": {"line": [[620, 200], [620, 280]], "role": "entry"},
+        "out": {"line": [[635, 280], [635, 200]], "role": "exit"},
+    }
+    rows = measured([run], site(CALIBRATED | {"gates": gates})).tables["queues"].to_pylist()
+    assert [(row["leg"], row["vehicles"]) for row in rows] == [("east", 1)]
+
+
 @pytest.mark.parametrize(("seconds", "found"), [(160, [("west", 1)]), (200, [])])
 def test_who_stands_for_longer_than_a_red_light_is_parked(tmp_path, seconds, found):
     assert queued(tmp_path, waiting((65, 0), seconds=seconds), CALIBRATED) == found

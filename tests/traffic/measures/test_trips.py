@@ -274,6 +274,23 @@ def test_who_passes_beside_an_entry_and_leaves_elsewhere_has_entered_there(tmp_p
     assert {row["track_id"]: row["complete"] for row in found["trips"].to_pylist()} == {1: True, 2: False}
 
 
+@pytest.mark.parametrize("lost_s", [13.0, 14.1])
+def test_a_joined_vehicle_has_left_where_it_passes_beside_an_exit(tmp_path, lost_s):
+    """The eastern gate is 2 m beside its way, which it passes after the gap, or within it."""
+    gates = PLACE["gates"] | {"east": {"line": [[500, 460], [500, 260]], "role": "exit"}}
+    found_s = lost_s + 0.8
+    tracks = [
+        straight(1, 10.0, 50, 240, 100, lost_s - 10),
+        straight(2, found_s, 50 + 100 * (found_s - 10), 240, 100, 15.8 - found_s),
+        *(straight(10 + k, 20.0 + 10 * k, 50, 300, 100, 5) for k in range(3)),
+    ]
+    found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(PLACE | {"gates": gates})).tables
+    row = next(row for row in found["trips"].to_pylist() if row["track_id"] == 1)
+    assert (row["complete"], row["tracks"], row["exit_gate"]) == (True, 2, "east")
+    exits = [row for row in found["crossings"].to_pylist() if row["gate"] == "east" and row["time_s"] < 16]
+    assert [(row["reason"], row["time_s"]) for row in exits] == [("inferred", pytest.approx(14.5, abs=0.05))]
+
+
 def test_who_begins_waiting_at_an_entry_has_come_in_there(tmp_path):
     """One stands 2 m behind the western entry when its track begins, and one 12 m behind it."""
     t = np.arange(0, 10, 0.04)
