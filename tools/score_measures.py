@@ -10,7 +10,8 @@ each site, of a junction or roundabout, has calibration points up to so many met
 video is tracked again with it.
 
 A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
-same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
+same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle,
+of several that of the nearest times of both vehicles.
 Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
 
 The bounds of a count hold if the true number of crossings of that gate, in that direction and in the whole clip, lies

@@ -59,7 +59,7 @@ def journeys(
     probability = np.concatenate([confidence(passed), joins.probability[across.track], confidence(spare)])
     free = np.concatenate([np.zeros(len(passed), bool), across.beside, spare.beside])
     passed = passed.and_also(across.of(joins.before[across.track]).nowhere()).and_also(spare)
-    whole = replace(passed, track=vehicle[passed.track], beside=free)
+    whole = replace(passed, track=vehicle[passed.track], beside=free)  # those that no track alone needs
     kept = np.flatnonzero(~free | _needed(gates, whole, may))
     passed, probability, reason = passed.only(kept), probability[kept], [reason[k] for k in kept.tolist()]
     probability = np.where(passed.beside, INFERRED_SURE, 1.0) * probability

@@ -37,7 +37,6 @@ _FAR = 25.0
 """Squared distance beyond which a row is of something else"""
 _OTHER = 30.0
 """Squared distance of two states, beyond which they are of two vehicles: of one, one in 200,000"""
-_UNKNOWN_S = float(__import__("os").environ.get("UNK", "1e9"))
 MODEL_M_S = 1.0
 """m/s; standard deviation of the difference of two velocities beside what they say"""
 T, X, Y, VX, VY, PXX, PXV, PVV, LASTING = range(9)
@@ -194,7 +193,7 @@ def _follow(
                 if now - began < _CHECK_S or since[k, 3 + 2 * c] < _CHECK_ROWS:
                     continue
                 _write_back(state, after, began, begun, 0)
-                if began - state[before, T] > _UNKNOWN_S or _apart(state, before, begun, 0) > _OTHER:
+                if _apart(state, before, begun, 0) > _OTHER:
                     broken = c
                     break
                 if state[first, T] <= began:
