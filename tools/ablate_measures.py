@@ -5,8 +5,9 @@
 Each CLIP is a folder of `vidtrack simulate`, with its tracks in CLIP/run, as in `score_measures.py`. A crossing is
 right within 1 s at its gate and direction; a trip with both legs and both times within 5 s, as a turning count asks
 for it.
-The second table has the joins: what probability they state, and how many of them are of one true vehicle, the one
-that is nearest to where the one stretch ends, within 8 m, and also to where the other begins.
+The second table has the joins of stretches of which one passed an entry or an exit, and the others, which make no
+trip: what probability they state, and how many of them are of one true vehicle, the one that is nearest to where the
+one stretch ends, within 8 m, and also to where the other begins.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from vidtrack.traffic.site import read_site
 CROSSING_S, TRIP_S = 1.0, 5.0
 NEAR_M = 8.0
 STATE = ("frame", "target_id", "x_m", "y_m")
-BINS = (0.5, 0.7, 0.9, 0.99, 1.0)
+BINS = (0.5, 0.65, 0.8, 0.9, 1.0)
 
 
 def none_of(*shape_of: int) -> Any:
@@ -50,11 +51,14 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "breaks where the motion is that of another vehicle": {(stretches, "_OTHER"): np.inf},
     "joins": {(journeys, "_joins"): lambda *_: journeys._NONE},
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
+    "ends that another vehicle has drawn along": {(joins, "_ASTRAY"): 0.0},
+    "joins of who passed a gate are surer": {(joins, "_SOUND"): joins._SOUND_BETWEEN},
     "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},
     "to and fro within 2 s": {(passing, "_BACK_S"): 0.0},
     "the same over breaks of a track": {(journeys, "lasting"): lambda track, *_: np.ones(len(track), bool)},
     "a velocity kept beyond the border": {(rows, "_go_on"): lambda *_: None},
     "gates passed beside": {(journeys, "_needed"): none_of(1)},
+    "gates passed beside within a gap": {(journeys, "reaches"): lambda metres: (reaches(metres)[0], 0.0)},
     "gates within a gap": {(journeys, "_across"): lambda *given: given[3].only(np.zeros(len(given[3]), bool))},
     "gates just beyond the end of a track": {(beyond, "_extended"): lambda g, end, free, *_: beyond._stood(
         g, end, *np.zeros((2, 0), int), *np.zeros((2, 0)), True)},
@@ -107,8 +111,9 @@ def nearest(vehicles: np.ndarray, end: End, k: int) -> int:
     return int(vehicles[low + far.argmin(), 1]) if far.min(initial=np.inf) < NEAR_M else -1
 
 
-def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool]]]:
-    """True, told and right crossings, then trips (6,); the probabilities of joins, and if they are right."""
+def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool, bool]]]:
+    """True, told and right crossings, then trips (6,); the probabilities of joins, if they are right, and if a stretch
+    passed an entry or an exit."""
     found = journeys.journeys(one.gates, one.passing.passed(), one.lives, one.spans, True, one.allowed)
     passed, told = found.passed, found.trips
     score_measures.TOLERANCE_S = CROSSING_S
@@ -123,7 +128,9 @@ def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool]]]:
     of = [
         [nearest(one.vehicles, end, k) for k in who] for end, who in zip(ends, (made.before, made.after), strict=True)
     ]
-    joined = [(float(p), a == b != -1) for p, a, b in zip(made.probability, *of, strict=True)]
+    role = passed.track[one.gates.role("entry", "exit", "both")[passed.gate]]
+    gated = np.isin(made.before, role) | np.isin(made.after, role)
+    joined = [(float(p), a == b != -1, bool(g)) for p, a, b, g in zip(made.probability, *of, gated, strict=True)]
     return np.array([len(one.crossed), len(crossed), hits, len(one.moved), len(moved), len(right)]), joined
 
 
@@ -148,7 +155,7 @@ def main() -> None:
     parser.add_argument("clips", nargs="+", type=Path)
     clips = parser.parse_args().clips
     whole = [seen(clip) for clip in clips]
-    joined: list[tuple[float, bool]] = []
+    joined: list[tuple[float, bool, bool]] = []
     print("| left out | crossings: right of told | trips: right of told |")
     print("|---|---|---|")
     for name, rule in RULES.items():
@@ -161,13 +168,15 @@ def main() -> None:
             joined = [one for _, some in results for one in some]
             print(f"of {true} crossings and {moved} trips:")
         print(f"| {name} | {right} of {told} | {right_trips} of {trips_} |", flush=True)
-    print("\n| probability | joins | its mean | right |")
-    print("|---|---|---|---|")
-    sure, good = np.array([s for s, _ in joined]), np.array([r for _, r in joined])
-    for low, high in pairwise(BINS):
-        mine = (sure > low) & (sure <= high)
-        if mine.any():
-            print(f"| {low:g} to {high:g} | {mine.sum()} | {sure[mine].mean():.2f} | {good[mine].mean():.2f} |")
+    print("\n| joins | probability | joins | its mean | right |")
+    print("|---|---|---|---|---|")
+    sure, good, gated = (np.array(column) for column in zip(*joined, strict=True))
+    for name, chosen in (("passed an entry or an exit", gated), ("others", ~gated)):
+        for low, high in pairwise(BINS):
+            mine = chosen & (sure > low) & (sure <= high)
+            if mine.any():
+                means = f"{sure[mine].mean():.2f} | {good[mine].mean():.2f}"
+                print(f"| {name} | {low:g} to {high:g} | {mine.sum()} | {means} |")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ each site, of a junction or roundabout, has calibration points up to so many met
 video is tracked again with it.
 
 A crossing is found by one of the same gate and direction within 1 s, one to one; a movement by a complete trip of the
-same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle.
+same legs whose two times are within 1 s; a conflict by one within 1 s whose place is within 15 m of the second vehicle,
+of several that of the nearest times of both vehicles.
 Conflicts whose vehicles the border of the picture cuts are in the exact states and not in the events.
 
 The bounds of a count hold if the true number of crossings of that gate, in that direction and in the whole clip, lies
@@ -91,6 +92,8 @@ def conflicts(clip: Path, events: list[dict[str, str]], rows: list[dict]) -> dic
             late = abs(float(event["time_s"]) - row["time_s"])
             if at is None or late > TOLERANCE_S:
                 continue
+            if event["pet_s"] and row["pet_s"] is not None:  # the first vehicle, too, was there at that time
+                late += abs(float(event["pet_s"]) - row["pet_s"])
             far = np.hypot(float(at["x_m"]) - row[f"{kind}_x_m"], float(at["y_m"]) - row[f"{kind}_y_m"])
             cost[i, j] = late if far < TOLERANCE_M else 1e3
     pairs = [(i, j) for i, j in zip(*linear_sum_assignment(cost), strict=True) if cost[i, j] < 1e3]

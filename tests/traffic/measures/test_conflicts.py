@@ -1,5 +1,7 @@
 """Conflicts: known times, brute force over exact rectangles, simulated roads, and errors by repetition."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_runs import CALIBRATED, SITE, along, site, write_run
@@ -351,3 +353,20 @@ def test_nobody_and_one_alone_are_in_no_conflict(tmp_path, seconds):
     tracks = [along(1, np.arange(25) / 25, 100 + 2 * np.arange(25))] if seconds else []
     found = measured([write_run(tmp_path / "run", tracks, metres=True)], site(CALIBRATED))
     assert len(found.tables["conflicts"]) == found.report["conflicts"] == 0
+
+
+def test_errors_of_headings_are_those_of_the_time_where_one_turns_into_the_way_of_another():
+    """Where the headings cross clearly nothing depends on them."""
+    track, t, xy, v = bend(1, 2.0, np.pi / 2)
+    turned = np.array([30.0, 37.0]) + np.column_stack([xy[:, 1], -xy[:, 0]])  # from the north to the east
+    south = np.column_stack([v[:, 1], -v[:, 0]])
+    merging = both(bend(0, 0.0, 0.0), (track, t, turned, south))
+    crossing = rows_of(*driven((0, 0, 10, 0), (20, -65, 0, 12)))
+    for rows, depends in ((merging, True), (crossing, False)):
+        values, sigmas = [], []
+        for sigma in (0.0, 0.7):
+            found = found_in(replace(rows, speed_sigma=np.full(len(rows), sigma)))
+            values.append(found.value[PET, 0])
+            sigmas.append(found.sigma[PET, 0])
+        assert values[0] == values[1]
+        assert (sigmas[1] > sigmas[0] + 0.01) == depends

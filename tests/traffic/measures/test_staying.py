@@ -116,6 +116,19 @@ def test_who_waits_when_the_watching_ends_is_in_the_queue_of_the_nearest_entry(t
     assert queued(tmp_path, waiting(*ways), CALIBRATED) == [("west", 1)]
 
 
+def test_who_came_from_afar_outside_the_points_waits_where_it_stands(tmp_path):
+    """Its track began 61.5 m before the gate."""
+    t = np.arange(0, 16, 0.04)
+    run = write_run(tmp_path / "run", [along(1, t, 5 + 60 * np.clip(t, 0, 10))], metres=True)
+    without_metres_before(run, 640)
+    gates = {
+        "east": {"line": [[620, 200], [620, 280]], "role": "entry"},
+        "out": {"line": [[635, 280], [635, 200]], "role": "exit"},
+    }
+    rows = measured([run], site(CALIBRATED | {"gates": gates})).tables["queues"].to_pylist()
+    assert [(row["leg"], row["vehicles"]) for row in rows] == [("east", 1)]
+
+
 @pytest.mark.parametrize(("seconds", "found"), [(160, [("west", 1)]), (200, [])])
 def test_who_stands_for_longer_than_a_red_light_is_parked(tmp_path, seconds, found):
     assert queued(tmp_path, waiting((65, 0), seconds=seconds), CALIBRATED) == found
@@ -140,7 +153,7 @@ def test_nobody_waits_before_a_gate_whose_inner_side_nothing_tells(tmp_path, lin
 
 def test_a_row_that_seems_to_stand_makes_no_queue():
     begin, xy, yes = np.array([0.0, 10.0]), np.zeros((2, 2)), np.ones(2, bool)
-    stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy)
+    stays = Stays(np.zeros(2, int), np.arange(2), begin, np.array([0.08, 10.3]), begin, yes, yes, xy, xy)
     assert queues_of(stays, np.zeros(2, int), np.full(2, 4.0)).begin.tolist() == [10.0]
 
 
@@ -210,7 +223,7 @@ def test_queues_are_those_of_brute_force(events):
     n, yes = len(events), np.ones(len(events), bool)
     xy = np.column_stack([x, np.zeros(n)]).astype(float)
     stays = Stays(
-        np.zeros(n, int), np.arange(n), begin.astype(float), (begin + wait).astype(float), xy[:, 0], yes, yes, xy
+        np.zeros(n, int), np.arange(n), begin.astype(float), (begin + wait).astype(float), xy[:, 0], yes, yes, xy, xy
     )
     found = queues_of(stays, leg, np.full(n, 4.0))
     got = list(zip(found.leg, found.begin, found.end, found.vehicles, found.length, strict=True))

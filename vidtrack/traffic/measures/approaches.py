@@ -27,16 +27,13 @@ _PARKED_S = 180.0
 def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, lives: Lives) -> Ints:
     """(E,) the entry gate by which each vehicle that stands comes, or will come; -1: by none, or it has left."""
     who, entered = standing.vehicle, trips.entry >= 0
-    gate, left_s = np.full(len(lives.track), -1), np.full(len(lives.track), -np.inf)
+    gate, left_s = np.full(len(lives.track), -1), np.full(len(lives.track), np.inf)
     gate[trips.vehicle[entered]] = passed.gate[trips.entry[entered]]
     left_s[trips.vehicle] = trips.to_s
-    xy = np.where(np.isfinite(standing.xy), standing.xy, lives.head.xy[who])
-    nearest, _, far = gates.nearest(xy, among=gates.role("entry", "exit", "both"))
+    nearest, _, far = gates.nearest(standing.rough, among=gates.role("entry", "exit", "both"))
     away = far - gates.far(nearest, lives.head.xy[who]) > _AWAY_M
     parked = standing.end - standing.begin > _PARKED_S
-    waits = gates.role("entry", "both")[nearest] & (far < _REACH_M) & gates.outside(nearest, xy) & ~away & ~parked
-    return np.where(
-        np.isin(who, trips.vehicle),
-        np.where(standing.begin < left_s[who], gate[who], -1),
-        np.where(waits, nearest, -1),
-    )
+    outside = gates.role("entry", "both")[nearest] & gates.outside(nearest, standing.rough)
+    waits = outside & (far < _REACH_M) & ~away & ~parked
+    known = np.where(gate[who] >= 0, gate[who], np.where(waits, nearest, -1))
+    return np.where(standing.begin < left_s[who], known, -1)

@@ -73,6 +73,11 @@ class Bodies:
         """(N, 2) m/s."""
         return self.table[:, VX : VY + 1]
 
+    @property
+    def heading_sigma(self) -> Floats:
+        """(N,) rad; standard deviation of the heading, by that of the velocity across."""
+        return self.table[:, SPEED_SIGMA] / np.maximum(np.linalg.norm(self.v, axis=1), 1e-9)
+
     def only(self, chosen: Mask | Ints | slice) -> Bodies:
         """The rectangles of a mask, of indices or of a slice."""
         return Bodies(self.track[chosen], self.table[chosen], self.merged[chosen])

@@ -38,6 +38,8 @@ TTC_S = 1.5
 """s; a longer time to collision is no conflict (FHWA-HRT-08-050, the default of SSAM)"""
 _SURE = 2.0
 """Standard deviations by which a closing speed must differ from 0: else vehicles that stand would collide"""
+_STILL_M_S = 1e-9
+"""m/s; of an edge as the other vehicle sees it, below which only rounding moves it"""
 
 
 def closing(bodies: Bodies) -> Encounters:
@@ -141,7 +143,7 @@ def _touch(dx: float, dy: float, wx: float, wy: float, table: Floats, i: int, j:
             half += abs(ex * x + ey * y) * table[its, LENGTH] / 2 + abs(ex * y - ey * x) * table[its, WIDTH] / 2
         d, rate = dx * x + dy * y, wx * x + wy * y
         apart |= abs(d) > half
-        if rate == 0:
+        if abs(rate) < _STILL_M_S:
             if abs(d) > half:
                 return np.inf, 0.0, 0.0
             continue

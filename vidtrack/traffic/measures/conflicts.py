@@ -16,8 +16,6 @@ _ACROSS_RAD, _AGAINST_RAD = np.radians(85), np.radians(150)
 """Angles from which on vehicles cross (SSAM), and meet head-on"""
 KINDS = "rear-end", "merging", "crossing", "head-on"
 TTC, PET = range(2)
-_CLEAR = 2.0
-"""Standard deviations from 0"""
 _MEMORY_S = 3 * PET_S
 """s; who encroaches is judged PET_S late, by where the second vehicle was up to PET_S before, and the first one up to
 PET_S before that"""
@@ -96,7 +94,7 @@ class Meeting:
         closed, encroached = (found.between(vehicle) for found in (closed, encroached))
         closed, encroached = (found.only(found.least()) for found in (closed, encroached))
         span = [np.searchsorted(spans[:, 0], t, side="right") for t in (encroached.t, encroached.t - encroached.value)]
-        return _joined(closed, _clear(encroached.only(span[0] == span[1])))
+        return _joined(closed, encroached.only(span[0] == span[1]))
 
     def settled(self, until: float) -> Conflicts:
         """What was found of tracks that were in no encounter for 2 PET_S before `until`, once; it is forgotten then.
@@ -115,15 +113,7 @@ class Meeting:
             done_ones = one.only(done & (one.first != one.second))
             found.append(done_ones.only(done_ones.least()))
         self._closed, self._encroached = [closed.only(~over[: len(closed)])], [encroached.only(~over[len(closed) :])]
-        return _joined(found[0], _clear(found[1]))
-
-
-def _clear(met: Encounters) -> Encounters:
-    """Those whose post-encroachment time differs from 0 by _CLEAR of its standard deviations.
-
-    Two that are in one place at one time have none: vehicles are not, so it is their error.
-    """
-    return met.only((met.rank > 0) & (met.value > _CLEAR * met.sigma))
+        return _joined(found[0], found[1].only(np.isfinite(found[1].value)))
 
 
 def _joined(closed: Encounters, encroached: Encounters) -> Conflicts:

@@ -14,6 +14,9 @@ g v_a = g v_b = -1,
 
 where h(g) is how far both together reach along g: their swept ways meet in a parallelogram, and this is the least of
 arriving less leaving over its corners.
+
+Where one vehicle turns into the way of another, the time depends on where their headings begin or cease to differ by
+CROSSING_RAD, and so on the errors of the headings: sigma has by how much longer it would be if they had to differ more.
 """
 
 from __future__ import annotations
@@ -36,8 +39,8 @@ _LEG = 16
 """Rows; with fewer there are more boxes to compare, with more the boxes hold more road where the vehicle is not"""
 _ROUNDING_S = 1e-6
 _SURE = 2.0
-"""Standard deviations of a time that must be less than PET_S: where ways are almost parallel nobody knows where they
-cross"""
+"""Standard deviations of a time by which it must be more than 0, and in all less than PET_S: where ways are almost
+parallel nobody knows where they cross; and of headings, by which more they may have to differ"""
 _SLOWEST = 0.5
 """m/s; for when a vehicle that is about to stand leaves or comes, since it does not go on with that speed"""
 
@@ -51,7 +54,8 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
 
     bodies  (N,) in order of time; the moment is when the second vehicle comes
 
-    Its value is NaN where they follow each other, or nobody knows where their ways cross: no other one counts for it.
+    Its value is NaN where they follow each other, nobody knows where their ways cross, or it does not differ from 0, as
+    that of two in one place at one time, which vehicles are not: no other one counts for it.
     """
     order = by_number(bodies.track)
     track, rectangle = _sorted(bodies.track, bodies.table, order)
@@ -59,10 +63,13 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
     late = rectangle[i, T] > rectangle[j, T]
     i, j = np.where(late, j, i), np.where(late, i, j)
     steps = _step(track, rectangle, i, 1) + _step(track, rectangle, j, -1)
-    found = _details(bodies.only(order[i]), bodies.only(order[j]), steps)
-    counts = _SURE * found.sigma < PET_S
+    first, second = bodies.only(order[i]), bodies.only(order[j])
+    found = _details(first, second, steps)
+    counts = (found.rank > 0) & (found.value > _SURE * found.sigma) & (_SURE * found.sigma < PET_S)
     counts[counts] = ~_follows(i[counts], j[counts], track, rectangle)
-    return replace(found, value=np.where(counts, found.value, np.nan))
+    turned = _SURE * np.hypot(first.heading_sigma, second.heading_sigma)
+    by_heading = _longer(i, j, turned, track, rectangle) / _SURE
+    return replace(found, value=np.where(counts, found.value, np.nan), sigma=np.hypot(found.sigma, by_heading))
 
 
 def _met(track: Ints, rectangle: Floats, since: float, until: float) -> tuple[Ints, Ints]:
@@ -223,6 +230,39 @@ def _nearest(
                     if not _aligned(rectangle, i, j) and _overlap(rectangle, i, j):
                         best, first, second = wait, i, j
     return first, second
+
+
+@kernel
+def _longer(first: Ints, second: Ints, turned: Floats, track: Ints, rectangle: Floats) -> Floats:
+    """(E,) s; by how much longer the wait between rows `first` and `second` is, over all places, if headings must
+    differ by `turned` (E,) rad more; up to PET_S where they nowhere do."""
+    longer = np.zeros(len(first))
+    for k in range(len(first)):
+        i, j, wait = first[k], second[k], rectangle[second[k], T] - rectangle[first[k], T]
+        most = np.cos(min(CROSSING_RAD + turned[k], np.pi / 2))
+        if not _cosine(rectangle, i, j) > most:
+            continue
+        low, high = _around(track, rectangle, i)
+        begin, end = _around(track, rectangle, j)
+        best = PET_S
+        for b in range(begin, end):
+            for a in range(low, high):
+                later = abs(rectangle[b, T] - rectangle[a, T])
+                if later < best and not _cosine(rectangle, a, b) > most and _overlap(rectangle, a, b):
+                    best = later
+        longer[k] = max(best - wait, 0.0)
+    return longer
+
+
+@inlined
+def _around(track: Ints, rectangle: Floats, row: int) -> tuple[int, int]:
+    """The first row of the same track within PET_S of a row, and the one after the last."""
+    low = high = row
+    while low > 0 and track[low - 1] == track[row] and rectangle[low - 1, T] > rectangle[row, T] - PET_S:
+        low -= 1
+    while high < len(track) and track[high] == track[row] and rectangle[high, T] < rectangle[row, T] + PET_S:
+        high += 1
+    return low, high
 
 
 @kernel

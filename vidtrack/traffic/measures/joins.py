@@ -6,14 +6,16 @@ The odds that they are, against a vehicle that is lost for good and another that
 
 h is the density of the time that a track is lost for, t that of place and velocity in which it is found (Student's t of
 four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after a motion of nearly constant velocity, and d the
-difference of the lengths in standard deviations. Two stretches of one track are SAME times as likely one vehicle, and a
-movement that is not allowed is none. `rate` is that at which tracks begin by chance between the gates, per second and
-unit of place and velocity: what no join explains.
+difference of the lengths in standard deviations. For a share _ASTRAY of the pairs another vehicle in the blob has drawn
+an end along: then the second one is somewhere near, at any velocity. Two stretches of one track are SAME times as
+likely one vehicle, and a movement that is not allowed is none. `rate` is that at which tracks begin by chance between
+the gates, per second and unit of place and velocity: what no join explains.
 
 All ends are decided together: the probability of a pair is its marginal over all ways to join ends one to one, each as
 likely as the product of its odds. Belief propagation finds these marginals (Williams and Lau, IEEE Transactions on
-Aerospace and Electronic Systems 50(4), 2014). They hold if both ends are where their tracks say, which is so for a
-share _SOUND of them. At most one pair of an end is likelier than not, and that is joined.
+Aerospace and Electronic Systems 50(4), 2014). They hold if both ends are of one vehicle, which is so for a share
+_SOUND of them, and for fewer where neither stretch has passed an entry or an exit. At most one pair of an end is
+likelier than not, and that is joined.
 """
 
 from __future__ import annotations
@@ -42,8 +44,12 @@ _VELOCITIES = 400.0
 """(m/s)2; over which the velocities of tracks that begin are spread"""
 _LENGTH_SIGMA = 0.25
 """Standard deviation of the logarithm of a length, from one track of a vehicle to another"""
-_SOUND = 0.78
-"""Share of joins whose two ends are where their tracks say: others are of blobs that hold several vehicles"""
+_ASTRAY, _ASTRAY_M, _ASTRAY_M_S, _ASTRAY_PACE_M_S = 0.3, 4.0, 5.0, 10.0
+"""Share of pairs with an end that another vehicle has drawn along; standard deviations of how far they are apart then,
+m, and m/s times the gap, and of the second velocity"""
+_SOUND, _SOUND_BETWEEN = 0.95, 0.65
+"""Share of joins whose two ends are of one vehicle, where it passed an entry or an exit, and of others: those are often
+of blobs that hold several vehicles, or none"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,10 +69,13 @@ class Joins:
         return first
 
 
-def joined(lives: Lives, ends: Mask, begins: Mask, watched_s: float, allowed: Callable[[Ints, Ints], Mask]) -> Joins:
+def joined(
+    lives: Lives, ends: Mask, begins: Mask, passes: Mask, watched_s: float, allowed: Callable[[Ints, Ints], Mask]
+) -> Joins:
     """The joins of T stretches.
 
     ends, begins   (T,) those that end, and that begin, between the gates
+    passes         (T,) those that passed an entry or an exit
     watched_s      s; time in which they began
     allowed        which pairs of stretches make a trip that may be
     """
@@ -87,7 +96,7 @@ def joined(lives: Lives, ends: Mask, begins: Mask, watched_s: float, allowed: Ca
     for _ in range(_ROUNDS):
         probability = marginals(density / (chance / (watched_s * area * _VELOCITIES)), a, b, len(ends))
         chance = max(len(first) - probability.sum(), 1.0)
-    probability = _SOUND * probability
+    probability = np.where(passes[a] | passes[b], _SOUND, _SOUND_BETWEEN) * probability
     likely = probability > 0.5
     return Joins(a[likely], b[likely], probability[likely])
 
@@ -117,8 +126,12 @@ def found_again(tail: End, head: End, a: Ints, b: Ints) -> Floats:
     svv = vv + jolt * gap + v2 + MODEL_M_S**2
     det = sxx * svv - sxv**2
     square = (svv * dot(place, place) - 2 * sxv * dot(place, pace) + sxx * dot(pace, pace)) / det
-    density = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det / _LOST_S
-    return np.asarray(density * np.exp(-(2 + _FREEDOM / 2) * np.log1p(square / _FREEDOM) - gap / _LOST_S))
+    density = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det
+    on_course = np.exp(-(2 + _FREEDOM / 2) * np.log1p(square / _FREEDOM)) * density
+    apart, near = head.xy[b] - tail.xy[a], _ASTRAY_M**2 + (_ASTRAY_M_S * gap) ** 2
+    square = dot(apart, apart) / near + dot(head.v[b], head.v[b]) / _ASTRAY_PACE_M_S**2
+    astray = np.exp(-square / 2) / (4 * np.pi**2 * near * _ASTRAY_PACE_M_S**2)
+    return np.asarray(((1 - _ASTRAY) * on_course + _ASTRAY * astray) * np.exp(-gap / _LOST_S) / _LOST_S)
 
 
 def gap_rows(lives: Lives, joins: Joins) -> Rows:

@@ -12,7 +12,7 @@ from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
 from vidtrack.traffic.measures.crossings import confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
-from vidtrack.traffic.measures.passing import REACH_M, Passed, Passing, lasting
+from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 
@@ -48,17 +48,22 @@ def journeys(
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
     may = _may(gates, allowed)
-    passed = passed.only(~passed.beside | _needed(gates, passed, may))
+    needed = ~passed.beside | _needed(gates, passed, may)
+    spare, passed = passed.only(~needed), passed.only(needed)
     passed = passed.only(~_of_another(gates, passed, lives, may))
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     across = _across(gates, lives, joins, passed)
-    sure = np.where(passed.beside, INFERRED_SURE, 1.0) * confidence(passed)
-    told = ["inferred" if off else reason for off, reason in zip(passed.beside.tolist(), reasons(passed), strict=True)]
-    probability = np.concatenate([sure, joins.probability[across.track]])
-    reason = [*told, *(["joined"] * len(across))]
-    passed = passed.and_also(across.of(joins.before[across.track]).nowhere())
+    reason = [*reasons(passed), *(["joined"] * len(across)), *reasons(spare)]
+    probability = np.concatenate([confidence(passed), joins.probability[across.track], confidence(spare)])
+    free = np.concatenate([np.zeros(len(passed), bool), across.beside, spare.beside])
+    passed = passed.and_also(across.of(joins.before[across.track]).nowhere()).and_also(spare)
+    whole = replace(passed, track=vehicle[passed.track], beside=free)  # those that no track alone needs
+    kept = np.flatnonzero(~free | _needed(gates, whole, may))
+    passed, probability, reason = passed.only(kept), probability[kept], [reason[k] for k in kept.tolist()]
+    probability = np.where(passed.beside, INFERRED_SURE, 1.0) * probability
+    reason = ["inferred" if off else why for off, why in zip(passed.beside.tolist(), reason, strict=True)]
     if metres:
         inferred, sure = beyond(gates, passed, lives, joins, spans)
         probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
@@ -91,7 +96,7 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
     """(P,) passings beside a gate without which a trip that may be would have no entry, or no exit."""
     drawn, beside = ~passed.beside, passed.beside.copy()
     k = np.flatnonzero(beside)
-    beside[k] = gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0] == passed.gate[k]
+    beside[k] = gates.leg[gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0]] == gates.leg[passed.gate[k]]
     leg, inwards = gates.leg[passed.gate], gates.inward[passed.gate] == passed.side
     enters, leaves = gates.ways(passed.gate, passed.side)
     entry, exit_ = _ends(passed, enters & drawn, leaves & drawn)
@@ -136,12 +141,12 @@ def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask)
     def possible(a: Ints, b: Ints) -> Mask:
         return np.asarray(may[leg[last[a]], leg[first[b]]])
 
-    return joined(lives, ends, begins, float(np.diff(spans).sum()), possible)
+    return joined(lives, ends, begins, last >= 0, float(np.diff(spans).sum()), possible)
 
 
 def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
     """Gates that vehicles passed only while their track was broken; `track` is the number of the join."""
-    passing = Passing(gates, REACH_M)
+    passing = Passing(gates, *reaches(metres=True))
     passing.add(gap_rows(lives, joins))
     found = passing.passed()
     vehicle = joins.vehicles(len(lives.track))

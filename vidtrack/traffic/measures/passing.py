@@ -20,7 +20,7 @@ from vidtrack.traffic.measures.rows import Rows
 
 REACH_M, REACH_PX = 10.0, 100.0
 """How far from a gate distances are looked at: many times what positions are off."""
-BESIDE_M = 2.0
+BESIDE_M = 3.0
 """m; how far beside a gate a vehicle may have been that is known to have passed there: positions are off by as much"""
 
 _BACK_S = 2.0

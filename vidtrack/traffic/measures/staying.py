@@ -23,7 +23,7 @@ _STILL_S = 1.0
 _EDGE_SHARE = 0.5
 """Of the shorter side of a box that the border cuts: while it stands none of its edges moves by more"""
 _LENS_STEPS = 8
-BEGIN, END, STOOD, X, Y = range(5)
+BEGIN, END, STOOD, X, Y, ROUGH_X, ROUGH_Y = range(7)
 TRACK, ZONE, CAME, LEFT = range(4)
 
 
@@ -36,6 +36,7 @@ class Stays:
     stood           (E,) s of it that the vehicle stood; NaN without a calibration
     came, left      (E,) whether it was seen before and afterwards; else it was there before, or still is
     xy              (E, 2) where it was as soon as that was sure, in the unit of positions; NaN where it never was
+    rough           (E, 2) where it was at first, however sure
     """
 
     zone: Ints
@@ -46,6 +47,7 @@ class Stays:
     came: Mask
     left: Mask
     xy: Floats
+    rough: Floats
 
 
 class Staying:
@@ -62,7 +64,7 @@ class Staying:
         self._first = np.cumsum([0, *map(len, closed)])
         self._last_t, self._still = np.full(0, np.nan), np.full((0, 7), np.nan)
         self._open = np.full((0, self._zones + 1), -1)
-        self._real, self._whole, self._count = np.zeros((0, 5)), np.zeros((0, 4), np.int64), 0
+        self._real, self._whole, self._count = np.zeros((0, 7)), np.zeros((0, 4), np.int64), 0
 
     def add(self, rows: Rows) -> None:
         """Look at some rows."""
@@ -115,6 +117,7 @@ class Staying:
             came=whole[first, CAME] > 0,
             left=whole[last, LEFT] > 0,
             xy=real[placed][:, [X, Y]],
+            rough=real[first][:, [ROUGH_X, ROUGH_Y]],
         )
 
 
@@ -176,6 +179,7 @@ def _look(
                 if z < zones:
                     real[count, BEGIN] = t[i] - dt / 2
                 real[count, X], real[count, Y] = (x, y) if sure[i] else (np.nan, np.nan)
+                real[count, ROUGH_X], real[count, ROUGH_Y] = x, y
                 whole[count, TRACK], whole[count, ZONE], whole[count, CAME], whole[count, LEFT] = k, z, not new, 0
                 open_[k, z] = count
                 count += 1
