@@ -733,6 +733,14 @@ def test_plots_that_come_over_several_feeds_are_told(tmp_path, caplog, feeds_s, 
     assert (told or "") in caplog.text
 
 
+def test_copies_are_told_where_plots_come_back_after_a_time(tmp_path, caplog):
+    """As of an object that circles: every 40 s it is where it was."""
+    range_m = np.tile(np.random.default_rng(0).uniform(1e3, 5e4, 10), 4)
+    rows = [f"{4 * k + late},{r:.1f},10" for k, r in enumerate(range_m) for late in (0, 0.2)]
+    read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert "40 of 80 plots come once more, 0.2 s later" in caplog.text
+
+
 @pytest.mark.parametrize("scans", [2, 5, 30])
 @pytest.mark.parametrize("error_m", [0, 15])
 def test_objects_that_stand_still_are_no_second_feed(tmp_path, caplog, scans, error_m):
