@@ -773,8 +773,11 @@ def test_parquet_that_is_damaged_within_is_refused(tmp_path, damage):
     [
         ("", "is empty"),
         ("\n\n", "is empty"),
+        ("\ufeff", "is empty"),
         ("scan;time_s;x_m\n0;0,5;1\n", "semicolons"),
         ("scan\tx_m\n0\t1\n", "tabs"),
+        ("scan;time_s;x_m;y_m,note\n0;0;1;2,here\n", "semicolons"),
+        ("scan|time_s|x_m\n0|0|1\n", "bars"),
     ],
 )
 def test_an_empty_file_and_other_separators_are_named(tmp_path, content, named):
