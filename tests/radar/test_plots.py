@@ -714,19 +714,45 @@ def test_binary_rubbish_and_damaged_parquet_are_refused(tmp_path):
             read_plots(path)
 
 
-@pytest.mark.parametrize(("later_s", "told"), [(0.2, True), (40.0, False)])
-def test_plots_that_come_over_two_feeds_are_told(tmp_path, caplog, later_s, told):
-    range_m = np.random.default_rng(0).uniform(1e3, 5e4, 40)
-    rows = sorted((4 * k + late, f"{r:.1f},10") for k, r in enumerate(range_m) for late in (0, later_s))
-    path = write(tmp_path / "p.csv", *(f"{t},{plot}" for t, plot in rows), header="time_s,range_m,azimuth_deg")
-    read_plots(path)
-    assert ("40 of 80 plots come once more, 0.2 s later" in caplog.text) == told
+@pytest.mark.parametrize(
+    ("feeds_s", "share", "told"),
+    [
+        ((0.2,), 1, "40 of 80 plots come once more, 0.2 s later"),
+        ((0.2, 0.4), 1, "80 of 120 plots come once more, 0.4 s later"),
+        ((0.2,), 0.3, " plots come once more, 0.2 s later"),
+        ((40.0,), 1, None),
+    ],
+)
+def test_plots_that_come_over_several_feeds_are_told(tmp_path, caplog, feeds_s, share, told):
+    rng = np.random.default_rng(0)
+    plots = [(4 * k, f"{range_m:.1f},10") for k, range_m in enumerate(rng.uniform(1e3, 5e4, 40))]
+    copies = [(t + late, plot) for late in feeds_s for t, plot in plots if rng.random() < share]
+    rows = [f"{t},{plot}" for t, plot in sorted(plots + copies)]
+    read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert ("come once more" in caplog.text) == (told is not None)
+    assert (told or "") in caplog.text
 
 
-def test_an_object_that_stands_still_is_no_second_feed(tmp_path, caplog):
-    rows = [f"{k},{4 * k},1000,10" for k in range(9)]
+def test_copies_are_told_where_plots_come_back_after_a_time(tmp_path, caplog):
+    """As of an object that circles: every 40 s it is where it was."""
+    range_m = np.tile(np.random.default_rng(0).uniform(1e3, 5e4, 10), 4)
+    rows = [f"{4 * k + late},{r:.1f},10" for k, r in enumerate(range_m) for late in (0, 0.2)]
+    read_plots(write(tmp_path / "p.csv", *rows, header="time_s,range_m,azimuth_deg"))
+    assert "40 of 80 plots come once more, 0.2 s later" in caplog.text
+
+
+@pytest.mark.parametrize("scans", [2, 5, 30])
+@pytest.mark.parametrize("error_m", [0, 15])
+def test_objects_that_stand_still_are_no_second_feed(tmp_path, caplog, scans, error_m):
+    rng = np.random.default_rng(scans)
+    range_m = 1000.0 * np.arange(1, 11)
+    rows = [
+        f"{k},{4 * k},{30 * round((r + rng.normal(0, error_m)) / 30)},10"
+        for k in range(scans)
+        for r in range_m[rng.random(10) < 0.9]
+    ]
     read_plots(write(tmp_path / "p.csv", *rows, header="scan,time_s,range_m,azimuth_deg"))
-    assert "once more" not in caplog.text
+    assert "come once more" not in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -747,8 +773,11 @@ def test_parquet_that_is_damaged_within_is_refused(tmp_path, damage):
     [
         ("", "is empty"),
         ("\n\n", "is empty"),
+        ("\ufeff", "is empty"),
         ("scan;time_s;x_m\n0;0,5;1\n", "semicolons"),
         ("scan\tx_m\n0\t1\n", "tabs"),
+        ("scan;time_s;x_m;y_m,note\n0;0;1;2,here\n", "semicolons"),
+        ("scan|time_s|x_m\n0|0|1\n", "bars"),
     ],
 )
 def test_an_empty_file_and_other_separators_are_named(tmp_path, content, named):

@@ -26,14 +26,21 @@ from vidtrack.radar.checks import (
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.numbering import numbered
 from vidtrack.radar.plane import Plane
+from vidtrack.radar.rhythm import scan_times
 from vidtrack.radar.table import Table, bare, names_sensors, nearest, read_table
 
 _log = logging.getLogger(__name__)
 
 LATEST_S = 30.0
-"""s; longest delay after which a second feed brings a plot again."""
+"""s; longest delay of a copy that is looked for."""
 MOSTLY = 0.5
-"""Share of the plots that come twice, with more of which a table is of two feeds."""
+"""Share of what may be copies; with more of them at one delay, they are of one radar."""
+FEW = 0.1
+"""Share of the plots; with fewer that come again a table is not called one of two feeds."""
+FEWEST = 10
+"""Plots that come again, and scans with others, from which a second feed is told."""
+OFTEN = 0.25
+"""Share of the steps between them that are no longer than a scan: in others nothing new was seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,17 +190,26 @@ def _hint_at_several(table: Table) -> None:
 
 
 def _hint_at_copies(table: Table, plots: Plots) -> None:
-    """Warn if most plots come exactly twice within LATEST_S: a second feed would confirm a radar's false plots."""
+    """Warn of plots that come again within half a scan: a second feed would confirm a radar's false plots.
+
+    A radar sees what stands still again after a scan or more. The time of a scan is that between scans with plots that
+    did not come within LATEST_S before.
+    """
     order = np.lexsort((plots.time_s, *plots.z.T))
     z, time_s = plots.z[order], plots.time_s[order]
-    first = np.flatnonzero(np.append(True, (z[1:] != z[:-1]).any(axis=1)))
-    twice = first[np.diff(np.append(first, len(z))) == 2]
-    later_s = time_s[twice + 1] - time_s[twice]
-    later_s = later_s[later_s <= LATEST_S]
-    if 2 * len(later_s) > MOSTLY * len(z):
+    new = np.append(True, (z[1:] != z[:-1]).any(axis=1) | (np.diff(time_s) > LATEST_S))
+    first = np.flatnonzero(new)
+    last = np.append(first[1:], len(z)) - 1
+    later_s = (time_s[last] - time_s[first])[last > first]
+    _, member, begun_s = scan_times(plots.scan[order][first], time_s[first])
+    begun = np.bincount(member)
+    steps_s = np.diff(begun_s[begun >= begun.mean() / 2])
+    if len(steps_s) < FEWEST or len(z) - len(first) <= max(FEWEST, FEW * len(z)):
+        return
+    if (later_s < np.quantile(steps_s, OFTEN) / 2).mean() > MOSTLY:
         _log.warning(
-            "%s: %d of %d plots come once more, %.3g s later, as over two feeds of one radar: false plots then seem to "
-            "be confirmed; give each once", table.path, len(later_s), len(z), np.median(later_s),
+            "%s: %d of %d plots come once more, %.3g s later, as over several feeds of one radar: false plots then "
+            "seem to be confirmed; give each once", table.path, len(z) - len(first), len(z), np.median(later_s),
         )  # fmt: skip
 
 

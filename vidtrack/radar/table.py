@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ WIDE = ("utf-32-le", "utf-32-be", "utf-16-le", "utf-16-be")
 """Encodings of text that are named, since they are not read."""
 PLAIN = 0.9
 """Share of characters of a table or of NMEA that are ASCII."""
-SEPARATORS = {";": "semicolons", "\t": "tabs"}
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
 """What programs write between the cells of a line in place of commas."""
 LOOKED_AT = 4096
 """Octets from which an encoding is told."""
@@ -133,7 +134,7 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
             beginning = file.read(LOOKED_AT)
     except OSError as error:
         raise SourceError(f"cannot open {path}: {error.strerror}; give a CSV or Parquet file of plots") from None
-    if not beginning.strip() and len(beginning) < LOOKED_AT:
+    if not beginning.removeprefix(BOM_UTF8).strip() and len(beginning) < LOOKED_AT:
         raise PlotFormatError(f"{path} is empty; give a table of plots (CSV, Parquet) or a recording (ASTERIX, NMEA)")
     wide = _wide(beginning)
     if wide is not None:
@@ -152,8 +153,9 @@ def read_table(path: Path, wanted: Iterable[str]) -> Table:
         raise PlotFormatError(
             f"{path} is neither a table of plots (CSV, Parquet) nor a recording of ASTERIX or NMEA: {reason}; give one"
         ) from None
+    header = ",".join(table.column_names)
     for mark, called in SEPARATORS.items():
-        if table.num_columns == 1 and mark in table.column_names[0]:
+        if header.count(mark) >= table.num_columns:
             raise PlotFormatError(f"{path}: the cells of a line are separated by {called}; save it with commas")
     _refuse_repeated_names(path, table.column_names)
     if not len(table):

@@ -242,8 +242,8 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
         dark = seen.foreground is not None and seen.foreground.dark
         return camera.scans.scan(seen.scan, seen.tracks, number, dark=dark)
 
-    seen, again = tee(one for _, _, one in heapq.merge(plots, pictures, key=lambda one: one[:2]))
-    for one, step in zip(seen, scan_steps(enumerate(map(scan_of, again)), tracker), strict=True):
+    merged, again = tee(one for _, _, one in heapq.merge(plots, pictures, key=lambda one: one[:2]))
+    for one, step in zip(merged, scan_steps(enumerate(map(scan_of, again)), tracker), strict=True):
         if isinstance(one, Turn) and network is not None:
             network.learn(one, step.tracks)
         yield step

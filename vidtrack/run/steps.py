@@ -1,4 +1,4 @@
-"""Tracks scans that exist before the run: stored detections and radar plots."""
+"""Tracks scans: of stored detections, of radar plots, and of the radars and the camera of a road."""
 
 from __future__ import annotations
 

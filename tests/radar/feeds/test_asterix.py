@@ -229,10 +229,11 @@ def test_system_tracks_are_in_the_plane_of_the_radar(tmp_path):
     np.testing.assert_allclose(plots.z[:, 1], 111.27 * np.arange(4), atol=0.7)
 
 
-def test_a_position_beyond_a_pole_is_damage(tmp_path):
+@pytest.mark.parametrize("part", [0, 4], ids=["latitude", "longitude"])
+def test_a_position_that_is_not_on_the_earth_is_damage(tmp_path, part):
     blocks = [track(4.0 * k, 52.0, 13.0, number=7) for k in range(4)]
-    at = blocks[0].index(round(52 / 180 * 2**25).to_bytes(4, "big"))
-    blocks[0] = blocks[0][:at] + b"\x40" + blocks[0][at + 1 :]  # 360 degrees
+    at = blocks[0].index(round(52 / 180 * 2**25).to_bytes(4, "big")) + part
+    blocks[0] = blocks[0][:at] + b"\x40" + blocks[0][at + 1 :]  # over 5000 degrees
     plots = seconds(recorded(tmp_path, *blocks))
     assert len(plots) == 3
     assert plots.losses["damaged"] == 1

@@ -7,7 +7,7 @@ import pytest
 from asterix_records import block, plot
 
 from vidtrack.errors import PlotFormatError
-from vidtrack.radar.feeds import packets
+from vidtrack.radar.feeds import asterix, packets
 from vidtrack.radar.feeds.messages import Losses
 from vidtrack.radar.feeds.recording import read_messages
 
@@ -179,10 +179,41 @@ def test_a_capture_that_begins_with_other_traffic_is_read(tmp_path):
         (pcap([]), "no packet"),
         (pcap([bytes(80)], link=105), "link type 105; those that are read are 0, 1,"),
         (pcap([ETHERNET + ipv4(b"over TCP", protocol=6)]), "no whole UDP datagram"),
-        (pcapng([ETHERNET + ipv4(payload) for payload in PAYLOADS]), "none of the 3 UDP datagrams"),
+        (pcapng([ETHERNET + ipv4(payload) for payload in PAYLOADS]), "none, or only one, of the 3 UDP datagrams"),
     ],
 )
 def test_a_capture_without_plots_is_told_by_what_it_has(tmp_path, content, named):
     (tmp_path / "capture").write_bytes(content)
     with pytest.raises(PlotFormatError, match=named):
         read_messages(tmp_path / "capture", Losses())
+
+
+def test_one_datagram_among_other_traffic_makes_no_recording(tmp_path):
+    stray = ETHERNET + ipv4(block(plot(0.0, 30_000.0, 40.0)))
+    (tmp_path / "capture").write_bytes(pcap([*[ETHERNET + ipv4(payload) for payload in PAYLOADS], stray]))
+    with pytest.raises(PlotFormatError, match="only one, of the 4 UDP datagrams"):
+        read_messages(tmp_path / "capture", Losses())
+
+
+def test_no_plots_are_looked_for_within_other_traffic(tmp_path):
+    """Four blocks within a datagram that does not begin with one are none: noise would have some, too."""
+    sound = [block(plot(float(k), 30_000.0, 40.0)) for k in range(6)]
+    frames = [ETHERNET + ipv4(payload) for payload in (*sound[:2], b"\xff" * 40 + b"".join(sound[2:]))]
+    (tmp_path / "capture").write_bytes(pcap(frames))
+    losses = Losses()
+    assert len(read_messages(tmp_path / "capture", losses)) == 2
+    assert losses.damaged == 1
+
+
+def test_only_datagrams_of_its_own_format_inform_a_decoder(tmp_path, monkeypatch):
+    """Text among blocks is not read for a time of day."""
+    sound = [block(plot(float(k), 30_000.0, 40.0)) for k in range(3)]
+    sentence = b"$RATTM,01,2.00,90.0,T,0,0,T,0,0,N,,T,,120000,A\r\n"
+    (tmp_path / "capture").write_bytes(pcap([ETHERNET + ipv4(payload) for payload in (sentence, *sound)]))
+    read, decode = [], asterix.Decoder.messages
+    monkeypatch.setattr(
+        asterix.Decoder, "messages", lambda self, payload: read.append(payload) or decode(self, payload)
+    )
+    read_messages(tmp_path / "capture", Losses())
+    assert sentence not in read
+    assert len(read) == 2 * len(sound)

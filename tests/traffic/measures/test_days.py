@@ -263,7 +263,7 @@ def test_a_run_of_radar_is_refused(tmp_path):
 def test_a_damaged_table_is_told(tmp_path):
     run = Path(write_run(tmp_path / "run", [straight(1, 2.0, 50, 240, 100, 5)]))
     (run / "tracks.parquet").write_bytes(b"PAR1 and then nothing")
-    with pytest.raises(FormatError, match=r"tracks\.parquet is damaged: .*; copy it again, or track the video again$"):
+    with pytest.raises(FormatError, match=r"tracks\.parquet is damaged: .*; copy it again, or make the run again$"):
         measured([str(run)], site())
     (run / "tracks.csv").touch()
     with pytest.raises(

@@ -323,7 +323,7 @@ def _clock(body: bytes, place: Place, name: str) -> float:
 
 
 def _degrees(body: bytes, at: int, size: int, power: int) -> tuple[float, float]:
-    """Latitude and longitude, of so many octets each, in units of 180 / 2^power. Raises Damaged beyond a pole."""
+    """Latitude and longitude, of so many octets each, in units of 180 / 2^power. Raises Damaged off the earth."""
     latitude, longitude = (_signed(_whole(body, at + k, size), 8 * size) * 180 / 2**power for k in (0, size))
     if abs(latitude) > 90 or abs(longitude) > 180:
         raise Damaged

@@ -54,14 +54,14 @@ def is_capture(content: bytes) -> bool:
     return content[:4] in _PCAP or content[:4] == _PCAPNG
 
 
-def lack(content: bytes) -> str:
-    """What a capture without any known message has instead."""
+def explain_lack(content: bytes) -> str:
+    """What a capture has instead of payloads of a known format."""
     count, links = 0, set()
     for link, frame in _frames(content, Losses()):
         count += bool(_datagram(link, frame))
         links.add(link)
     if count:
-        return f"none of the {count} UDP datagrams in this capture is ASTERIX or NMEA"
+        return f"none, or only one, of the {count} UDP datagrams in this capture is ASTERIX or NMEA"
     if links and links.isdisjoint(_LINK_HEADS):
         own, read = (", ".join(map(str, sorted(each))) for each in (links, _LINK_HEADS))
         return f"the packets of this capture have link type {own}; those that are read are {read} (1: Ethernet)"

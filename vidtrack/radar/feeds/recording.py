@@ -14,9 +14,9 @@ import numpy as np
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError, PlotFormatError, SourceError
 from vidtrack.radar.feeds import asterix, nmea
-from vidtrack.radar.feeds.messages import Kind, Losses, Messages
+from vidtrack.radar.feeds.messages import Kind, Losses, Message, Messages
 from vidtrack.radar.feeds.pace import Pace, is_unknown, paced
-from vidtrack.radar.feeds.packets import is_capture, lack, payloads
+from vidtrack.radar.feeds.packets import explain_lack, is_capture, payloads
 from vidtrack.radar.feeds.plots import (
     Choice,
     Code,
@@ -61,10 +61,16 @@ def decoder_of(payload: bytes) -> type[Decoder] | None:
 
 
 def _kind(content: bytes) -> type[Decoder] | None:
-    """The decoder for most of the first payloads that have one."""
-    known = (kind for payload in payloads(content, Losses()) if (kind := decoder_of(payload)))
-    found = Counter(islice(known, _PAYLOADS))
-    return found.most_common(1)[0][0] if found else None
+    """The decoder for most of the first payloads that have one; one payload among others may have it by chance."""
+    count = 0
+    found: Counter[type[Decoder]] = Counter()
+    for payload in payloads(content, Losses()):
+        count += 1
+        if kind := decoder_of(payload):
+            found[kind] += 1
+        if found.total() == _PAYLOADS:
+            break
+    return found.most_common(1)[0][0] if found and (found.total() > 1 or count == 1) else None
 
 
 def _before_blocks(beginning: bytes) -> int:
@@ -90,7 +96,7 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
     captured = is_capture(content)
     kind = _kind(content if captured else content[:_LOOKED_AT])
     if kind is None and captured:
-        raise PlotFormatError(f"{path}: {lack(content)}")
+        raise PlotFormatError(f"{path}: {explain_lack(content)}")
     if kind is None and (trash := _before_blocks(content[:_LOOKED_AT])):
         _log.warning("%s: the first block of ASTERIX is at octet %d; what is before it is left out", path, trash)
         losses.damaged += 1
@@ -99,7 +105,12 @@ def read_messages(path: str | Path, losses: Losses) -> Messages:
         raise PlotFormatError(f"{path} is neither a recording of ASTERIX (raw, pcap, FINAL) nor of NMEA; give one")
     decoder = _informed(kind, content)
     decoder.losses = losses
-    found = [message for payload in payloads(content, losses) for message in decoder.messages(payload)]
+    found: list[Message] = []
+    for payload in payloads(content, losses):
+        if captured and decoder_of(payload) is not kind:  # other traffic, or damage at its begin
+            losses.damaged += 1
+        else:
+            found += decoder.messages(payload)
     if not found:
         raise PlotFormatError(f"{path} holds no message of a radar; {losses.damaged} damaged ones")
     return Messages.of(found)

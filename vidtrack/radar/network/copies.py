@@ -8,14 +8,11 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from vidtrack.arrays.types import Floats
+from vidtrack.radar.plots import LATEST_S, MOSTLY
 
 NEAR = 0.1
 """Standard deviations; range and azimuth of a copy differ by less. Those of two radars at one place do in one of 300
 plots: their difference has sqrt(2) standard deviations, and is so small with probability 0.06 in each."""
-LATEST_S = 30.0
-"""s; longest delay of a copy that is looked for."""
-MOSTLY = 0.5
-"""Share of the plots of the smaller of two feeds; with more of them in the other feed the two are of one radar."""
 UNLIKELY = 4.0
 """Standard deviations of the number of plots that two radars share by chance, beyond which they are one."""
 

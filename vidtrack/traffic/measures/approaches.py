@@ -30,10 +30,10 @@ def approaches(standing: Stays, gates: Gates, passed: Passed, trips: Trips, live
     gate, left_s = np.full(len(lives.track), -1), np.full(len(lives.track), np.inf)
     gate[trips.vehicle[entered]] = passed.gate[trips.entry[entered]]
     left_s[trips.vehicle] = trips.to_s
-    nearest, _, far = gates.nearest(standing.rough, among=gates.role("entry", "exit", "both"))
+    nearest, _, far = gates.nearest(standing.first_xy, among=gates.role("entry", "exit", "both"))
     away = far - gates.far(nearest, lives.head.xy[who]) > _AWAY_M
     parked = standing.end - standing.begin > _PARKED_S
-    outside = gates.role("entry", "both")[nearest] & gates.outside(nearest, standing.rough)
+    outside = gates.role("entry", "both")[nearest] & gates.outside(nearest, standing.first_xy)
     waits = outside & (far < _REACH_M) & ~away & ~parked
     known = np.where(gate[who] >= 0, gate[who], np.where(waits, nearest, -1))
     return np.where(standing.begin < left_s[who], known, -1)

@@ -113,7 +113,7 @@ def column_names(folder: Path) -> set[str]:
 
 def damaged(path: Path, error: Exception) -> FormatError:
     """What is wrong with a table of tracks, and what to do."""
-    folder, advice = path.parent, "copy it again, or track the video again"
+    folder, advice = path.parent, "copy it again, or make the run again"
     if path.suffix == ".csv":
         advice = f"vidtrack repair {folder} may help"
     elif (folder / "tracks.csv").is_file():

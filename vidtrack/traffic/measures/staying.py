@@ -23,7 +23,7 @@ _STILL_S = 1.0
 _EDGE_SHARE = 0.5
 """Of the shorter side of a box that the border cuts: while it stands none of its edges moves by more"""
 _LENS_STEPS = 8
-BEGIN, END, STOOD, X, Y, ROUGH_X, ROUGH_Y = range(7)
+BEGIN, END, STOOD, X, Y, FIRST_X, FIRST_Y = range(7)
 TRACK, ZONE, CAME, LEFT = range(4)
 
 
@@ -36,7 +36,7 @@ class Stays:
     stood           (E,) s of it that the vehicle stood; NaN without a calibration
     came, left      (E,) whether it was seen before and afterwards; else it was there before, or still is
     xy              (E, 2) where it was as soon as that was sure, in the unit of positions; NaN where it never was
-    rough           (E, 2) where it was at first, however sure
+    first_xy        (E, 2) where it was at first, however sure
     """
 
     zone: Ints
@@ -47,7 +47,7 @@ class Stays:
     came: Mask
     left: Mask
     xy: Floats
-    rough: Floats
+    first_xy: Floats
 
 
 class Staying:
@@ -117,7 +117,7 @@ class Staying:
             came=whole[first, CAME] > 0,
             left=whole[last, LEFT] > 0,
             xy=real[placed][:, [X, Y]],
-            rough=real[first][:, [ROUGH_X, ROUGH_Y]],
+            first_xy=real[first][:, [FIRST_X, FIRST_Y]],
         )
 
 
@@ -179,7 +179,7 @@ def _look(
                 if z < zones:
                     real[count, BEGIN] = t[i] - dt / 2
                 real[count, X], real[count, Y] = (x, y) if sure[i] else (np.nan, np.nan)
-                real[count, ROUGH_X], real[count, ROUGH_Y] = x, y
+                real[count, FIRST_X], real[count, FIRST_Y] = x, y
                 whole[count, TRACK], whole[count, ZONE], whole[count, CAME], whole[count, LEFT] = k, z, not new, 0
                 open_[k, z] = count
                 count += 1
