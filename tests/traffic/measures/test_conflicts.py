@@ -370,3 +370,22 @@ def test_errors_of_headings_are_those_of_the_time_where_one_turns_into_the_way_o
             sigmas.append(found.sigma[PET, 0])
         assert values[0] == values[1]
         assert (sigmas[1] > sigmas[0] + 0.01) == depends
+
+
+@pytest.mark.parametrize("turn_rad", [np.pi / 2, np.pi / 4])
+def test_the_error_by_headings_is_half_of_what_the_wait_gains_if_they_must_differ_by_two_sigmas_more(turn_rad):
+    """By the waits of all pairs of rows; on the lesser turn headings nowhere differ by so much, and it is 5 s."""
+    track, t, xy, v = bend(1, 2.0, turn_rad)
+    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
+    away = np.array([[cos, -sin], [sin, cos]])  # by which it ends on the way to the east
+    turned = np.array([60.0, 0.0]) + (xy - xy[-1]) @ away
+    rows = both(bend(0, 0.0, 0.0), (track, t, turned, v @ away))
+    base = footprints(rows.xy, np.arctan2(*rows.v.T[::-1]), np.full(len(rows), 4.0), np.full(len(rows), 1.8))
+    i, j = (k.ravel() for k in np.meshgrid(*(np.flatnonzero(rows.track == one) for one in (0, 1))))
+    apart = np.arccos(np.clip(np.sum(rows.ahead[i] * rows.ahead[j], axis=1), -1, 1))
+    hit = touching(base[i], base[j])
+    wait = [np.abs(rows.t[i] - rows.t[j])[hit & (apart >= np.radians(30) + more)].min(initial=5.0)
+            for more in (0.0, 2 * np.hypot(0.7, 0.7) / 6)]  # fmt: skip
+    sigma = [found_in(replace(rows, speed_sigma=np.full(len(rows), one))).sigma[PET, 0] for one in (0.0, 0.7)]
+    assert wait[1] > wait[0] + 0.05
+    assert np.sqrt(sigma[1] ** 2 - sigma[0] ** 2) == pytest.approx((wait[1] - wait[0]) / 2, abs=1e-6)

@@ -146,6 +146,28 @@ def test_of_two_that_fit_alike_neither_is_joined():
     assert alone.probability[0] > 0.7
 
 
+def test_a_join_is_surer_where_one_passed_an_entry_or_an_exit():
+    """As sure as it is that both ends are of one vehicle: 0.95, and between the gates 0.65."""
+    tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [10.0] * 2)
+    one, two = np.array([True, False]), np.array([False, True])
+    before, after, neither = (
+        joined(lives(tail, head), one, two, passes, 3600.0, anywhere).probability.item()
+        for passes in (one, two, one & two)
+    )
+    assert before == after
+    assert 0.9 < before < 0.95
+    assert neither == pytest.approx(before * 0.65 / 0.95)
+
+
+def test_one_that_another_has_drawn_along_is_found_near_and_at_any_velocity():
+    """At most 4 m from where it was last, in place of 15 m ahead, and it stands."""
+    tail, head = end([1.0, 0], [0.0, 0], [30.0] * 2), end([0.0, 1.5], [0.0, 4.0], [0.0] * 2)
+    one, two = np.array([True, False]), np.array([False, True])
+    assert len(joined(lives(tail, head), one, two, one, 3600.0, anywhere).before) == 1
+    head.xy[1] = 40.0
+    assert len(joined(lives(tail, head), one, two, one, 3600.0, anywhere).before) == 0
+
+
 def test_one_that_comes_back_is_another():
     """At the place where the first one was heading for, but with the opposite velocity."""
     tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [-10.0] * 2)
@@ -319,6 +341,18 @@ def test_who_passes_beside_two_exits_leaves_by_the_last_one(tmp_path, seen):
     place = site(PLACE | {"gates": gates, "movements": {}})
     rows = measured([write_run(tmp_path / "run", tracks + others, metres=True)], place).tables["crossings"].to_pylist()
     assert [row["gate"] for row in rows if row["time_s"] < 20] == ["west", "east"]
+
+
+def test_a_gate_passed_beside_is_of_its_leg_where_another_gate_of_it_is_nearer(tmp_path):
+    """Between the exit, 1.8 m aside, and the entry of the eastern leg, 0.6 m aside."""
+    gates = {"west": PLACE["gates"]["west"]} | {
+        "east_out": {"line": [[500, 460], [500, 260]], "role": "exit", "leg": "east"},
+        "east_in": {"line": [[500, 236], [500, 100]], "role": "entry", "leg": "east"},
+    }
+    track = straight(1, 10.0, 50, 242, 100, 6)
+    found = measured([write_run(tmp_path / "run", [track], metres=True)], site(PLACE | {"gates": gates})).tables
+    assert [row["gate"] for row in found["crossings"].to_pylist()] == ["west", "east_out"]
+    assert [row["complete"] for row in found["trips"].to_pylist()] == [True]
 
 
 def test_who_begins_waiting_at_an_entry_has_come_in_there(tmp_path):
