@@ -95,11 +95,12 @@ def _may(gates: Gates, allowed: Sequence[tuple[str, str]]) -> Mask:
 
 
 def _of_vehicles(gates: Gates, passed: Passed, may: Mask) -> Ints:
-    """Indices of the passings of whole vehicles: of those beside gates that no track alone needs, the needed ones."""
-    gate = np.where(passed.beside, len(gates), 0) + passed.gate
-    kept = np.flatnonzero(lasting(passed.track, gate, passed.side, passed.t))
-    kept = kept[~passed.beside[kept] | _needed(gates, passed.only(kept), may)]
-    return kept[lasting(passed.track[kept], passed.gate[kept], passed.side[kept], passed.t[kept])]
+    """Indices of the passings of whole vehicles: of those that no track alone needs, `beside`, the needed ones."""
+    beside = np.flatnonzero(passed.beside)
+    free = passed.only(beside)
+    beside = beside[lasting(free.track, free.gate, free.side, free.t)]
+    kept = np.sort(np.append(np.flatnonzero(~passed.beside), beside))
+    return kept[~passed.beside[kept] | _needed(gates, passed.only(kept), may)]
 
 
 def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
