@@ -389,3 +389,15 @@ def test_the_error_by_headings_is_half_of_what_the_wait_gains_if_they_must_diffe
     sigma = [found_in(replace(rows, speed_sigma=np.full(len(rows), one))).sigma[PET, 0] for one in (0.0, 0.7)]
     assert wait[1] > wait[0] + 0.05
     assert np.sqrt(sigma[1] ** 2 - sigma[0] ** 2) == pytest.approx((wait[1] - wait[0]) / 2, abs=1e-6)
+
+
+def test_who_slides_along_another_is_closed_up_to_from_behind_if_at_all():
+    """Beside each other by their widths: rounding may have it that they touch, but not when."""
+    angle = np.arange(100) / 100 * 2 * np.pi + 0.013
+    ahead = np.column_stack([np.cos(angle), np.sin(angle)])
+    place = 7.3 * ahead + 2.0 * np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    xy = np.stack([np.zeros_like(place), place], axis=1).reshape(-1, 2)
+    v = np.stack([14.7 * ahead, 4.9 * ahead], axis=1).reshape(-1, 2)
+    ttc = found_in(rows_of(np.arange(200), np.repeat(10.0 * np.arange(100), 2), xy, v)).value[TTC]
+    assert 0 < len(ttc) < 100
+    assert ttc == pytest.approx((7.3 - 4) / 9.8)
