@@ -5,8 +5,8 @@
 Each CLIP is a folder of `vidtrack simulate`, with its tracks in CLIP/run, as in `score_measures.py`. A crossing is
 right within 1 s at its gate and direction; a trip with both legs and both times within 5 s, as a turning count asks
 for it.
-The second table has the joins of stretches of which one passed an entry or an exit, and the others, which make no
-trip: what probability they state, and how many of them are of one true vehicle, the one that is nearest to where the
+The second table has the joins of stretches of which one passed an entry or an exit, as `joined` is told, and the
+others: what probability they state, and how many of them are of one true vehicle, the one that is nearest to where the
 one stretch ends, within 8 m, and also to where the other begins.
 """
 
@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numba
 import numpy as np
@@ -114,7 +115,8 @@ def nearest(vehicles: np.ndarray, end: End, k: int) -> int:
 def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool, bool]]]:
     """True, told and right crossings, then trips (6,); the probabilities of joins, if they are right, and if a stretch
     passed an entry or an exit."""
-    found = journeys.journeys(one.gates, one.passing.passed(), one.lives, one.spans, True, one.allowed)
+    with patch.object(journeys, "joined", wraps=journeys.joined) as asked:
+        found = journeys.journeys(one.gates, one.passing.passed(), one.lives, one.spans, True, one.allowed)
     passed, told = found.passed, found.trips
     score_measures.TOLERANCE_S = CROSSING_S
     crossed = [(way, t) for way, t in zip(zip(*way_names(one.gates, passed), strict=True), passed.t, strict=True)]
@@ -128,9 +130,8 @@ def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool, bool]]]:
     of = [
         [nearest(one.vehicles, end, k) for k in who] for end, who in zip(ends, (made.before, made.after), strict=True)
     ]
-    role = passed.track[one.gates.role("entry", "exit", "both")[passed.gate]]
-    gated = np.isin(made.before, role) | np.isin(made.after, role)
-    joined = [(float(p), a == b != -1, bool(g)) for p, a, b, g in zip(made.probability, *of, gated, strict=True)]
+    gated = [bool(asked.call_args.args[3][[*pair]].any()) for pair in zip(made.before, made.after, strict=True)]
+    joined = [(float(p), a == b != -1, g) for p, a, b, g in zip(made.probability, *of, gated, strict=True)]
     return np.array([len(one.crossed), len(crossed), hits, len(one.moved), len(moved), len(right)]), joined
 
 

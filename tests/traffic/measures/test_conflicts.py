@@ -370,3 +370,34 @@ def test_errors_of_headings_are_those_of_the_time_where_one_turns_into_the_way_o
             sigmas.append(found.sigma[PET, 0])
         assert values[0] == values[1]
         assert (sigmas[1] > sigmas[0] + 0.01) == depends
+
+
+@pytest.mark.parametrize("turn_rad", [np.pi / 2, np.pi / 4])
+def test_the_error_by_headings_is_half_of_what_the_wait_gains_if_they_must_differ_by_two_sigmas_more(turn_rad):
+    """By the waits of all pairs of rows; on the lesser turn headings nowhere differ by so much, and it is 5 s."""
+    track, t, xy, v = bend(1, 2.0, turn_rad)
+    cos, sin = np.cos(turn_rad), np.sin(turn_rad)
+    away = np.array([[cos, -sin], [sin, cos]])  # by which it ends on the way to the east
+    turned = np.array([60.0, 0.0]) + (xy - xy[-1]) @ away
+    rows = both(bend(0, 0.0, 0.0), (track, t, turned, v @ away))
+    base = footprints(rows.xy, np.arctan2(*rows.v.T[::-1]), np.full(len(rows), 4.0), np.full(len(rows), 1.8))
+    i, j = (k.ravel() for k in np.meshgrid(*(np.flatnonzero(rows.track == one) for one in (0, 1))))
+    apart = np.arccos(np.clip(np.sum(rows.ahead[i] * rows.ahead[j], axis=1), -1, 1))
+    hit = touching(base[i], base[j])
+    wait = [np.abs(rows.t[i] - rows.t[j])[hit & (apart >= np.radians(30) + more)].min(initial=5.0)
+            for more in (0.0, 2 * np.hypot(0.7, 0.7) / 6)]  # fmt: skip
+    sigma = [found_in(replace(rows, speed_sigma=np.full(len(rows), one))).sigma[PET, 0] for one in (0.0, 0.7)]
+    assert wait[1] > wait[0] + 0.05
+    assert np.sqrt(sigma[1] ** 2 - sigma[0] ** 2) == pytest.approx((wait[1] - wait[0]) / 2, abs=1e-6)
+
+
+def test_who_slides_along_another_is_closed_up_to_from_behind_if_at_all():
+    """Beside each other by their widths: rounding may have it that they touch, but not when."""
+    angle = np.arange(100) / 100 * 2 * np.pi + 0.013
+    ahead = np.column_stack([np.cos(angle), np.sin(angle)])
+    place = 7.3 * ahead + 2.0 * np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    xy = np.stack([np.zeros_like(place), place], axis=1).reshape(-1, 2)
+    v = np.stack([14.7 * ahead, 4.9 * ahead], axis=1).reshape(-1, 2)
+    ttc = found_in(rows_of(np.arange(200), np.repeat(10.0 * np.arange(100), 2), xy, v)).value[TTC]
+    assert 0 < len(ttc) < 100
+    assert ttc == pytest.approx((7.3 - 4) / 9.8)

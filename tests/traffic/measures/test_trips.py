@@ -5,7 +5,9 @@ import pytest
 from drawn_runs import CALIBRATED, FPS, along, site, straight, write_run
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import PchipInterpolator
 
+from vidtrack.traffic.measures.beyond import INFERRED_SURE
 from vidtrack.traffic.measures.joins import LONGEST_S, found_again, joined, marginals
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.stretches import End, Lives
@@ -142,6 +144,28 @@ def test_of_two_that_fit_alike_neither_is_joined():
     alone = joined(lives(tail, head), one, np.array([False, True, False]), one, 3600.0, anywhere)
     assert (alone.before.tolist(), alone.after.tolist()) == ([0], [1])
     assert alone.probability[0] > 0.7
+
+
+def test_a_join_is_surer_where_one_passed_an_entry_or_an_exit():
+    """As sure as it is that both ends are of one vehicle: 0.95, and between the gates 0.65."""
+    tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [10.0] * 2)
+    one, two = np.array([True, False]), np.array([False, True])
+    before, after, neither = (
+        joined(lives(tail, head), one, two, passes, 3600.0, anywhere).probability.item()
+        for passes in (one, two, one & two)
+    )
+    assert before == after
+    assert 0.9 < before < 0.95
+    assert neither == pytest.approx(before * 0.65 / 0.95)
+
+
+def test_one_that_another_has_drawn_along_is_found_near_and_at_any_velocity():
+    """At most 4 m from where it was last, in place of 15 m ahead, and it stands."""
+    tail, head = end([1.0, 0], [0.0, 0], [30.0] * 2), end([0.0, 1.5], [0.0, 4.0], [0.0] * 2)
+    one, two = np.array([True, False]), np.array([False, True])
+    assert len(joined(lives(tail, head), one, two, one, 3600.0, anywhere).before) == 1
+    head.xy[1] = 40.0
+    assert len(joined(lives(tail, head), one, two, one, 3600.0, anywhere).before) == 0
 
 
 def test_one_that_comes_back_is_another():
@@ -289,6 +313,46 @@ def test_a_joined_vehicle_has_left_where_it_passes_beside_an_exit(tmp_path, lost
     assert (row["complete"], row["tracks"], row["exit_gate"]) == (True, 2, "east")
     exits = [row for row in found["crossings"].to_pylist() if row["gate"] == "east" and row["time_s"] < 16]
     assert [(row["reason"], row["time_s"]) for row in exits] == [("inferred", pytest.approx(14.5, abs=0.05))]
+
+
+@pytest.mark.parametrize("seen", [[(10.0, 19.0)], [(10.0, 12.8), (13.5, 19.0)]])
+def test_a_joined_vehicle_leaves_once_where_it_drives_to_and_fro_beside_an_exit(tmp_path, seen):
+    """As one whose track is whole: out, back after 0.6 s, and out again, 2 m beside the eastern gate."""
+    gates = PLACE["gates"] | {"east": {"line": [[500, 460], [500, 260]], "role": "exit"}}
+    driven = PchipInterpolator([10, 13, 14, 14.8, 15.4, 16, 17, 19], [50, 350, 450, 506, 494, 506, 540, 640])
+    times = [np.arange(*span, 0.04) for span in seen]
+    tracks = [along(1 + k, t, driven(t), np.full(len(t), 240.0)) for k, t in enumerate(times)]
+    others = [straight(10 + k, 20.0 + 10 * k, 50, 300, 100, 5) for k in range(3)]
+    found = measured([write_run(tmp_path / "run", tracks + others, metres=True)], site(PLACE | {"gates": gates})).tables
+    trip = next(row for row in found["trips"].to_pylist() if row["track_id"] == 1)
+    assert (trip["tracks"], trip["complete"]) == (len(seen), True)
+    exits = [row for row in found["crossings"].to_pylist() if row["gate"] == "east" and row["time_s"] < 20]
+    assert [row["reason"] for row in exits] == ["inferred"]
+    assert exits[0]["confidence"] == pytest.approx(INFERRED_SURE * trip["join_confidence"], abs=1e-3)
+
+
+@pytest.mark.parametrize("seen", [[(10.0, 15.0)], [(10.0, 12.0), (12.8, 15.0)]])
+def test_who_passes_beside_two_exits_leaves_by_the_last_one(tmp_path, seen):
+    """They are of two legs; the track is whole, or broken before both."""
+    exits = {name: {"line": [[x, 460], [x, 260]], "role": "exit"} for name, x in (("middle", 300), ("east", 500))}
+    gates = {"west": PLACE["gates"]["west"]} | exits
+    tracks = [straight(k, begin, 50 + 100 * (begin - 10), 240, 100, end - begin) for k, (begin, end) in enumerate(seen)]
+    others = [straight(10 + k, 20.0 + 10 * k, 50, 300, 100, 5) for k in range(3)]
+    place = site(PLACE | {"gates": gates, "movements": {}})
+    rows = measured([write_run(tmp_path / "run", tracks + others, metres=True)], place).tables["crossings"].to_pylist()
+    assert [row["gate"] for row in rows if row["time_s"] < 20] == ["west", "east"]
+
+
+def test_a_gate_passed_beside_is_of_its_leg_where_another_gate_of_it_is_nearer(tmp_path):
+    """Between the exit, 1.8 m aside, and the entry of the eastern leg, 0.6 m aside."""
+    gates = {"west": PLACE["gates"]["west"]} | {
+        "east_out": {"line": [[500, 460], [500, 260]], "role": "exit", "leg": "east"},
+        "east_in": {"line": [[500, 236], [500, 100]], "role": "entry", "leg": "east"},
+    }
+    track = straight(1, 10.0, 50, 242, 100, 6)
+    found = measured([write_run(tmp_path / "run", [track], metres=True)], site(PLACE | {"gates": gates})).tables
+    assert [row["gate"] for row in found["crossings"].to_pylist()] == ["west", "east_out"]
+    assert [row["complete"] for row in found["trips"].to_pylist()] == [True]
 
 
 def test_who_begins_waiting_at_an_entry_has_come_in_there(tmp_path):

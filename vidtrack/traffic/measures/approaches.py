@@ -1,8 +1,8 @@
 """On their way from which leg vehicles stand: by the gate that they enter by, until they leave.
 
-Who is not seen to enter or to leave, since the watching ends before or its track does, is on the approach of an entry
-if of all entries and exits this is the nearest, if it stands outside, has not driven away from it, and does not stand
-for so long that it is parked.
+Who is not seen to enter, since the watching ends before or its track does, or since it passes far beside the gate, is
+on the approach of an entry if of all entries and exits this is the nearest, if it stands outside, has not driven away
+from it, and does not stand for so long that it is parked.
 """
 
 from __future__ import annotations

@@ -67,8 +67,9 @@ def encroachments(bodies: Bodies, since: float, until: float) -> Encounters:
     found = _details(first, second, steps)
     counts = (found.rank > 0) & (found.value > _SURE * found.sigma) & (_SURE * found.sigma < PET_S)
     counts[counts] = ~_follows(i[counts], j[counts], track, rectangle)
-    turned = _SURE * np.hypot(first.heading_sigma, second.heading_sigma)
-    by_heading = _longer(i, j, turned, track, rectangle) / _SURE
+    turned = _SURE * np.hypot(first.heading_sigma, second.heading_sigma)[counts]
+    by_heading = np.zeros(len(found))
+    by_heading[counts] = _longer(i[counts], j[counts], turned, track, rectangle) / _SURE
     return replace(found, value=np.where(counts, found.value, np.nan), sigma=np.hypot(found.sigma, by_heading))
 
 

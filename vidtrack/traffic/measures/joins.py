@@ -68,6 +68,12 @@ class Joins:
             first = first[first]
         return first
 
+    def likely(self, vehicle: Ints) -> Floats:
+        """(T,) that all stretches of the vehicle of each number are its own; vehicle (T,) as `vehicles` has it."""
+        sure = np.ones(len(vehicle))
+        np.multiply.at(sure, vehicle[self.after], self.probability)
+        return sure
+
 
 def joined(
     lives: Lives, ends: Mask, begins: Mask, passes: Mask, watched_s: float, allowed: Callable[[Ints, Ints], Mask]

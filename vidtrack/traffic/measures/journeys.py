@@ -54,13 +54,15 @@ def journeys(
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
+    together = joins.likely(vehicle)[vehicle]
     across = _across(gates, lives, joins, passed)
+    across, joint = across.of(joins.before[across.track]).nowhere(), joins.probability[across.track]
+    joint = np.where(across.beside, together[across.track], joint)
     reason = [*reasons(passed), *(["joined"] * len(across)), *reasons(spare)]
-    probability = np.concatenate([confidence(passed), joins.probability[across.track], confidence(spare)])
+    probability = np.concatenate([confidence(passed), joint, together[spare.track] * confidence(spare)])
     free = np.concatenate([np.zeros(len(passed), bool), across.beside, spare.beside])
-    passed = passed.and_also(across.of(joins.before[across.track]).nowhere()).and_also(spare)
-    whole = replace(passed, track=vehicle[passed.track], beside=free)  # those that no track alone needs
-    kept = np.flatnonzero(~free | _needed(gates, whole, may))
+    passed = passed.and_also(across).and_also(spare)
+    kept = _of_vehicles(gates, replace(passed, track=vehicle[passed.track], beside=free), may)
     passed, probability, reason = passed.only(kept), probability[kept], [reason[k] for k in kept.tolist()]
     probability = np.where(passed.beside, INFERRED_SURE, 1.0) * probability
     reason = ["inferred" if off else why for off, why in zip(passed.beside.tolist(), reason, strict=True)]
@@ -92,8 +94,18 @@ def _may(gates: Gates, allowed: Sequence[tuple[str, str]]) -> Mask:
     return may
 
 
+def _of_vehicles(gates: Gates, passed: Passed, may: Mask) -> Ints:
+    """Indices of the passings of whole vehicles: of those that no track alone needs, `beside`, the needed ones."""
+    beside = np.flatnonzero(passed.beside)
+    free = passed.only(beside)
+    beside = beside[lasting(free.track, free.gate, free.side, free.t)]
+    kept = np.sort(np.append(np.flatnonzero(~passed.beside), beside))
+    return kept[~passed.beside[kept] | _needed(gates, passed.only(kept), may)]
+
+
 def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
-    """(P,) passings beside a gate without which a trip that may be would have no entry, or no exit."""
+    """(P,) passings beside a gate without which a trip that may be would have no entry, or no exit: the first one that
+    enters, and the last one that leaves."""
     drawn, beside = ~passed.beside, passed.beside.copy()
     k = np.flatnonzero(beside)
     beside[k] = gates.leg[gates.nearest(gates.place(passed.gate[k], passed.along[k]))[0]] == gates.leg[passed.gate[k]]
@@ -103,7 +115,9 @@ def _needed(gates: Gates, passed: Passed, may: Mask) -> Mask:
     t, leg_of = np.append(passed.t, np.nan), np.append(leg, -1)
     enters &= beside & inwards & (entry < 0) & (t[exit_] > passed.t) & may[leg, leg_of[exit_]]
     leaves &= beside & ~inwards & (exit_ < 0) & (t[entry] < passed.t) & may[leg_of[entry], leg]
-    return np.asarray(enters | leaves)
+    entry, exit_ = _ends(passed, enters, leaves)
+    number = np.arange(len(passed))
+    return np.asarray((number == entry) | (number == exit_))
 
 
 def _of_another(gates: Gates, passed: Passed, lives: Lives, may: Mask) -> Mask:

@@ -231,8 +231,6 @@ class _Figures:
         ]
         whole_tracks = np.unique(np.column_stack([self.vehicle, self.session, self.track_id]), axis=0)[:, 0]
         count = np.bincount(whole_tracks, minlength=len(self.vehicle))[trips.vehicle]
-        sure = np.ones(len(self.vehicle))
-        np.multiply.at(sure, self.vehicle[self.joins.after], self.joins.probability)
         length, pace = self.length[trips.vehicle], self._trip_speeds()
         return table(
             {
@@ -255,7 +253,7 @@ class _Figures:
                 "possible": ("yes", possible),
                 "reason": ("", trips.reasons()),
                 "tracks": ("n", count),
-                "join_confidence": ("1", sure[trips.vehicle]),
+                "join_confidence": ("1", self.joins.likely(self.vehicle)[trips.vehicle]),
             }
         )
 
