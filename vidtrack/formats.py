@@ -341,3 +341,13 @@ def _refuse_repeated(frame: Ints, identity: Ints, place: Place) -> None:
         k = int(np.argmax(again))
         first, second = order[k], order[k + 1]
         raise FormatError(f"{place(second)}: id {identity[second]} stands twice in a frame, first at {place(first)}")
+
+
+def damaged(path: Path, error: Exception) -> FormatError:
+    """What is wrong with a table of tracks, and what to do."""
+    folder, advice = path.parent, "copy it again, or make the run again"
+    if path.suffix == ".csv":
+        advice = f"vidtrack repair {folder} may help"
+    elif (folder / "tracks.csv").is_file():
+        advice = f"vidtrack repair {folder} makes it from tracks.csv"
+    return FormatError(f"{path} is damaged: {' '.join(str(error).split())}; {advice}")  # some errors have several lines

@@ -18,6 +18,7 @@ from vidtrack.associate.tracks_of_runs import Histories, parallel, same_targets
 from vidtrack.config.settings import Settings
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.estimate.intersection import intersection
+from vidtrack.formats import damaged
 from vidtrack.output.radar_plot import RadarPlot
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
@@ -26,7 +27,6 @@ from vidtrack.radar.plane import Plane, plane_of_run
 from vidtrack.run.run import Pipeline, Run
 from vidtrack.scan import Scan
 from vidtrack.tracks import CONFIRMED, Tracks
-from vidtrack.traffic.measures.blocks import damaged
 
 _log = logging.getLogger(__name__)
 

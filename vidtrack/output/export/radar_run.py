@@ -12,8 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from vidtrack.errors import ConfigError, FormatError
+from vidtrack.formats import damaged
 from vidtrack.radar.plane import Plane, plane_of_run
-from vidtrack.traffic.measures.blocks import damaged
 
 _BATCH = 1 << 16
 _NEEDED = ("scan", "time_s", "track_id", "status", "x_m", "y_m", "vx_m_s", "vy_m_s", "sigma_x_m", "sigma_y_m")

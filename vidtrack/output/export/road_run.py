@@ -15,9 +15,10 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.errors import ConfigError, FormatError, SourceError
+from vidtrack.formats import damaged
 from vidtrack.output.export.whole_tracks import WholeTracks
 from vidtrack.traffic.lengths import UNKNOWN
-from vidtrack.traffic.measures.blocks import column_names, damaged, whole_pictures
+from vidtrack.traffic.measures.blocks import column_names, whole_pictures
 from vidtrack.traffic.measures.rows import BOX, EDGE_COLUMNS
 from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.site import Site, read_site

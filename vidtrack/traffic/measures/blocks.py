@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 
 from vidtrack.arrays.types import Floats
 from vidtrack.errors import FormatError
+from vidtrack.formats import damaged
 from vidtrack.traffic.measures.runs import ended
 
 BLOCK = 1 << 16
@@ -109,16 +110,6 @@ def column_names(folder: Path) -> set[str]:
             return set(file.readline().strip().split(","))
     except UnicodeDecodeError as error:
         raise damaged(path, error) from None
-
-
-def damaged(path: Path, error: Exception) -> FormatError:
-    """What is wrong with a table of tracks, and what to do."""
-    folder, advice = path.parent, "copy it again, or make the run again"
-    if path.suffix == ".csv":
-        advice = f"vidtrack repair {folder} may help"
-    elif (folder / "tracks.csv").is_file():
-        advice = f"vidtrack repair {folder} makes it from tracks.csv"
-    return FormatError(f"{path} is damaged: {' '.join(str(error).split())}; {advice}")  # some errors have several lines
 
 
 def numbers(table: pa.Table, name: str) -> Floats:
