@@ -171,8 +171,8 @@ def main() -> None:
         print(f"| {name} | {right} of {told} | {right_trips} of {trips_} |", flush=True)
     print("\n| joins | probability | joins | its mean | right |")
     print("|---|---|---|---|---|")
-    sure, good, gated = (np.array(column) for column in zip(*joined, strict=True))
-    for name, chosen in (("passed an entry or an exit", gated), ("others", ~gated)):
+    sure, good, gated = np.array(joined, float).reshape(-1, 3).T
+    for name, chosen in (("passed an entry or an exit", gated == 1), ("others", gated == 0)):
         for low, high in pairwise(BINS):
             mine = chosen & (sure > low) & (sure <= high)
             if mine.any():

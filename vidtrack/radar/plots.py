@@ -31,7 +31,7 @@ from vidtrack.radar.table import Table, bare, names_sensors, nearest, read_table
 
 _log = logging.getLogger(__name__)
 
-LATEST_S = 30.0
+LATEST_COPY_S = 30.0
 """s; longest delay of a copy that is looked for."""
 MOSTLY = 0.5
 """Share of what may be copies; with more of them at one delay, they are of one radar."""
@@ -193,11 +193,11 @@ def _hint_at_copies(table: Table, plots: Plots) -> None:
     """Warn of plots that come again within half a scan: a second feed would confirm a radar's false plots.
 
     A radar sees what stands still again after a scan or more. The time of a scan is that between scans with plots that
-    did not come within LATEST_S before.
+    did not come within LATEST_COPY_S before.
     """
     order = np.lexsort((plots.time_s, *plots.z.T))
     z, time_s = plots.z[order], plots.time_s[order]
-    new = np.append(True, (z[1:] != z[:-1]).any(axis=1) | (np.diff(time_s) > LATEST_S))
+    new = np.append(True, (z[1:] != z[:-1]).any(axis=1) | (np.diff(time_s) > LATEST_COPY_S))
     first = np.flatnonzero(new)
     last = np.append(first[1:], len(z)) - 1
     later_s = (time_s[last] - time_s[first])[last > first]

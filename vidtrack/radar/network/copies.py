@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from vidtrack.arrays.types import Floats
-from vidtrack.radar.plots import LATEST_S, MOSTLY
+from vidtrack.radar.plots import LATEST_COPY_S, MOSTLY
 
 NEAR = 0.1
 """Standard deviations; range and azimuth of a copy differ by less. Those of two radars at one place do in one of 300
@@ -65,7 +65,7 @@ def copies(first: Measured, second: Measured) -> Copies:
     found = np.isfinite(distance)
     if not found.any():
         return Copies(0, len(few), 0.0, np.zeros(len(few)))
-    later_s = LATEST_S * (many[partner[found], 0] - few[found, 0])
+    later_s = LATEST_COPY_S * (many[partner[found], 0] - few[found, 0])
     delay_s = float(np.median(later_s))
     same = int((np.abs(later_s - delay_s) <= min(first.scan_s, second.scan_s) / 2).sum())
     chance = _chance(few, many, scan_s) if same > MOSTLY * len(few) else np.zeros(len(few))
@@ -75,12 +75,12 @@ def copies(first: Measured, second: Measured) -> Copies:
 def _chance(few: Floats, many: Floats, scan_s: float) -> Floats:
     """(N,) share of the other scans of a feed `many` (M, 4) with a plot where each of `few` (N, 4) is."""
     there = KDTree(many[:, 1:]).query_ball_point(few[:, 1:], 1.0, p=np.inf, return_length=True)
-    scans = 1 + LATEST_S * np.ptp(many[:, 0]) / scan_s
+    scans = 1 + LATEST_COPY_S * np.ptp(many[:, 0]) / scan_s
     return np.asarray(np.clip((there - 1) / max(scans - 1, 1), 0, 1))
 
 
 def _scaled(feed: Measured, sigma: Floats) -> Floats:
     """(N, 4) time, range and direction of each different plot, so that those of copies differ by less than one."""
     direction = np.column_stack([np.cos(feed.azimuth), np.sin(feed.azimuth)]) / sigma[1]
-    plots = np.column_stack([feed.time_s / LATEST_S, np.column_stack([feed.range_m / sigma[0], direction]) / NEAR])
+    plots = np.column_stack([feed.time_s / LATEST_COPY_S, np.column_stack([feed.range_m / sigma[0], direction]) / NEAR])
     return np.unique(plots, axis=0)
