@@ -175,8 +175,7 @@ def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -
     """Whether two regions are each like a vehicle."""
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
     if not np.isnan(typical[i, 0]):
-        usual = typical[i, 0] * typical[i, 1]
-        return min(a, b) >= _LIKE * usual
+        return a >= _LIKE * typical[i, 0] * typical[i, 1] and b >= _LIKE * typical[j, 0] * typical[j, 1]
     union = _union(box[i], box[j])
     filled = area[i] > _LIKE_FILL * a and area[j] > _LIKE_FILL * b
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
