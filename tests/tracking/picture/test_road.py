@@ -44,16 +44,16 @@ def test_a_perspective_field_is_found_though_three_of_ten_samples_are_fragments(
         np.testing.assert_allclose(typical, perspective(y), rtol=0.2)
 
 
-def test_nothing_is_typical_before_five_vehicles_drove():
+def test_nothing_is_typical_before_three_vehicles_drove():
     sizes = SizeField(WIDTH, HEIGHT)
 
     def learn(tracks):
         sizes.learn(tracks, np.ones(len(tracks), bool))
 
-    drive(learn, perspective, vehicles=4)
+    drive(learn, perspective, vehicles=2)
     assert not sizes.known
     assert np.isnan(sizes.typical(np.array([[10.0, 10, 20, 10]]))).all()
-    drive(learn, perspective, vehicles=1, first=4)
+    drive(learn, perspective, vehicles=1, first=2)
     assert sizes.known
 
 
@@ -80,6 +80,14 @@ def test_a_standing_vehicle_is_one_sample():
     for k in range(500):
         sizes.learn(tracks_of(100 + k / 5, [at_bottom(160, 140, (90, 70))], ids=[99]), np.ones(1, bool))
     np.testing.assert_allclose(sizes.typical(np.array([at_bottom(160, 140, (20, 10))])), before, rtol=0.1)
+
+
+def test_accelerations_are_in_the_sizes_of_vehicles_at_the_place_or_of_what_is_larger():
+    road = Road(WIDTH, HEIGHT)
+    motorcycle, lorry = at_bottom(160, 140, (8, 10)), at_bottom(160, 140, (90, 70))
+    np.testing.assert_array_equal(road.scale(np.array([motorcycle, lorry])), [10, 90])  # nothing is known
+    drive(road.learn, perspective, vehicles=6)
+    np.testing.assert_allclose(road.scale(np.array([motorcycle, lorry])), [perspective(140)[0], 90], rtol=0.05)
 
 
 def test_a_field_stays_while_vehicles_differ_too_much_for_another_one():

@@ -17,9 +17,9 @@ NOBODY = np.empty((0, 4))
 
 
 def grouped(box, predicted=NOBODY, typical=CAR, area=None, gap=0.05, link=None, flake=0.0):
-    """Group of each box (R, 4), where it is known that vehicles are as large as `typical`; None: it is not."""
+    """Group of each box (R, 4), where vehicles are known to be as large as `typical`, (2,) or (R, 2); None: unknown."""
     box = np.asarray(box, float)
-    usual = np.tile(np.full(2, np.nan) if typical is None else typical, (len(box), 1))
+    usual = np.broadcast_to(np.full(2, np.nan) if typical is None else typical, (len(box), 2)).astype(float)
     area = box[:, 2] * box[:, 3] if area is None else np.asarray(area, float)
     link = np.arange(len(box)) if link is None else np.asarray(link)
     group, count = together(box, area, link, np.asarray(predicted, float), usual, flake, True, 0.7, gap)
@@ -45,6 +45,12 @@ def test_a_flake_is_a_piece_of_nothing():
 @pytest.mark.parametrize("typical", [CAR, None])
 def test_two_regions_that_are_each_like_a_vehicle_are_two_whoever_was_predicted(typical):
     assert grouped([[10, 10, 35, 18], [30, 30, 35, 18]], [[8, 8, 60, 42]], typical, gap=0.5) == [0, 1]
+
+
+def test_a_far_vehicle_is_no_piece_of_a_near_one_in_whose_predicted_box_it_is():
+    far, near = [30, 10, 18, 9], [10, 22, 60, 30]
+    assert grouped([far, near], [[8, 8, 64, 46]], [(20, 10), (60, 30)], gap=0.5) == [0, 1]
+    assert grouped([far, near], [[8, 8, 64, 46]], [(60, 30), (60, 30)], gap=0.5) == [0, 0]  # as large as a vehicle's part
 
 
 def test_a_small_piece_beside_a_vehicle_belongs_to_it_though_nobody_predicted_it():
