@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.measures.blocks import blocks
-from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
+from vidtrack.traffic.measures.intervals import NOBODY, coverage, edges_of, figures
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
 
@@ -89,6 +89,35 @@ def test_zeros_are_written_and_what_nobody_watched_is_empty(tmp_path):
     assert [row["count"] for row in back] == [0, 0, None, None, 0, 0]
 
 
+def bounds(found, gate, direction):
+    rows = found.tables["intervals"].to_pylist()
+    row = next(row for row in rows if row["gate"] == gate and row["direction"] == direction and row["begin_s"] <= 0)
+    return row["count_low"], row["count"], row["count_high"]
+
+
+@pytest.mark.parametrize(("listed", "high"), [(True, 1), (False, 0)])
+def test_who_vanishes_between_the_gates_may_have_left_where_it_may(tmp_path, listed, high):
+    """By the only exit, if the site lists all ways; else perhaps by a way without a gate. One that left has left."""
+    place = site(CALIBRATED | ({"movements": {"allowed": [["west", "east"]]}} if listed else {}))
+    lost = measured([write_run(tmp_path / "lost", [straight(1, 2.0, 50, 240, 100, 3)], metres=True)], place)
+    assert bounds(lost, "west", "right") == (1, 1, 1)
+    assert bounds(lost, "east", "right") == (0, 0, high)
+    whole = measured([write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], metres=True)], place)
+    assert bounds(whole, "east", "right") == (1, 1, 1)
+
+
+@pytest.mark.parametrize(("words", "step"), [("confirmed", -100), ("merged", 100)])
+def test_passings_out_over_an_entry_or_in_a_blob_are_doubtful(tmp_path, words, step):
+    """Perhaps it was none, or another vehicle: the bounds hold 0, too."""
+    track = straight(1, 2.0, 300 - 2.5 * step, 240, step, 5)
+    found = measured(
+        [write_run(tmp_path / "run", [track], metres=True, status=np.full(len(track[1]), words))], site(CALIBRATED)
+    )
+    rows = [row for row in found.tables["crossings"].to_pylist() if row["gate"] == "west"]
+    assert [row["confidence"] < 0.9 for row in rows] == [True]
+    assert bounds(found, "west", rows[0]["direction"]) == (0, 1, 1)
+
+
 def test_files_follow_each_other_and_a_vehicle_of_one_is_none_of_the_other(tmp_path):
     runs = [write_run(tmp_path / name, [straight(1, 2.0, 50, 240, 100, 5)], seconds=10) for name in "ab"]
     found = measured(runs, site())
@@ -117,7 +146,7 @@ def test_figures_are_those_of_their_definitions(events):
         v, 0.3 * np.ones(n), 0.2 * np.ones(n), 0 * t, ~yes,
     )  # fmt: skip
     edges, watched = np.arange(5) * 10.0, np.array([1.0, 1.0, 0.5, 0.0])
-    found = figures(passed, np.full(n, 0.9), np.full(n, 4.0), edges, watched, ways=4)
+    found = figures(passed, np.full(n, 0.9), NOBODY, np.full(n, 4.0), edges, watched, ways=4)
     for w in range(4):
         for k in range(3):
             mine = (way == w) & (t >= edges[k]) & (t < edges[k + 1])
@@ -148,7 +177,7 @@ def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():
         np.zeros(n), way // 2, np.arange(n), way, *np.ones((4, n)), yes, ~yes,
         speed, *np.ones((2, n)), np.zeros(n), ~yes,
     )  # fmt: skip
-    found = figures(passed, np.ones(n), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=2)
+    found = figures(passed, np.ones(n), NOBODY, np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=2)
     assert found.v85[0, 0] == pytest.approx(np.quantile(speed[:23], 0.85))
     assert np.isnan(found.v85[1, 0])
     assert np.isfinite(found.time_mean).all()

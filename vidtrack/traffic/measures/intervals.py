@@ -64,6 +64,18 @@ class Figures:
     density: Floats
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Unseen:
+    """U passings that nobody saw: when [s], which way (gate and direction), and with what chance; all (U,)."""
+
+    t: Floats
+    way: Ints
+    chance: Floats
+
+
+NOBODY = Unseen(np.empty(0), np.empty(0, int), np.empty(0))
+
+
 def figure_columns(found: Figures) -> dict[str, tuple[str, Any]]:
     """The figures as columns name -> (unit, values) of a table, way by way."""
     return {
@@ -81,14 +93,23 @@ def figure_columns(found: Figures) -> dict[str, tuple[str, Any]]:
     }
 
 
-def figures(passed: Passed, confidence: Floats, length: Floats, edges: Floats, watched: Floats, ways: int) -> Figures:
+def figures(
+    passed: Passed, confidence: Floats, unseen: Unseen, length: Floats, edges: Floats, watched: Floats, ways: int
+) -> Figures:
     """Sum up passings. Where nobody watched all is NaN, else zeros are written.
+
+    The number is a sum of passings that were as their confidences say, of unseen ones, and of a Poisson number while
+    nobody watched; its bounds are those of normal distributions, half a vehicle less than a quantile of whole numbers.
 
     watched  (I,) or (W, I) the coverage
     """
     bins = len(edges) - 1
-    interval = np.clip(np.searchsorted(edges, passed.t, side="right") - 1, 0, bins - 1)
-    cell = (2 * passed.gate + passed.side) * bins + interval
+
+    def cell_of(way: Ints, t: Floats) -> Ints:
+        interval = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, bins - 1)
+        return np.asarray(way * bins + interval)
+
+    cell, hidden = cell_of(2 * passed.gate + passed.side, passed.t), cell_of(unseen.way, unseen.t)
     cells = ways * bins
     seen = np.broadcast_to(np.where(watched > 0, watched, np.nan), (ways, bins)).ravel()
     seconds = np.tile(np.diff(edges), ways) * seen
@@ -97,8 +118,10 @@ def figures(passed: Passed, confidence: Floats, length: Floats, edges: Floats, w
     expected, spread = _sum(cell, confidence, cells), _sum(cell, confidence * (1 - confidence), cells)
     missing = (1 / seen - 1) * np.maximum(count, 1)  # expected while nobody watched; after none, no more than one
     missing[seen > 1 - 1e-9] = 0
-    low = np.floor(np.minimum(count, expected - _SIGMAS * np.sqrt(spread)) + 1e-9)
-    high = np.ceil(count + missing + _SIGMAS * np.sqrt(spread + missing * (1 / seen)) - 1e-9)
+    more = missing + _sum(hidden, unseen.chance, cells)
+    spread_more = missing / seen + _sum(hidden, unseen.chance * (1 - unseen.chance), cells)
+    low = np.minimum(count, np.ceil(expected - _SIGMAS * np.sqrt(spread) - 0.5))
+    high = count + np.floor(more + _SIGMAS * np.sqrt(spread_more) + 0.5)
     flow = 3600 * count / seconds
 
     known = np.isfinite(passed.speed) & (passed.speed > 0)

@@ -9,12 +9,14 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
-from vidtrack.traffic.measures.crossings import INFERRED, JOINED, confidence, reasons
+from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
+from vidtrack.traffic.measures.intervals import Unseen
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined, step_rows
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
+from vidtrack.traffic.measures.unseen import unseen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,12 +56,14 @@ class Journeys:
     joins     which stretches go on as others
     vehicle   (T,) number of the first stretch of the vehicle that each stretch is of
     trips     of the vehicles
+    unseen    passings that nobody saw
     """
 
     passings: Passings
     joins: Joins
     vehicle: Ints
     trips: Trips
+    unseen: Unseen
 
 
 def journeys(
@@ -101,7 +105,10 @@ def journeys(
     np.fmin.at(begin, vehicle, lives.head.t)
     np.fmax.at(end, vehicle, lives.tail.t)
     trips = _trips(gates, known.passed, vehicle[known.passed.track], begin, end, spans)
-    return Journeys(known, joins, vehicle, trips)
+    known = _as_sure(gates, known)
+    return Journeys(
+        known, joins, vehicle, trips, unseen(trips, known.passed, known.probability, gates, may, bool(allowed))
+    )
 
 
 def _because(reason: int, passed: Passed, probability: Floats) -> Passings:
@@ -113,6 +120,24 @@ def _inferred_beside(known: Passings) -> Passings:
     beside = known.passed.beside
     sure = np.where(beside, INFERRED_SURE, 1.0) * known.probability
     return Passings(known.passed, sure, np.where(beside, INFERRED, known.reason))
+
+
+_MERGED_SURE, _AGAINST_SURE = 0.8, 0.04
+"""Share of passings in a shared blob that are of the track's own vehicle, and of those out over an entry or in over an
+exit that are of any: as `tools/ablate_measures.py` has them"""
+
+
+def wrong_way(gates: Gates, passed: Passed) -> Mask:
+    """(P,) whether passings are out over an entry or in over an exit."""
+    inwards = gates.inward[passed.gate] == passed.side
+    return np.where(inwards, gates.role("exit")[passed.gate], gates.role("entry")[passed.gate])
+
+
+def _as_sure(gates: Gates, known: Passings) -> Passings:
+    """The same passings, as sure as those of their kind are."""
+    sure = np.where(known.reason == MERGED, _MERGED_SURE, 1.0)
+    sure *= np.where(wrong_way(gates, known.passed), _AGAINST_SURE, 1.0)
+    return Passings(known.passed, sure * known.probability, known.reason)
 
 
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))
