@@ -43,9 +43,9 @@ STATE = ("frame", "target_id", "x_m", "y_m")
 BINS = (0.5, 0.65, 0.8, 0.9, 1.0)
 
 
-def none_of(shape_of: int, chosen: bool = False) -> Any:
-    """A rule that chooses nothing, or all; its result has the length of that argument."""
-    return lambda *given: np.full(len(given[shape_of]), chosen)
+def none_of(*shape_of: int) -> Any:
+    """A rule that chooses nothing; its result has the length of that argument."""
+    return lambda *given: np.zeros(len(given[shape_of[0]]), bool)
 
 
 FOLLOW = stretches._follow
@@ -56,12 +56,10 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
     "ends that another vehicle has drawn along": {(joins, "_ASTRAY"): 0.0},
     "joins where the one begins up to 1 s before the other ends": {(joins, "OVERLAP_S"): 0.3},
-    "joins by the legs that they passed beside": {(journeys, "_beside"): lambda _, __, n: np.full((2, n), -1)},
     "joins of who passed a gate are surer": {(joins, "_SOUND"): joins._SOUND_BETWEEN},
     "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},
     "to and fro within 2 s": {(passing, "_BACK_S"): 0.0},
     "the same over breaks of a track": {(journeys, "lasting"): lambda track, *_: np.ones(len(track), bool)},
-    "beside a gate and back at once where a track breaks": {(journeys, "_lasting_over_breaks"): none_of(1, True)},
     "a velocity kept beyond the border": {(rows, "_go_on"): lambda *_: None},
     "gates passed beside": {(journeys, "_needed"): none_of(1)},
     "gates passed beside within a gap": {(journeys, "reaches"): lambda metres: (reaches(metres)[0], 0.0)},

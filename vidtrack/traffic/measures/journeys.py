@@ -12,11 +12,15 @@ from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
 from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.intervals import Unseen
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined, step_rows
+from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 from vidtrack.traffic.measures.unseen import unseen
+
+_MERGED_SURE, _AGAINST_SURE = 0.8, 0.04
+"""Share of passings in a shared blob that are of the track's own vehicle, and of those out over an entry or in over an
+exit that are of any: as `tools/ablate_measures.py` has them"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,9 +35,6 @@ class Passings:
     passed: Passed
     probability: Floats
     reason: Ints
-
-    def __len__(self) -> int:
-        return len(self.passed)
 
     def only(self, chosen: Mask | Ints) -> Passings:
         """The passings of a mask or of indices."""
@@ -77,14 +78,12 @@ def journeys(
     allowed  pairs of legs; none: all but turning back
     """
     passed = passed.only(passed.t <= lives.until[passed.track])
-    if metres:
-        passed = passed.only(~passed.beside | _lasting_over_breaks(gates, passed, lives))
     may = _may(gates, allowed)
     needed = ~passed.beside | _needed(gates, passed, may)
     spare, passed = passed.only(~needed), passed.only(needed)
     passed = passed.only(~_of_another(gates, passed, lives, may))
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
-    joins = _joins(gates, passed, spare, lives, spans, may) if metres else _NONE
+    joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
     together = joins.likely(vehicle)[vehicle]
     across = _across(gates, lives, joins, passed)
@@ -106,9 +105,8 @@ def journeys(
     np.fmax.at(end, vehicle, lives.tail.t)
     trips = _trips(gates, known.passed, vehicle[known.passed.track], begin, end, spans)
     known = _as_sure(gates, known)
-    return Journeys(
-        known, joins, vehicle, trips, unseen(trips, known.passed, known.probability, gates, may, bool(allowed))
-    )
+    nobody_saw = unseen(trips, known.passed, known.probability, gates, may, bool(allowed))
+    return Journeys(known, joins, vehicle, trips, nobody_saw)
 
 
 def _because(reason: int, passed: Passed, probability: Floats) -> Passings:
@@ -120,11 +118,6 @@ def _inferred_beside(known: Passings) -> Passings:
     beside = known.passed.beside
     sure = np.where(beside, INFERRED_SURE, 1.0) * known.probability
     return Passings(known.passed, sure, np.where(beside, INFERRED, known.reason))
-
-
-_MERGED_SURE, _AGAINST_SURE = 0.8, 0.04
-"""Share of passings in a shared blob that are of the track's own vehicle, and of those out over an entry or in over an
-exit that are of any: as `tools/ablate_measures.py` has them"""
 
 
 def wrong_way(gates: Gates, passed: Passed) -> Mask:
@@ -198,7 +191,7 @@ def _ends(passed: Passed, enters: Mask, leaves: Mask) -> tuple[Ints, Ints]:
     return first_in[passed.track], last_out[passed.track]
 
 
-def _joins(gates: Gates, passed: Passed, spare: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:
+def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask) -> Joins:
     """Joins of stretches that end after an entry or before an exit, and of those that begin so."""
     enters, leaves = gates.ways(passed.gate, passed.side)
     event = np.flatnonzero(enters | leaves)
@@ -208,38 +201,11 @@ def _joins(gates: Gates, passed: Passed, spare: Passed, lives: Lives, spans: Flo
     ends = ~np.append(leaves, False)[last] & np.isfinite(lives.tail.t) & ~at_edge(lives.tail.t, spans[:, 1])
     begins = ~np.append(enters, False)[first] & np.isfinite(lives.head.t) & ~at_edge(lives.head.t, spans[:, 0])
     leg = np.append(gates.leg[passed.gate], -1)
-    came, went = _beside(gates, spare, len(lives.track))
-    came, went = np.where(last < 0, came, leg[last]), np.where(first < 0, went, leg[first])
 
     def possible(a: Ints, b: Ints) -> Mask:
-        return np.asarray(may[came[a], went[b]])
+        return np.asarray(may[leg[last[a]], leg[first[b]]])
 
     return joined(lives, ends, begins, last >= 0, float(np.diff(spans).sum()), possible)
-
-
-def _beside(gates: Gates, spare: Passed, stretches: int) -> tuple[Ints, Ints]:
-    """(T,) the legs beside whose gates stretches came in last, and went out first; -1: none."""
-    legs, inwards = gates.leg[spare.gate], gates.inward[spare.gate] == spare.side
-    order = np.argsort(spare.t, kind="stable")
-    order = order[gates.role("entry", "exit", "both")[spare.gate[order]]]
-    came, went = np.full((2, stretches), -1)
-    came_in, went_out = order[inwards[order]], order[~inwards[order]][::-1]
-    came[spare.track[came_in]], went[spare.track[went_out]] = legs[came_in], legs[went_out]
-    return came, went
-
-
-def _lasting_over_breaks(gates: Gates, passed: Passed, lives: Lives) -> Mask:
-    """(P,) whether passings are none that a track takes back at once where it is broken: from the end of a stretch to
-    the beginning of the next one."""
-    known = np.flatnonzero(np.isfinite(lives.head.t))
-    order = known[np.lexsort((lives.head.t[known], lives.track[known]))]
-    goes_on = np.flatnonzero(np.diff(lives.track[order]) == 0)
-    before, after = order[goes_on], order[goes_on + 1]
-    passing = Passing(gates, *reaches(metres=True))
-    passing.add(step_rows(lives.tail.only(before), lives.head.only(after)))
-    back = passing.passed()
-    both = passed.and_also(back.of(before[back.track]))
-    return lasting(lives.track[both.track], both.gate, both.side, both.t)[: len(passed)]
 
 
 def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
@@ -258,7 +224,7 @@ def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
 def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floats, spans: Floats) -> Trips:
     """The trips of vehicles; those of one that comes in again where it has left are of another vehicle.
 
-    A track that leaves may go on as a vehicle that comes in there.
+    A track that leaves the picture may go on as a vehicle that comes in there.
     """
     again = _comes_again(gates, passed, vehicle)
     order = np.lexsort((passed.t, vehicle))
@@ -277,14 +243,13 @@ def _trips(gates: Gates, passed: Passed, vehicle: Ints, begin: Floats, end: Floa
 
 
 def _comes_again(gates: Gates, passed: Passed, vehicle: Ints) -> Mask:
-    """(P,) whether a vehicle comes in over an entry of the leg on which it went out last."""
+    """(P,) whether a vehicle passes an entry of the leg whose exit it passed last, another gate."""
     legs = gates.leg
     role = np.flatnonzero(gates.role("entry", "exit")[passed.gate])
     order = role[np.lexsort((passed.t[role], vehicle[role]))]
     gate, who = passed.gate[order], vehicle[order]
     again = np.zeros(len(vehicle), bool)
     if len(order) > 1:
-        inwards = gates.inward[gate] == passed.side[order]
-        same = (who[1:] == who[:-1]) & (legs[gate[1:]] == legs[gate[:-1]])
-        again[order[1:]] = same & ~inwards[:-1] & inwards[1:] & gates.role("entry", "both")[gate[1:]]
+        same = (who[1:] == who[:-1]) & (legs[gate[1:]] == legs[gate[:-1]]) & (gate[1:] != gate[:-1])
+        again[order[1:]] = same & gates.role("exit")[gate[:-1]] & gates.role("entry")[gate[1:]]
     return again
