@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from vidtrack.errors import ConfigError, FormatError, SourceError
 from vidtrack.traffic.measures.blocks import blocks
-from vidtrack.traffic.measures.intervals import NOBODY, coverage, edges_of, figures
+from vidtrack.traffic.measures.intervals import coverage, edges_of, figures
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed
 
@@ -95,17 +95,6 @@ def bounds(found, gate, direction):
     return row["count_low"], row["count"], row["count_high"]
 
 
-@pytest.mark.parametrize(("listed", "high"), [(True, 1), (False, 0)])
-def test_who_vanishes_between_the_gates_may_have_left_where_it_may(tmp_path, listed, high):
-    """By the only exit, if the site lists all ways; else perhaps by a way without a gate. One that left has left."""
-    place = site(CALIBRATED | ({"movements": {"allowed": [["west", "east"]]}} if listed else {}))
-    lost = measured([write_run(tmp_path / "lost", [straight(1, 2.0, 50, 240, 100, 3)], metres=True)], place)
-    assert bounds(lost, "west", "right") == (1, 1, 1)
-    assert bounds(lost, "east", "right") == (0, 0, high)
-    whole = measured([write_run(tmp_path / "whole", [straight(1, 2.0, 50, 240, 100, 5)], metres=True)], place)
-    assert bounds(whole, "east", "right") == (1, 1, 1)
-
-
 @pytest.mark.parametrize(("words", "step"), [("confirmed", -100), ("merged", 100)])
 def test_passings_out_over_an_entry_or_in_a_blob_are_doubtful(tmp_path, words, step):
     """Perhaps it was none, or another vehicle: the bounds hold 0, too."""
@@ -146,7 +135,7 @@ def test_figures_are_those_of_their_definitions(events):
         v, 0.3 * np.ones(n), 0.2 * np.ones(n), 0 * t, ~yes,
     )  # fmt: skip
     edges, watched = np.arange(5) * 10.0, np.array([1.0, 1.0, 0.5, 0.0])
-    found = figures(passed, np.full(n, 0.9), NOBODY, np.full(n, 4.0), edges, watched, ways=4)
+    found = figures(passed, np.full(n, 0.9), np.full(n, 4.0), edges, watched, ways=4)
     for w in range(4):
         for k in range(3):
             mine = (way == w) & (t >= edges[k]) & (t < edges[k + 1])
@@ -168,6 +157,21 @@ def test_figures_are_those_of_their_definitions(events):
         assert np.isnan(found.count[w, 3])
 
 
+@pytest.mark.parametrize(
+    ("n", "sure", "low", "high"),
+    [(1, 0.99, 1, 1), (1, 0.8, 0, 1), (5, 0.99, 4, 6), (100, 0.99, 97, 106), (3, 1.0, 3, 4)],
+)
+def test_bounds_of_a_count_hold_passings_that_were_none_and_missed_ones(n, sure, low, high):
+    """Poisson numbers of means n (1 - sure) and 0.025 n sure, each below its bound with 97.5 %."""
+    yes = np.ones(n, bool)
+    passed = Passed(
+        np.zeros(n), np.zeros(n, int), np.arange(n), np.zeros(n, int), *np.ones((4, n)), yes, ~yes,
+        np.ones(n), *np.ones((2, n)), np.zeros(n), ~yes,
+    )  # fmt: skip
+    found = figures(passed, np.full(n, sure), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=1)
+    assert (found.low.item(), found.count.item(), found.high.item()) == (low, n, high)
+
+
 def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():
     """Both ways of one gate: the fewest of 23 vehicles, whose fastest bounds the percentile, and one fewer."""
     way = np.append(np.zeros(23, int), np.ones(22, int))
@@ -177,7 +181,7 @@ def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():
         np.zeros(n), way // 2, np.arange(n), way, *np.ones((4, n)), yes, ~yes,
         speed, *np.ones((2, n)), np.zeros(n), ~yes,
     )  # fmt: skip
-    found = figures(passed, np.ones(n), NOBODY, np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=2)
+    found = figures(passed, np.ones(n), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=2)
     assert found.v85[0, 0] == pytest.approx(np.quantile(speed[:23], 0.85))
     assert np.isnan(found.v85[1, 0])
     assert np.isfinite(found.time_mean).all()

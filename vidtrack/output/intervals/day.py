@@ -18,7 +18,7 @@ from vidtrack.arrays.types import Floats
 from vidtrack.errors import FormatError
 from vidtrack.output.intervals.days import edges_of_day, span_of, zone_of
 from vidtrack.traffic.lengths import class_of
-from vidtrack.traffic.measures.intervals import NOBODY, coverage, figure_columns, figures
+from vidtrack.traffic.measures.intervals import coverage, figure_columns, figures
 from vidtrack.traffic.measures.passing import Passed
 from vidtrack.traffic.measures.tables import stamps, table
 
@@ -155,7 +155,7 @@ def _table(day: Day, edges: Floats, plan: Plan) -> pa.Table:
     way = np.array([numbers[pair] for pair in pairs], int)
     passed = _passed(crossings, unix, way)
     begin = edges[0]
-    found = figures(passed, np.ones(len(passed)), NOBODY, length, edges, watched, len(ways))
+    found = figures(passed, np.ones(len(passed)), length, edges, watched, len(ways))
     cell = way * bins + np.searchsorted(edges, unix, side="right") - 1
     counted = np.bincount(cell, minlength=len(ways) * bins).reshape(found.count.shape)
     found = replace(found, count=np.where(counted > 0, counted, found.count))

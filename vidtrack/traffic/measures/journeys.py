@@ -9,18 +9,16 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
-from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, confidence, reasons
+from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, SEEN, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.intervals import Unseen
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
-from vidtrack.traffic.measures.unseen import unseen
 
-_MERGED_SURE, _AGAINST_SURE = 0.8, 0.04
-"""Share of passings in a shared blob that are of the track's own vehicle, and of those out over an entry or in over an
-exit that are of any: as `tools/ablate_measures.py` has them"""
+_SEEN_SURE, _MERGED_SURE, _AGAINST_SURE = 0.99, 0.8, 0.04
+"""Share of the passings that are some vehicle's own among those that a track is seen to make, those in a shared blob,
+and those out over an entry or in over an exit, as `tools/ablate_measures.py` has them"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,14 +55,12 @@ class Journeys:
     joins     which stretches go on as others
     vehicle   (T,) number of the first stretch of the vehicle that each stretch is of
     trips     of the vehicles
-    unseen    passings that nobody saw
     """
 
     passings: Passings
     joins: Joins
     vehicle: Ints
     trips: Trips
-    unseen: Unseen
 
 
 def journeys(
@@ -104,9 +100,7 @@ def journeys(
     np.fmin.at(begin, vehicle, lives.head.t)
     np.fmax.at(end, vehicle, lives.tail.t)
     trips = _trips(gates, known.passed, vehicle[known.passed.track], begin, end, spans)
-    known = _as_sure(gates, known)
-    nobody_saw = unseen(trips, known.passed, known.probability, gates, may, bool(allowed))
-    return Journeys(known, joins, vehicle, trips, nobody_saw)
+    return Journeys(_as_sure(gates, known), joins, vehicle, trips)
 
 
 def _because(reason: int, passed: Passed, probability: Floats) -> Passings:
@@ -128,7 +122,7 @@ def wrong_way(gates: Gates, passed: Passed) -> Mask:
 
 def _as_sure(gates: Gates, known: Passings) -> Passings:
     """The same passings, as sure as those of their kind are."""
-    sure = np.where(known.reason == MERGED, _MERGED_SURE, 1.0)
+    sure = np.select([known.reason == SEEN, known.reason == MERGED], [_SEEN_SURE, _MERGED_SURE], 1.0)
     sure *= np.where(wrong_way(gates, known.passed), _AGAINST_SURE, 1.0)
     return Passings(known.passed, sure * known.probability, known.reason)
 

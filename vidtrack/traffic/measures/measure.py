@@ -128,7 +128,7 @@ class _Figures:
         driven = journeys(gates, passed, lives, self.spans, self.metres, site.movements.allowed)
         known = driven.passings
         self.passed, self.probability, self.reason = known.passed, known.probability, known.reason
-        self.joins, self.vehicle, self.trips, self.unseen = driven.joins, driven.vehicle, driven.trips, driven.unseen
+        self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
         self.against = {"calibration": against, **contradicting(found)}
         if found is not None:
@@ -268,7 +268,7 @@ class _Figures:
         gates, bins = self.gates, len(self.watched)
         ways = 2 * len(gates)
         length = self.length[self.passed.track]
-        found = figures(self.passed, self.probability, self.unseen, length, self.edges, self.watched, ways)
+        found = figures(self.passed, self.probability, length, self.edges, self.watched, ways)
         gate = [name for name in gates.names for _ in range(2 * bins)]
         direction = [way for pair in gates.directions for way in pair for _ in range(bins)]
         return table(
