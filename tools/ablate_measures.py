@@ -54,7 +54,7 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "breaks where the motion is that of another vehicle": {(stretches, "_OTHER"): np.inf},
     "joins": {(journeys, "_joins"): lambda *_: journeys._NONE},
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
-    "ends that another vehicle has drawn along": {(joins, "_ASTRAY"): 0.0},
+    "ends of two tracks that another vehicle has drawn along": {(joins, "_ASTRAY"): 0.0},
     "joins where the one begins up to 1 s before the other ends": {(joins, "OVERLAP_S"): 0.3},
     "joins of who passed a gate are surer": {(joins, "_SOUND"): joins._SOUND_BETWEEN},
     "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},

@@ -104,6 +104,7 @@ def journeys(
 
 
 def _because(reason: int, passed: Passed, probability: Floats) -> Passings:
+    """Passings that all rest on the same."""
     return Passings(passed, probability, np.full(len(passed), reason))
 
 
