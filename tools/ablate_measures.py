@@ -8,6 +8,8 @@ for it.
 The second table has the joins of stretches of which one passed an entry or an exit, as `joined` is told, and the
 others: what probability they state, and how many of them are of one true vehicle, the one that is nearest to where the
 one stretch ends, within 8 m, and also to where the other begins.
+The third table has the passings by what they rest on, and those against their gates, out over an entry or in over an
+exit: what probability they state, and how many are right within 5 s.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from score_measures import FPS, paired, rows_of
 
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.measures import beyond, joins, journeys, passing, rows, stretches, trips
-from vidtrack.traffic.measures.crossings import way_names
+from vidtrack.traffic.measures.crossings import REASONS, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.passing import Passing, reaches
 from vidtrack.traffic.measures.rows import Reader
@@ -52,7 +54,8 @@ RULES: dict[str, dict[tuple[Any, str], Any]] = {
     "breaks where the motion is that of another vehicle": {(stretches, "_OTHER"): np.inf},
     "joins": {(journeys, "_joins"): lambda *_: journeys._NONE},
     "joins of one track are likelier": {(joins, "SAME"): 1.0},
-    "ends that another vehicle has drawn along": {(joins, "_ASTRAY"): 0.0},
+    "ends of two tracks that another vehicle has drawn along": {(joins, "_ASTRAY"): 0.0},
+    "joins where the one begins up to 1 s before the other ends": {(joins, "OVERLAP_S"): 0.3},
     "joins of who passed a gate are surer": {(joins, "_SOUND"): joins._SOUND_BETWEEN},
     "movements that may not be": {(journeys, "_may"): lambda gates, _: np.ones((len(set(gates.legs)) + 1,) * 2, bool)},
     "to and fro within 2 s": {(passing, "_BACK_S"): 0.0},
@@ -112,27 +115,40 @@ def nearest(vehicles: np.ndarray, end: End, k: int) -> int:
     return int(vehicles[low + far.argmin(), 1]) if far.min(initial=np.inf) < NEAR_M else -1
 
 
-def judged(one: Seen) -> tuple[np.ndarray, list[tuple[float, bool, bool]]]:
-    """True, told and right crossings, then trips (6,); the probabilities of joins, if they are right, and if a stretch
-    passed an entry or an exit."""
+class Judged(NamedTuple):
+    """counts  (6,) true, told and right crossings, then trips
+    joins   (J, 3) probability, if it is right, if a stretch passed an entry or an exit
+    passings  (P, 4) number of the reason, if it is against its gate, probability, if it is right
+    """
+
+    counts: np.ndarray
+    joins: np.ndarray
+    passings: np.ndarray
+
+
+def judged(one: Seen) -> Judged:
     with patch.object(journeys, "joined", wraps=journeys.joined) as asked:
         found = journeys.journeys(one.gates, one.passing.passed(), one.lives, one.spans, True, one.allowed)
-    passed, told = found.passed, found.trips
+    passed, told = found.passings.passed, found.trips
     score_measures.TOLERANCE_S = CROSSING_S
     crossed = [(way, t) for way, t in zip(zip(*way_names(one.gates, passed), strict=True), passed.t, strict=True)]
     hits = len(paired(one.crossed, crossed))
+    score_measures.TOLERANCE_S = TRIP_S
+    right = np.isin(np.arange(len(passed)), [j for _, j in paired(one.crossed, crossed)])
+    why = found.passings.reason, journeys.wrong_way(one.gates, passed)
+    passings = np.column_stack([*why, found.passings.probability, right])
     who = np.flatnonzero(told.complete)
     legs = [[one.gates.legs[gate] for gate in passed.gate[end[who]]] for end in (told.entry, told.exit)]
     moved = list(zip(zip(*legs, strict=True), told.from_s[who], told.to_s[who], strict=True))
-    score_measures.TOLERANCE_S = TRIP_S
-    right = paired(one.moved, moved)
+    met = len(paired(one.moved, moved))
     made, ends = found.joins, (one.lives.tail, one.lives.head)
     of = [
         [nearest(one.vehicles, end, k) for k in who] for end, who in zip(ends, (made.before, made.after), strict=True)
     ]
     gated = [bool(asked.call_args.args[3][[*pair]].any()) for pair in zip(made.before, made.after, strict=True)]
     joined = [(float(p), a == b != -1, g) for p, a, b, g in zip(made.probability, *of, gated, strict=True)]
-    return np.array([len(one.crossed), len(crossed), hits, len(one.moved), len(moved), len(right)]), joined
+    counts = np.array([len(one.crossed), len(crossed), hits, len(one.moved), len(moved), met])
+    return Judged(counts, np.array(joined, float).reshape(-1, 3), passings)
 
 
 @contextmanager
@@ -156,7 +172,7 @@ def main() -> None:
     parser.add_argument("clips", nargs="+", type=Path)
     clips = parser.parse_args().clips
     whole = [seen(clip) for clip in clips]
-    joined: list[tuple[float, bool, bool]] = []
+    as_it_is: list[Judged] = []
     print("| left out | crossings: right of told | trips: right of told |")
     print("|---|---|---|")
     for name, rule in RULES.items():
@@ -164,20 +180,27 @@ def main() -> None:
             anew = any(module in (rows, stretches) for module, _ in rule)
             looked = [seen(clip) for clip in clips] if anew else whole
             results = [judged(one) for one in looked]
-        true, told, right, moved, trips_, right_trips = sum(counts for counts, _ in results)
+        true, told, right, moved, trips_, right_trips = sum(result.counts for result in results)
         if not rule:
-            joined = [one for _, some in results for one in some]
+            as_it_is = results
             print(f"of {true} crossings and {moved} trips:")
         print(f"| {name} | {right} of {told} | {right_trips} of {trips_} |", flush=True)
     print("\n| joins | probability | joins | its mean | right |")
     print("|---|---|---|---|---|")
-    sure, good, gated = np.array(joined, float).reshape(-1, 3).T
+    sure, good, gated = np.concatenate([result.joins for result in as_it_is]).T
     for name, chosen in (("passed an entry or an exit", gated == 1), ("others", gated == 0)):
         for low, high in pairwise(BINS):
             mine = chosen & (sure > low) & (sure <= high)
             if mine.any():
                 means = f"{sure[mine].mean():.2f} | {good[mine].mean():.2f}"
                 print(f"| {name} | {low:g} to {high:g} | {mine.sum()} | {means} |")
+    print("\n| passings | number | probability stated | right |")
+    print("|---|---|---|---|")
+    reason, against, sure, good = np.concatenate([result.passings for result in as_it_is]).T
+    kinds = [(name, (against == 0) & (reason == number)) for number, name in enumerate(REASONS)]
+    for name, mine in (*kinds, ("against their gates", against == 1)):
+        if mine.any():
+            print(f"| {name} | {mine.sum()} | {sure[mine].mean():.2f} | {good[mine].mean():.2f} |")
 
 
 if __name__ == "__main__":

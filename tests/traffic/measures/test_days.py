@@ -89,6 +89,24 @@ def test_zeros_are_written_and_what_nobody_watched_is_empty(tmp_path):
     assert [row["count"] for row in back] == [0, 0, None, None, 0, 0]
 
 
+def bounds(found, gate, direction):
+    rows = found.tables["intervals"].to_pylist()
+    row = next(row for row in rows if row["gate"] == gate and row["direction"] == direction and row["begin_s"] <= 0)
+    return row["count_low"], row["count"], row["count_high"]
+
+
+@pytest.mark.parametrize(("words", "step"), [("confirmed", -100), ("merged", 100)])
+def test_passings_out_over_an_entry_or_in_a_blob_are_doubtful(tmp_path, words, step):
+    """Perhaps it was none, or another vehicle: the bounds hold 0, too."""
+    track = straight(1, 2.0, 300 - 2.5 * step, 240, step, 5)
+    found = measured(
+        [write_run(tmp_path / "run", [track], metres=True, status=np.full(len(track[1]), words))], site(CALIBRATED)
+    )
+    rows = [row for row in found.tables["crossings"].to_pylist() if row["gate"] == "west"]
+    assert [row["confidence"] < 0.9 for row in rows] == [True]
+    assert bounds(found, "west", rows[0]["direction"]) == (0, 1, 1)
+
+
 def test_files_follow_each_other_and_a_vehicle_of_one_is_none_of_the_other(tmp_path):
     runs = [write_run(tmp_path / name, [straight(1, 2.0, 50, 240, 100, 5)], seconds=10) for name in "ab"]
     found = measured(runs, site())
@@ -137,6 +155,21 @@ def test_figures_are_those_of_their_definitions(events):
                 assert np.isnan(found.time_mean[w, k])
                 assert found.occupancy[w, k] == 0
         assert np.isnan(found.count[w, 3])
+
+
+@pytest.mark.parametrize(
+    ("n", "sure", "low", "high"),
+    [(1, 0.99, 1, 1), (1, 0.8, 0, 1), (5, 0.99, 4, 6), (100, 0.99, 97, 106), (3, 1.0, 3, 4)],
+)
+def test_bounds_of_a_count_hold_passings_that_were_none_and_missed_ones(n, sure, low, high):
+    """Poisson numbers of means n (1 - sure) and 0.025 n sure, each below its bound with 97.5 %."""
+    yes = np.ones(n, bool)
+    passed = Passed(
+        np.zeros(n), np.zeros(n, int), np.arange(n), np.zeros(n, int), *np.ones((4, n)), yes, ~yes,
+        np.ones(n), *np.ones((2, n)), np.zeros(n), ~yes,
+    )  # fmt: skip
+    found = figures(passed, np.full(n, sure), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=1)
+    assert (found.low.item(), found.count.item(), found.high.item()) == (low, n, high)
 
 
 def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():

@@ -1,5 +1,7 @@
 """Trips through the site, broken tracks, and the checks that need no truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_runs import CALIBRATED, FPS, along, site, straight, write_run
@@ -115,9 +117,9 @@ def test_a_broken_track_is_joined_and_its_gate_counted(tmp_path):
     assert middle[0]["speed_kmh"] is None
 
 
-@pytest.mark.parametrize(("gap_s", "aside_px"), [(0.8, 200.0), (-0.5, 0.0)])
+@pytest.mark.parametrize(("gap_s", "aside_px"), [(0.8, 200.0), (-1.5, 0.0)])
 def test_tracks_that_do_not_fit_stay_apart(tmp_path, gap_s, aside_px):
-    """Too far aside, or at the same time."""
+    """Too far aside, or for long at the same time."""
     found = measured([write_run(tmp_path / "run", broken(gap_s, aside_px), metres=True)], site(PLACE))
     assert found.report["joins"] == 0
 
@@ -168,6 +170,15 @@ def test_one_that_another_has_drawn_along_is_found_near_and_at_any_velocity():
     assert len(joined(lives(tail, head), one, two, one, 3600.0, anywhere).before) == 0
 
 
+def test_a_track_that_is_broken_goes_on_near_where_it_was_whatever_its_motion():
+    """Of one track it is the same vehicle at 10 m/s and, a moment later, as fast the other way; of two it is not."""
+    tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.1], [0.0, 1.0], [-10.0] * 2)
+    one, two = np.array([True, False]), np.array([False, True])
+    both = replace(lives(tail, head), track=np.zeros(2, int))
+    sure = [joined(of, one, two, one, 3600.0, anywhere).probability.sum() for of in (both, lives(tail, head))]
+    assert sure[0] > sure[1]
+
+
 def test_one_that_comes_back_is_another():
     """At the place where the first one was heading for, but with the opposite velocity."""
     tail, head = end([1.0, 0], [0.0, 0], [10.0] * 2), end([0.0, 1.5], [0.0, 5.0], [-10.0] * 2)
@@ -201,18 +212,19 @@ def test_where_one_must_go_elsewhere_the_other_stays():
     assert (marginals(R, a, b, 4) > 0.5).tolist() == [False, True, True]
 
 
-def test_who_is_found_again_has_a_density_over_time_place_and_velocity():
-    """The sum over all states, drawn around the likely ones, is the chance to be found again, less what is later than
-    LONGEST_S."""
+@pytest.mark.parametrize("along", [0.0, 1.0])
+def test_who_is_found_again_has_a_density_over_time_place_and_velocity(along):
+    """The sum over all states, drawn around the likely ones (Student's t), is the chance to be found again, less what
+    is later than LONGEST_S: of vehicles on their course, and of those that another one has drawn along."""
     rng = np.random.default_rng(1)
     n = 200_000
     gap = rng.uniform(0, LONGEST_S, n)
     wide = 3 * np.sqrt([2 + 2 * gap**2 + gap**3, 12 + gap])
-    drawn = rng.standard_normal((2, n, 2))
-    weight = LONGEST_S * (2 * np.pi) ** 2 * np.exp(np.sum(drawn**2, axis=(0, 2)) / 2) * np.prod(wide, axis=0) ** 2
+    drawn = rng.standard_normal((2, n, 2)) / np.sqrt(rng.exponential(1.0, (2, n, 1)))
+    weight = LONGEST_S * np.prod(2 * np.pi * wide**2 * (1 + np.sum(drawn**2, axis=2) / 2) ** 2, axis=0)
     xy, v = (np.vstack([[0, 0], values]) for values in wide[:, :, None] * drawn)
     head = End(np.append(0.0, gap), xy, v, np.tile([1.0, 0.0, 1.0], (n + 1, 1)))
-    pairs = found_again(head, head, np.zeros(n, int), np.arange(1, n + 1))
+    pairs = found_again(head, head, np.zeros(n, int), np.arange(1, n + 1), np.full(n, along))
     assert np.mean(pairs * weight) == pytest.approx(1 - np.exp(-LONGEST_S / 2), rel=0.06)
 
 

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.passing import Passed
 
+REASONS = ("seen", "merged", "coasted", "joined", "inferred")
+"""What the confidence of a passing rests on, by numbers"""
+SEEN, MERGED, COASTED, JOINED, INFERRED = range(5)
 LANE_M = 1.75
 """m along a gate; vehicles that pass it farther apart do not follow each other: half a lane"""
 _LOOK_BACK = 12
@@ -60,10 +63,9 @@ def confidence(passed: Passed) -> Floats:
     return np.asarray(ndtr(passed.before / sigma) * ndtr(passed.after / sigma))
 
 
-def reasons(passed: Passed) -> list[str]:
+def reasons(passed: Passed) -> Ints:
     """(P,) what each confidence rests on."""
-    words = np.array(["seen", "merged", "coasted"])
-    return [str(word) for word in words[np.where(~passed.shown, 2, passed.merged.astype(int))]]
+    return np.where(~passed.shown, COASTED, np.where(passed.merged, MERGED, SEEN))
 
 
 def way_names(gates: Gates, passed: Passed) -> tuple[list[str], list[str]]:

@@ -7,8 +7,9 @@ The odds that they are, against a vehicle that is lost for good and another that
 h is the density of the time that a track is lost for, t that of place and velocity in which it is found (Student's t of
 four dimensions, 1/(m^2 (m/s)^2)), S the covariance of both states after a motion of nearly constant velocity, and d the
 difference of the lengths in standard deviations. For a share _ASTRAY of the pairs another vehicle in the blob has drawn
-an end along: then the second one is somewhere near, at any velocity. Two stretches of one track are SAME times as
-likely one vehicle, and a movement that is not allowed is none. `rate` is that at which tracks begin by chance between
+an end along: then the second one is somewhere near (Student's t of two dimensions), at any velocity. That is so of all
+stretches of one track, which was broken since its motion is not that of one vehicle; they are SAME times as likely one
+vehicle. A movement that is not allowed is none. `rate` is that at which tracks begin by chance between
 the gates, per second and unit of place and velocity: what no join explains.
 
 All ends are decided together: the probability of a pair is its marginal over all ways to join ends one to one, each as
@@ -20,7 +21,7 @@ likelier than not, and that is joined.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,7 +36,7 @@ _ROUNDS, _PASSES, _SETTLED = 4, 30, 1e-9
 """In which the rate of chance is found, and of belief propagation, at most: until no message changes by more"""
 _LOST_S = 2.0
 """s; mean time that a track is lost for"""
-OVERLAP_S = 0.3
+OVERLAP_S = 1.0
 """s; a track that is lost may be seen so long after the one began that goes on"""
 SAME = 10.0
 _FREEDOM = 4.0
@@ -44,9 +45,11 @@ _VELOCITIES = 400.0
 """(m/s)2; over which the velocities of tracks that begin are spread"""
 _LENGTH_SIGMA = 0.25
 """Standard deviation of the logarithm of a length, from one track of a vehicle to another"""
-_ASTRAY, _ASTRAY_M, _ASTRAY_M_S, _ASTRAY_PACE_M_S = 0.3, 4.0, 5.0, 10.0
-"""Share of pairs with an end that another vehicle has drawn along; standard deviations of how far they are apart then,
-m, and m/s times the gap, and of the second velocity"""
+_ASTRAY, _ASTRAY_FREEDOM = 0.5, 2.0
+"""Share of pairs of two tracks with an end that another vehicle has drawn along; of Student's t then"""
+ASTRAY_SCALES = (1.6, 2.6, 7.6)
+"""Of how far such ends are apart, m, and m/s times the gap; standard deviation of the second velocity, m/s. As
+`tools/fit_joins.py` has all four."""
 _SOUND, _SOUND_BETWEEN = 0.95, 0.65
 """Share of joins whose two ends are of one vehicle, where it passed an entry or an exit, and of others: those are often
 of blobs that hold several vehicles, or none"""
@@ -96,8 +99,9 @@ def joined(
         return Joins(a, b, np.empty(0))
     area = np.prod(np.ptp(head.xy[first], axis=0) + 1.0)
     size = np.nan_to_num(np.log(lives.length[b] / lives.length[a]) / _LENGTH_SIGMA)
-    density = found_again(tail, head, a, b) * np.exp(-(size**2) / 2)
-    density *= np.where(lives.track[a] == lives.track[b], SAME, 1.0) * allowed(a, b)
+    same = lives.track[a] == lives.track[b]
+    density = found_again(tail, head, a, b, np.where(same, 1.0, _ASTRAY)) * np.exp(-(size**2) / 2)
+    density *= np.where(same, SAME, 1.0) * allowed(a, b)
     chance = float(len(first))
     for _ in range(_ROUNDS):
         probability = marginals(density / (chance / (watched_s * area * _VELOCITIES)), a, b, len(ends))
@@ -120,10 +124,24 @@ def marginals(R: Floats, a: Ints, b: Ints, ends: int) -> Floats:
     return np.asarray(going / (1 + np.bincount(a, going, ends)[a]))
 
 
-def found_again(tail: End, head: End, a: Ints, b: Ints) -> Floats:
-    """(J,) density with which the vehicle of stretch a, driving on, is found as stretch b, 1/(s m2 (m/s)2)."""
-    gap = np.maximum(head.t[b] - tail.t[a], 0.0)
-    place = head.xy[b] - tail.xy[a] - gap[:, None] * tail.v[a]
+def found_again(tail: End, head: End, a: Ints, b: Ints, drawn: Floats) -> Floats:
+    """(J,) density with which the vehicle of stretch a, driving on, is found as stretch b, 1/(s m2 (m/s)2).
+
+    drawn  (J,) probability that another vehicle has drawn an end along
+    """
+    lost = np.exp(-gaps(tail, head, a, b) / _LOST_S) / _LOST_S
+    return np.asarray(((1 - drawn) * on_course(tail, head, a, b) + drawn * astray(tail, head, a, b)) * lost)
+
+
+def gaps(tail: End, head: End, a: Ints, b: Ints) -> Floats:
+    """(J,) s from the end of stretch a to the beginning of stretch b; 0 where they overlap."""
+    return np.asarray(np.maximum(head.t[b] - tail.t[a], 0.0))
+
+
+def on_course(tail: End, head: End, a: Ints, b: Ints) -> Floats:
+    """(J,) density of the place and velocity of stretch b where that of stretch a leads to, 1/(m2 (m/s)2)."""
+    gap = gaps(tail, head, a, b)
+    place = head.xy[b] - tail.xy[a] - (head.t[b] - tail.t[a])[:, None] * tail.v[a]
     pace = head.v[b] - tail.v[a]
     jolt = STANDING_JOLT + JOLT_PER_M_S * np.linalg.norm(tail.v, axis=1)[a]
     (xx, xv, vv), (x2, xv2, v2) = tail.spread[a].T, head.spread[b].T
@@ -132,12 +150,17 @@ def found_again(tail: End, head: End, a: Ints, b: Ints) -> Floats:
     svv = vv + jolt * gap + v2 + MODEL_M_S**2
     det = sxx * svv - sxv**2
     square = (svv * dot(place, place) - 2 * sxv * dot(place, pace) + sxx * dot(pace, pace)) / det
-    density = (1 + _FREEDOM / 2) / (4 * np.pi**2 * _FREEDOM / 2) / det
-    on_course = np.exp(-(2 + _FREEDOM / 2) * np.log1p(square / _FREEDOM)) * density
-    apart, near = head.xy[b] - tail.xy[a], _ASTRAY_M**2 + (_ASTRAY_M_S * gap) ** 2
-    square = dot(apart, apart) / near + dot(head.v[b], head.v[b]) / _ASTRAY_PACE_M_S**2
-    astray = np.exp(-square / 2) / (4 * np.pi**2 * near * _ASTRAY_PACE_M_S**2)
-    return np.asarray(((1 - _ASTRAY) * on_course + _ASTRAY * astray) * np.exp(-gap / _LOST_S) / _LOST_S)
+    peak = (1 + _FREEDOM / 2) / (2 * np.pi**2 * _FREEDOM) / det
+    return np.asarray(peak * (1 + square / _FREEDOM) ** -(2 + _FREEDOM / 2))
+
+
+def astray(tail: End, head: End, a: Ints, b: Ints, scales: Sequence[float] = ASTRAY_SCALES) -> Floats:
+    """(J,) the same where another vehicle has drawn an end along."""
+    apart_m, apart_m_s, pace_m_s = scales
+    apart = head.xy[b] - tail.xy[a]
+    near = apart_m**2 + (apart_m_s * gaps(tail, head, a, b)) ** 2
+    place = (1 + dot(apart, apart) / near / _ASTRAY_FREEDOM) ** -(1 + _ASTRAY_FREEDOM / 2) / (2 * np.pi * near)
+    return np.asarray(place * np.exp(-dot(head.v[b], head.v[b]) / pace_m_s**2 / 2) / (2 * np.pi * pace_m_s**2))
 
 
 def gap_rows(lives: Lives, joins: Joins) -> Rows:

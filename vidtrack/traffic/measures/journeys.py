@@ -9,28 +9,55 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
-from vidtrack.traffic.measures.crossings import confidence, reasons
+from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, SEEN, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 
+_SEEN_SURE, _MERGED_SURE, _AGAINST_SURE = 0.99, 0.8, 0.04
+"""Share of the passings that are some vehicle's own among those that a track is seen to make, those in a shared blob,
+and those out over an entry or in over an exit, as `tools/ablate_measures.py` has them"""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Journeys:
-    """All passings, in order of time.
+class Passings:
+    """P passings and how sure they are.
 
-    passed        P passings, those within gaps too
-    probability   (P,) that the vehicle passed; reason (P,) what this rests on
-    joins         which stretches go on as others
-    vehicle       (T,) number of the first stretch of the vehicle that each stretch is of
-    trips         of the vehicles
+    passed        (P,) the passings
+    probability   (P,) that the vehicle passed
+    reason        (P,) what this rests on, of REASONS
     """
 
     passed: Passed
     probability: Floats
-    reason: list[str]
+    reason: Ints
+
+    def only(self, chosen: Mask | Ints) -> Passings:
+        """The passings of a mask or of indices."""
+        return Passings(self.passed.only(chosen), self.probability[chosen], self.reason[chosen])
+
+    def and_also(self, other: Passings) -> Passings:
+        """Both, these first."""
+        return Passings(
+            self.passed.and_also(other.passed),
+            np.concatenate([self.probability, other.probability]),
+            np.concatenate([self.reason, other.reason]),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Journeys:
+    """Who drove where.
+
+    passings  all, in order of time, those within gaps too
+    joins     which stretches go on as others
+    vehicle   (T,) number of the first stretch of the vehicle that each stretch is of
+    trips     of the vehicles
+    """
+
+    passings: Passings
     joins: Joins
     vehicle: Ints
     trips: Trips
@@ -58,29 +85,47 @@ def journeys(
     across = _across(gates, lives, joins, passed)
     across, joint = across.of(joins.before[across.track]).nowhere(), joins.probability[across.track]
     joint = np.where(across.beside, together[across.track], joint)
-    reason = [*reasons(passed), *(["joined"] * len(across)), *reasons(spare)]
-    probability = np.concatenate([confidence(passed), joint, together[spare.track] * confidence(spare)])
+    known = Passings(passed, confidence(passed), reasons(passed))
+    known = known.and_also(_because(JOINED, across, joint))
+    known = known.and_also(Passings(spare, together[spare.track] * confidence(spare), reasons(spare)))
     free = np.concatenate([np.zeros(len(passed), bool), across.beside, spare.beside])
-    passed = passed.and_also(across).and_also(spare)
-    kept = _of_vehicles(gates, replace(passed, track=vehicle[passed.track], beside=free), may)
-    passed, probability, reason = passed.only(kept), probability[kept], [reason[k] for k in kept.tolist()]
-    probability = np.where(passed.beside, INFERRED_SURE, 1.0) * probability
-    reason = ["inferred" if off else why for off, why in zip(passed.beside.tolist(), reason, strict=True)]
+    owned = replace(known.passed, track=vehicle[known.passed.track], beside=free)
+    known = _inferred_beside(known.only(_of_vehicles(gates, owned, may)))
     if metres:
-        inferred, sure = beyond(gates, passed, lives, joins, spans)
-        probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
-        passed = passed.and_also(inferred)
-        inferred, sure = at_gates(gates, passed, lives, joins, spans, may)
-        probability, reason = np.concatenate([probability, sure]), [*reason, *(["inferred"] * len(inferred))]
-        passed = passed.and_also(inferred)
-    order = np.argsort(passed.t, kind="stable")
-    passed, probability, reason = passed.only(order), probability[order], [reason[k] for k in order.tolist()]
+        known = known.and_also(_because(INFERRED, *beyond(gates, known.passed, lives, joins, spans)))
+        known = known.and_also(_because(INFERRED, *at_gates(gates, known.passed, lives, joins, spans, may)))
+    known = known.only(np.argsort(known.passed.t, kind="stable"))
     begin = np.full(len(vehicle), np.inf)
     end = -begin
     np.fmin.at(begin, vehicle, lives.head.t)
     np.fmax.at(end, vehicle, lives.tail.t)
-    trips = _trips(gates, passed, vehicle[passed.track], begin, end, spans)
-    return Journeys(passed, probability, reason, joins, vehicle, trips)
+    trips = _trips(gates, known.passed, vehicle[known.passed.track], begin, end, spans)
+    return Journeys(_as_sure(gates, known), joins, vehicle, trips)
+
+
+def _because(reason: int, passed: Passed, probability: Floats) -> Passings:
+    """Passings that all rest on the same."""
+    return Passings(passed, probability, np.full(len(passed), reason))
+
+
+def _inferred_beside(known: Passings) -> Passings:
+    """The same passings, those beside gates as what they are."""
+    beside = known.passed.beside
+    sure = np.where(beside, INFERRED_SURE, 1.0) * known.probability
+    return Passings(known.passed, sure, np.where(beside, INFERRED, known.reason))
+
+
+def wrong_way(gates: Gates, passed: Passed) -> Mask:
+    """(P,) whether passings are out over an entry or in over an exit."""
+    inwards = gates.inward[passed.gate] == passed.side
+    return np.where(inwards, gates.role("exit")[passed.gate], gates.role("entry")[passed.gate])
+
+
+def _as_sure(gates: Gates, known: Passings) -> Passings:
+    """The same passings, as sure as those of their kind are."""
+    sure = np.select([known.reason == SEEN, known.reason == MERGED], [_SEEN_SURE, _MERGED_SURE], 1.0)
+    sure *= np.where(wrong_way(gates, known.passed), _AGAINST_SURE, 1.0)
+    return Passings(known.passed, sure * known.probability, known.reason)
 
 
 _NONE = Joins(np.empty(0, int), np.empty(0, int), np.empty(0))

@@ -23,7 +23,7 @@ from vidtrack.traffic.measures.approaches import approaches
 from vidtrack.traffic.measures.by_traffic import by_stretches, contradicting
 from vidtrack.traffic.measures.checks import balance, movements
 from vidtrack.traffic.measures.conflicts import KINDS, PET, TTC, Meeting
-from vidtrack.traffic.measures.crossings import following, section_speeds, way_names
+from vidtrack.traffic.measures.crossings import REASONS, following, section_speeds, way_names
 from vidtrack.traffic.measures.gates import Gates, gates_of
 from vidtrack.traffic.measures.intervals import coverage, edges_of, figure_columns, figures
 from vidtrack.traffic.measures.journeys import journeys
@@ -126,7 +126,8 @@ class _Figures:
         self.tracks = len(track_ids)
         self.session, self.track_id = sessions[lives.track], track_ids[lives.track]
         driven = journeys(gates, passed, lives, self.spans, self.metres, site.movements.allowed)
-        self.passed, self.probability, self.reason = driven.passed, driven.probability, driven.reason
+        known = driven.passings
+        self.passed, self.probability, self.reason = known.passed, known.probability, known.reason
         self.joins, self.vehicle, self.trips = driven.joins, driven.vehicle, driven.trips
         found = vehicles.fitted(self.vehicle, self.passed.track, self.passed.t)
         self.against = {"calibration": against, **contradicting(found)}
@@ -214,7 +215,7 @@ class _Figures:
                 "headway_s": ("s", after.headway),
                 ("along_m" if metres else "along_px"): ("m" if metres else "px", passed.along),
                 "confidence": ("1", self.probability),
-                "reason": ("", self.reason),
+                "reason": ("", [REASONS[why] for why in self.reason.tolist()]),
             }
         )
 

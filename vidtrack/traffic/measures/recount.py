@@ -79,12 +79,13 @@ class Recount:
             passed, metres, allowed = self._passings(gates), ground is not None, site.movements.allowed
             found = journeys(all_gates, passed, self._lives, self._day.spans, metres, allowed)
             vehicle, trips = found.vehicle, len(found.trips.vehicle)
-            ways = np.bincount(2 * found.passed.gate + found.passed.side, minlength=2 * len(gates)).reshape(-1, 2)
+            passed = found.passings.passed
+            ways = np.bincount(2 * passed.gate + passed.side, minlength=2 * len(gates)).reshape(-1, 2)
             counts = {
                 name: dict(zip(names, way, strict=True))
                 for name, names, way in zip(all_gates.names, all_gates.directions, ways.tolist(), strict=True)
             }
-            moved = [(*legs, n) for legs, n in sorted(movements(found.trips, found.passed, all_gates).items())]
+            moved = [(*legs, n) for legs, n in sorted(movements(found.trips, passed, all_gates).items())]
         zones = {name: self._stays.get(zone.polygon) for name, zone in site.tracked_zones.items()}
         stays = {name: len(staying.in_zones(vehicle).zone) for name, staying in zones.items() if staying is not None}
         return Tally(counts, stays, moved, trips, faults)
