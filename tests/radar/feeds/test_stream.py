@@ -58,7 +58,11 @@ def test_scans_are_those_of_the_recording(tmp_path, blocks):
 
 
 def test_other_traffic_at_the_address_is_counted_and_changes_nothing(blocks):
-    foreign = [b"GET / HTTP/1.1\r\n\r\n" + blocks[0], b"$GPZDA,000500.00,01,01,2026,,\r\n", bytes(60)]
+    foreign = [
+        b"GET / HTTP/1.1\r\n\r\n" + block(plot(502.0, 12000, 123)),
+        b"$GPZDA,000500.00,01,01,2026,,\r\n",
+        bytes(60),
+    ]
     stream, scans = given_out([payload for own in blocks for payload in (own, *foreign)])
     _, expected = given_out(blocks)
     assert stream.losses.damaged == 3 * len(blocks)
