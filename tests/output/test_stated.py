@@ -41,7 +41,7 @@ def test_measurements_without_outlines_keep_the_filter_s_errors():
 
 def test_a_blob_of_its_own_limits_the_error_whatever_the_filter_says():
     unsure, sure = position(step_of("own", 1e6 * np.eye(4))), position(step_of("own", 1e-6 * np.eye(4)))
-    share = 0.045 * np.sqrt(200) / 22  # sides of 20 and 10 px within the rim
+    share = 0.04 * np.sqrt(200) / 22  # sides of 20 and 10 px within the rim
     lasting = np.array([400.0, 100.0]) / 12 * (share**2 + (15 / 200) ** 2)
     np.testing.assert_allclose(np.diag(sure), lasting, rtol=1e-3)
     np.testing.assert_allclose(np.diag(unsure), lasting + 0.15**2, rtol=1e-3)

@@ -41,7 +41,7 @@ _PATCH = 15.0
 """Processed pixels. Ends that fill less than half of the detector's window of 7 x 7 are lost: from none to half of it.
 The mean is the same at both ends; the rest moves the centroid by its share of the area times the standard deviation of
 the extent."""
-_SHARE, _SIZE, _MOST = 0.045, 22.0, 2.0
+_SHARE, _SIZE, _MOST = 0.04, 22.0, 2.0
 """Standard deviation of a centroid per standard deviation of the extent, for vehicles of this size (root of the area,
 processed pixels); in proportion for others, up to so many times as much."""
 _BESIDE = 0.13
