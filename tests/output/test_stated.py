@@ -21,11 +21,11 @@ def step_of(kind, P, pixel=1.0, rim=1.5, surveyed=(0.0, 0, 200, 100), side=(23.0
     """
     step = make_step(0, [ROWS[kind]])
     xy = step.tracks.xy[0]
-    box = np.array([[*(xy - np.divide(side, 2)), *side]])
+    box = np.array([[*(xy - np.divide(side, 2) + 0.5), *side]])  # a pixel's position is its middle
     group = np.array([1 if kind == "shared" else -1])
     taken = np.array([-1 if kind == "coasting" else 0])
     seen = np.add(side, more)
-    blob = np.concatenate([np.subtract(off, seen / 2), seen])[None]
+    blob = np.concatenate([np.subtract(off, seen / 2) + 0.5, seen])[None]
     scan = Scan(0.0, xy[None], np.eye(2), box=blob, pixel=pixel, rim=rim, surveyed=np.array(surveyed))
     return replace(step, scan=scan, tracks=replace(step.tracks, P=P[None], box=box, group=group, measurement=taken))
 
@@ -41,7 +41,7 @@ def test_measurements_without_outlines_keep_the_filter_s_errors():
 
 def test_a_blob_of_its_own_limits_the_error_whatever_the_filter_says():
     unsure, sure = position(step_of("own", 1e6 * np.eye(4))), position(step_of("own", 1e-6 * np.eye(4)))
-    share = 0.05 * np.sqrt(200) / 22  # sides of 20 and 10 px within the rim
+    share = 0.04 * np.sqrt(200) / 22  # sides of 20 and 10 px within the rim
     lasting = np.array([400.0, 100.0]) / 12 * (share**2 + (15 / 200) ** 2)
     np.testing.assert_allclose(np.diag(sure), lasting, rtol=1e-3)
     np.testing.assert_allclose(np.diag(unsure), lasting + 0.15**2, rtol=1e-3)
@@ -77,11 +77,22 @@ def test_a_shared_blob_smaller_than_the_vehicle_lacks_an_end_of_it():
     assert by((20.0, 30.0)) == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.parametrize("kind", sorted(ROWS))
 @pytest.mark.parametrize("by", [(6.0, -3.0), (0.0, 1.5)])
-def test_on_a_shared_blob_the_truth_is_between_the_position_and_the_middle_of_the_box(by):
-    step = step_of("shared", 1e-12 * np.eye(4))
-    moved = replace(step, tracks=replace(step.tracks, box=step.tracks.box + np.array([*by, 0, 0])))
-    assert np.diag(position(moved) - position(step)) == pytest.approx(np.square(by) / 3, abs=1e-9)
+def test_the_middle_of_the_box_is_as_likely_as_the_position(kind, by):
+    step = step_of(kind, 1e-12 * np.eye(4))
+    moved = moved_boxes(step, by)
+    assert np.diag(position(moved) - position(step)) == pytest.approx(np.square(by) / 2, abs=1e-9)
+
+
+def moved_boxes(step, by):
+    """The step with the boxes of track and blob moved away from the position."""
+    by = np.array([*by, 0, 0])
+    return replace(
+        step,
+        tracks=replace(step.tracks, box=step.tracks.box + by),
+        scan=replace(step.scan, box=step.scan.box + by),
+    )
 
 
 @pytest.mark.parametrize("kind", sorted(ROWS))
@@ -106,19 +117,13 @@ def test_a_box_that_the_border_cuts_is_less_certain_along_it(surveyed, more):
 
 @pytest.mark.parametrize(
     ("left", "off", "least"),
-    [(89.0, (2, 4), [2, 0]), (89.0, (-1.5, 4), [1.5, 0]), (0.0, (2, 4), [0, 0]), (89.0, (0.1, 0), [0, 0])],
+    [(89.5, (2, 4), [2, 0]), (89.5, (-1.5, 4), [1.5, 0]), (0.0, (2, 4), [0, 0]), (89.5, (0.1, 0), [0, 0])],
     ids=["cut", "the other way", "not cut", "less than the other errors"],
 )
 def test_what_the_border_cuts_is_off_the_middle_of_its_box(left, off, least):
     step = step_of("own", np.diag([0.04, 1, 0.04, 1]), surveyed=(left, 0, 200, 100))
-    by = np.array([*off, 0, 0])
-    moved = replace(
-        step,
-        tracks=replace(step.tracks, box=step.tracks.box + by),
-        scan=replace(step.scan, box=step.scan.box + by),
-    )
-    expected = np.maximum(np.diag(position(step)), np.square(least))
-    assert np.diag(position(moved)) == pytest.approx(expected, rel=1e-9)
+    expected = np.maximum(np.diag(position(step)) + np.square(off) / 2, np.square(least))
+    assert np.diag(position(moved_boxes(step, off))) == pytest.approx(expected, rel=1e-9)
 
 
 def test_all_errors_of_a_small_blob_scale_with_the_processed_pixel():

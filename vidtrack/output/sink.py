@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # radar runs must not load OpenCV
     from vidtrack.video.frame import Frame
 
 
-_HALF_PX = 0.5
+HALF_PX = 0.5
 """Pixel 0 covers -0.5 to 0.5."""
 _UNLIMITED = (-np.inf, -np.inf, np.inf, np.inf)
 
@@ -86,7 +86,7 @@ def seen(steps: Sequence[Step]) -> Floats:
     high = low + box[:, 2:]
     low = np.where(low < limits[:, :2] + pixel, np.nan, low)
     high = np.where(high > limits[:, 2:] - pixel, np.nan, high)
-    edge[own] = np.hstack([low + rim, high - rim]) - _HALF_PX
+    edge[own] = np.hstack([low + rim, high - rim]) - HALF_PX
     return edge
 
 

@@ -17,9 +17,10 @@ L   what lasts, and what this picture contradicts:
              border the centroid is not the middle of what is seen, and is off by the difference at least
     blob     a blob of another size than the vehicle lacks the difference at one end, or has too much there; and where
              its middle is not that of the vehicle's box, the truth may be anywhere between: uniform errors. A shared
-             blob that is smaller than the vehicle lacks the difference at one end. Its centroid is not the vehicle's:
-             where that is in the box is remembered, also while the box grows, and the truth may be anywhere between it
-             and the middle of the box
+             blob that is smaller than the vehicle lacks the difference at one end
+    middle   a body seen at a slant does not fill its box evenly, and a shared blob's centroid is not the vehicle's:
+             where that is in the box is remembered, also while the box grows. That the middle of the box is the truth
+             is as likely as that the centroid is
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from itertools import groupby
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
-from vidtrack.output.sink import Step
+from vidtrack.output.sink import HALF_PX, Step
 from vidtrack.tracking.picture.border import Border
 
 _PIXEL = 0.15
@@ -40,7 +41,7 @@ _PATCH = 15.0
 """Processed pixels. Ends that fill less than half of the detector's window of 7 x 7 are lost: from none to half of it.
 The mean is the same at both ends; the rest moves the centroid by its share of the area times the standard deviation of
 the extent."""
-_SHARE, _SIZE, _MOST = 0.05, 22.0, 2.0
+_SHARE, _SIZE, _MOST = 0.04, 22.0, 2.0
 """Standard deviation of a centroid per standard deviation of the extent, for vehicles of this size (root of the area,
 processed pixels); in proportion for others, up to so many times as much."""
 _BESIDE = 0.13
@@ -49,8 +50,8 @@ _EDGE_SHARE, _EDGE_PIXEL = 0.05, 0.6
 """Standard deviation of the middle between two edges of a shared blob: shares of the vehicle's side, and pixels."""
 _UNIFORM = 1 / 12
 """Variance of what is uniform over an interval of one."""
-_BETWEEN = 1 / 3
-"""Mean square of what is uniform from nought to one."""
+_EITHER = 1 / 2
+"""Mean square of what is nought or one, either as likely."""
 
 
 def stated(step: Step) -> Step:
@@ -94,8 +95,8 @@ def _restated(steps: Sequence[Step]) -> Floats:
     edges = (_EDGE_SHARE * side) ** 2 + (_EDGE_PIXEL * pixel) ** 2
     measured = np.where(shared[:, None], 1 / edges, np.where(own[:, None], (_PIXEL * pixel) ** -2, 0.0))
     differs, lacks = (np.concatenate(parts) for parts in zip(*map(_contradicted, steps), strict=True))
-    cut, off = Border().of(scan).sides(box), np.square(box[:, :2] + box[:, 2:] / 2 - xy)
-    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks + _BETWEEN * off, differs + _beside(cut, side))
+    cut, off = Border().of(scan).sides(box), np.square(box[:, :2] + box[:, 2:] / 2 - HALF_PX - xy)
+    lasting = _outline(side, pixel) + np.where(shared[:, None], lacks, differs + _beside(cut, side)) + _EITHER * off
     eye = np.eye(len(place))
     updated = np.linalg.solve(eye + P * measured[:, None, :], P)  # (P^-1 + W^-1)^-1, for a singular P too
     updated = (updated + np.swapaxes(updated, 1, 2)) / 2

@@ -33,7 +33,7 @@ _LONGEST = 160
 
 
 def looks_like(content: bytes) -> bool:
-    """Whether most of it, by octets, is lines with a sentence whose checksum is not wrong.
+    """Whether most of it, by octets, is lines with a sentence whose checksum is not wrong, or a proprietary one.
 
     NULs, with which recorders fill their files, do not count, nor do the octets of a line beyond the longest.
     """
@@ -42,7 +42,7 @@ def looks_like(content: bytes) -> bool:
         octets = min(len(line) - line.count(b"\0"), _LONGEST)
         found = _SENTENCE.search(line)
         total += octets
-        sound += octets if found and _is_sound(found.group()) else 0
+        sound += octets if (found and _is_sound(found.group())) or _PROPRIETARY.search(line) else 0
     return 2 * sound > total
 
 

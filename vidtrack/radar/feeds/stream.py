@@ -79,13 +79,13 @@ class ScanStream:
         return None if self._pace is None else self._pace.period_s
 
     def hear(self, payload: bytes) -> None:
-        """Take a payload. Raises ConfigError without the library for its format."""
-        if self._decoder is None:
-            kind = decoder_of(payload)
-            if kind is None:
-                self.losses.damaged += 1
-                return
+        """Take a payload; the first known one tells the format. Raises ConfigError without the library for it."""
+        kind = decoder_of(payload)
+        if self._decoder is None and kind is not None:
             self._decoder = kind(self.losses)
+        if kind is None or not isinstance(self._decoder, kind):  # other traffic, or damage at its begin
+            self.losses.damaged += 1
+            return
         now = monotonic()
         self._heard += [(now, message) for message in self._decoder.messages(payload)]
 
