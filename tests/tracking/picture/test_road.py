@@ -82,14 +82,6 @@ def test_a_standing_vehicle_is_one_sample():
     np.testing.assert_allclose(sizes.typical(np.array([at_bottom(160, 140, (20, 10))])), before, rtol=0.1)
 
 
-def test_accelerations_are_in_the_sizes_of_vehicles_at_the_place_or_of_what_is_larger():
-    road = Road(WIDTH, HEIGHT)
-    motorcycle, lorry = at_bottom(160, 140, (8, 10)), at_bottom(160, 140, (90, 70))
-    np.testing.assert_array_equal(road.scale(np.array([motorcycle, lorry])), [10, 90])  # nothing is known
-    drive(road.learn, perspective, vehicles=6)
-    np.testing.assert_allclose(road.scale(np.array([motorcycle, lorry])), [perspective(140)[0], 90], rtol=0.05)
-
-
 def test_a_field_stays_while_vehicles_differ_too_much_for_another_one():
     road, box = Road(WIDTH, HEIGHT), np.array([at_bottom(160, 140, (20, 10))])
     drive(road.learn, perspective, vehicles=6)

@@ -47,10 +47,25 @@ def test_two_regions_that_are_each_like_a_vehicle_are_two_whoever_was_predicted(
     assert grouped([[10, 10, 35, 18], [30, 30, 35, 18]], [[8, 8, 60, 42]], typical, gap=0.5) == [0, 1]
 
 
-def test_a_far_vehicle_is_no_piece_of_a_near_one_in_whose_predicted_box_it_is():
-    far, near = [30, 10, 18, 9], [10, 22, 60, 30]
-    assert grouped([far, near], [[8, 8, 64, 46]], [(20, 10), (60, 30)], gap=0.5) == [0, 1]
-    assert grouped([far, near], [[8, 8, 64, 46]], [(60, 30), (60, 30)], gap=0.5) == [0, 0]  # as large as a vehicle's part
+@pytest.mark.parametrize("order", [[0, 1], [1, 0]])
+def test_each_region_is_like_a_vehicle_by_what_is_usual_at_its_own_place(order):
+    far, near, scrap = [30, 10, 18, 9], [10, 22, 60, 30], [30, 24, 12, 8]
+
+    def one(box, usual):
+        group = grouped(np.array(box)[order], [[8, 8, 64, 46]], np.array(usual)[order], gap=0.5)
+        return group[0] == group[1]
+
+    assert not one([far, near], [(20, 10), (60, 30)])
+    assert one([far, near], [(60, 30), (60, 30)])
+    assert one([far, scrap], [(20, 10), (60, 30)])
+
+
+@given(st.permutations(range(3)))
+def test_a_scrap_between_a_far_and_a_near_vehicle_makes_them_one_in_no_order(order):
+    boxes = np.array([[30, 10, 18, 9], [36, 20, 6, 2], [20, 21, 40, 22]])
+    usual = np.array([[20, 10], [30, 15], [60, 30]])
+    group = grouped(boxes[order], [[8, 8, 64, 46]], usual[order], gap=0.5)
+    assert group[order.index(0)] != group[order.index(2)]
 
 
 def test_a_small_piece_beside_a_vehicle_belongs_to_it_though_nobody_predicted_it():

@@ -203,8 +203,7 @@ class Picture:
             least, never = -float(np.expm1(-dt / LOOK_S)), np.zeros(len(view.looks), bool)
             follow(register.look, view.looks, taken, never, least, bank.hits)
         if bank.model.per_size:
-            box = around(bank.x, register.box)
-            np.copyto(bank.scale, self.road.scale(box) if self.road else longer(box), where=taken >= 0)
+            np.copyto(bank.scale, longer(register.box), where=taken >= 0)
 
     def sides(self, box: Floats) -> Mask:
         """(N, 4) which sides of boxes (N, 4) the border of the last scan cuts."""

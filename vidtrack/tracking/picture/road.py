@@ -6,7 +6,6 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Mask
 from vidtrack.compiled import kernel
-from vidtrack.tracking.boxes import longer
 from vidtrack.tracking.picture.restless import RestlessMap
 from vidtrack.tracking.picture.sizes import SizeField
 from vidtrack.tracking.picture.swarm import Swarm
@@ -45,14 +44,6 @@ class Road:
         if not self.sizes.known or not len(before):
             return np.ones((len(before), 4))
         return _growth(self.sizes.typical(before), self.sizes.typical(after))
-
-    def scale(self, box: Floats) -> Floats:
-        """(N,) longer sides [px] of boxes (N, 4), or those usual at their places where these are longer.
-
-        Accelerations are in sizes: a motorcycle, or the part that is seen of a car, accelerates no less than cars.
-        """
-        longest = longer(box)
-        return np.fmax(longest, self.sizes.typical(box).max(axis=1)) if self.sizes.known else longest
 
     @property
     def flake(self) -> float:
