@@ -35,9 +35,9 @@ def _grows(ground: Ground, knots: Knots) -> np.ndarray:
     """(K - 1,) steps in which a box changes its size on the road."""
     left, top, right, bottom = knots.edge.T
     across = ground.metres(np.column_stack([right, bottom])) - ground.metres(np.column_stack([left, bottom]))
-    m_per_px = np.linalg.norm(across, axis=1) / (right - left)
     grows = np.zeros(len(left) - 1, bool)
-    with np.errstate(invalid="ignore", divide="ignore"):  # NaN, and so no growth, for sides that the border cuts
+    with np.errstate(invalid="ignore", divide="ignore"):  # NaN, no growth: a side that is cut, or zero
+        m_per_px = np.linalg.norm(across, axis=1) / (right - left)
         for side in (right - left, bottom - top):
             change = np.abs(np.diff(np.log(side * m_per_px)))
             grows |= change > _GROWTH + _SIGMAS * _PX * np.hypot(1 / side[1:], 1 / side[:-1])
