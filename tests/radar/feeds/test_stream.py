@@ -61,19 +61,32 @@ def test_other_traffic_at_the_address_is_counted_and_changes_nothing(blocks):
     foreign = [
         b"GET / HTTP/1.1\r\n\r\n" + block(plot(502.0, 12000, 123)),
         b"$GPZDA,000500.00,01,01,2026,,\r\n",
+        b"$GPZDA,000500.00,01,01,2026,,\r\n" * 3 + block(plot(502.0, 12000, 123)),
         bytes(60),
     ]
     stream, scans = given_out([payload for own in blocks for payload in (own, *foreign)])
     _, expected = given_out(blocks)
-    assert stream.losses.damaged == 3 * len(blocks)
+    assert stream.losses.damaged == 4 * len(blocks)
     assert len(scans) == len(expected)
     for (_, scan), (_, same) in zip(scans, expected, strict=True):
         np.testing.assert_array_equal(scan.z, same.z)
 
 
-def test_proprietary_sentences_are_no_damage():
+@pytest.mark.parametrize("stray", [b"$PMTK010,001*2E\r\n", b"$GPZDA,000500.00,01,01,2026,,\r\n"])
+def test_what_tells_nothing_does_not_settle_the_format(stray, blocks):
+    stream, scans = given_out([stray, *blocks])
+    assert len(scans) == len(given_out(blocks)[1])
+    assert not stream.losses.damaged
+
+
+def test_proprietary_sentences_and_empty_lines_are_no_damage():
     stream = ScanStream(SETTINGS, "feed")
-    for payload in (b"$PGRME,3.1,M,4.2,M,5.2,M*2D\r\n", b"$RATTM,01,3.5,45.0,T,,,,,,N,,T,,000500.00,A\r\n"):
+    for payload in (
+        b"\r\n",
+        b"$PMTK010,001*2E\r\n",
+        b"$PGRME,3.1,M,4.2,M,5.2,M*2D\r\n",
+        b"$RATTM,01,3.5,45.0,T,,,,,,N,,T,,000500.00,A\r\n",
+    ):
         stream.hear(payload)
     assert not stream.losses.damaged
 

@@ -60,7 +60,8 @@ class ScanStream:
         self.found: Measurements | None = None
         self.plane: Plane | None = None
         self.plots = 0
-        self._decoder: Decoder | None = None
+        self._decoders: dict[type[Decoder], Decoder] = {}
+        self._kind: type[Decoder] | None = None  # of the one that told the first message
         self._heard: list[tuple[float, Message]] = []
         self.lacks: str | None = None
         self._warned = False
@@ -79,15 +80,17 @@ class ScanStream:
         return None if self._pace is None else self._pace.period_s
 
     def hear(self, payload: bytes) -> None:
-        """Take a payload; the first known one tells the format. Raises ConfigError without the library for it."""
+        """Take a payload; the first that tells anything settles the format. ConfigError without the library for it."""
         kind = decoder_of(payload)
-        if self._decoder is None and kind is not None:
-            self._decoder = kind(self.losses)
-        if kind is None or not isinstance(self._decoder, kind):  # other traffic, or damage at its begin
-            self.losses.damaged += 1
+        if kind is None or self._kind not in (None, kind):  # other traffic, or damage at its begin
+            self.losses.damaged += bool(payload.strip())
             return
         now = monotonic()
-        self._heard += [(now, message) for message in self._decoder.messages(payload)]
+        decoder = self._decoders.setdefault(kind, kind(self.losses))
+        found = [(now, message) for message in decoder.messages(payload)]
+        if found:
+            self._kind = kind
+        self._heard += found
 
     def over(self, *, silent: bool = False) -> Iterator[tuple[int, Scan]]:
         """The scans that are over, and empty ones between them, with numbers from 0; all there are after a silence.
