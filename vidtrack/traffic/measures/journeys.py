@@ -18,7 +18,7 @@ from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 
 _SEEN_SURE, _MERGED_SURE, _AGAINST_SURE = 0.99, 0.8, 0.04
 """Share of the passings that are some vehicle's own among those that a track is seen to make, those in a shared blob,
-and those out over an entry or in over an exit, as `tools/ablate_measures.py` has them"""
+and those out over an entry or in over an exit (0 of 23 by Laplace's rule), as `tools/ablate_measures.py` has them"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,9 +116,14 @@ def _inferred_beside(known: Passings) -> Passings:
 
 
 def wrong_way(gates: Gates, passed: Passed) -> Mask:
-    """(P,) whether passings are out over an entry or in over an exit."""
-    inwards = gates.inward[passed.gate] == passed.side
-    return np.where(inwards, gates.role("exit")[passed.gate], gates.role("entry")[passed.gate])
+    """(P,) whether passings are out over an entry or in over an exit.
+
+    None is where a gate's inner side is not known, or where more do so than not, by two at least: it was drawn wrongly.
+    """
+    gate, inwards = passed.gate, gates.inward[passed.gate] == passed.side
+    against = np.where(inwards, gates.role("exit")[gate], gates.role("entry")[gate])
+    drawn = gates.crosses & gates.sided & (np.bincount(gate, np.where(against, 1, -1), len(gates)) < 2)
+    return np.asarray(against & drawn[gate])
 
 
 def _as_sure(gates: Gates, known: Passings) -> Passings:
