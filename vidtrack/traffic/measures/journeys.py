@@ -11,7 +11,7 @@ from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
 from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, SEEN, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.joins import OVERLAP_S, Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
@@ -81,6 +81,7 @@ def journeys(
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
+    passed = passed.only(_once(gates, passed, vehicle))
     together = joins.likely(vehicle)[vehicle]
     across = _across(gates, lives, joins, passed)
     across, joint = across.of(joins.before[across.track]).nowhere(), joins.probability[across.track]
@@ -208,11 +209,22 @@ def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask)
     return joined(lives, ends, begins, last >= 0, float(np.diff(spans).sum()), possible)
 
 
+def _once(gates: Gates, passed: Passed, vehicle: Ints) -> Mask:
+    """(P,) whether a vehicle passes there and that way for the first time within OVERLAP_S: while two of its stretches
+    overlap, each may show the same passing."""
+    way = (vehicle[passed.track] * len(gates) + passed.gate) * 2 + passed.side
+    order = np.lexsort((passed.t, way))
+    once = np.ones(len(passed), bool)
+    once[order[1:]] = (np.diff(way[order]) != 0) | (np.diff(passed.t[order]) > OVERLAP_S)
+    return once
+
+
 def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
     """Gates that vehicles passed only while their track was broken; `track` is the number of the join."""
     passing = Passing(gates, *reaches(metres=True))
     passing.add(gap_rows(lives, joins))
     found = passing.passed()
+    found = found.only(lives.head.t[joins.after[found.track]] > lives.tail.t[joins.before[found.track]])  # a gap
     vehicle = joins.vehicles(len(lives.track))
 
     def ways(passed: Passed, stretch: Ints) -> Ints:
