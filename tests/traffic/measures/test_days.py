@@ -107,6 +107,15 @@ def test_passings_out_over_an_entry_or_in_a_blob_are_doubtful(tmp_path, words, s
     assert bounds(found, "west", rows[0]["direction"]) == (0, 1, 1)
 
 
+def test_a_passing_that_the_picture_does_not_show_is_no_surer_than_one_in_a_blob(tmp_path):
+    track = straight(1, 2.0, 50, 240, 100, 5)
+    status = np.where(np.abs(track[1] - 2.5) < 0.2, "coasting", "confirmed")
+    found = measured([write_run(tmp_path / "run", [track], metres=True, status=status)], site(CALIBRATED))
+    row = next(row for row in found.tables["crossings"].to_pylist() if row["gate"] == "west")
+    assert row["reason"] == "coasted"
+    assert 0.7 < row["confidence"] <= 0.8
+
+
 def test_files_follow_each_other_and_a_vehicle_of_one_is_none_of_the_other(tmp_path):
     runs = [write_run(tmp_path / name, [straight(1, 2.0, 50, 240, 100, 5)], seconds=10) for name in "ab"]
     found = measured(runs, site())

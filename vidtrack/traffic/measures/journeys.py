@@ -9,7 +9,7 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
-from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, SEEN, confidence, reasons
+from vidtrack.traffic.measures.crossings import COASTED, INFERRED, JOINED, MERGED, SEEN, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
 from vidtrack.traffic.measures.joins import OVERLAP_S, Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
@@ -18,7 +18,8 @@ from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 
 _SEEN_SURE, _MERGED_SURE, _AGAINST_SURE = 0.99, 0.8, 0.04
 """Share of the passings that are some vehicle's own among those that a track is seen to make, those in a shared blob,
-and those out over an entry or in over an exit (0 of 23 by Laplace's rule), as `tools/ablate_measures.py` has them"""
+and those out over an entry or in over an exit (0 of 23 by Laplace's rule), as `tools/ablate_measures.py` has them.
+Those that the picture does not show are taken for no surer than those in a blob."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +130,8 @@ def wrong_way(gates: Gates, passed: Passed) -> Mask:
 
 def _as_sure(gates: Gates, known: Passings) -> Passings:
     """The same passings, as sure as those of their kind are."""
-    sure = np.select([known.reason == SEEN, known.reason == MERGED], [_SEEN_SURE, _MERGED_SURE], 1.0)
+    unseen = (known.reason == MERGED) | (known.reason == COASTED)
+    sure = np.select([known.reason == SEEN, unseen], [_SEEN_SURE, _MERGED_SURE], 1.0)
     sure *= np.where(wrong_way(gates, known.passed), _AGAINST_SURE, 1.0)
     return Passings(known.passed, sure * known.probability, known.reason)
 
