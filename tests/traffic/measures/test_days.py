@@ -167,18 +167,28 @@ def test_figures_are_those_of_their_definitions(events):
 
 
 @pytest.mark.parametrize(
-    ("n", "sure", "low", "high"),
-    [(1, 0.99, 1, 1), (1, 0.8, 0, 1), (5, 0.99, 4, 6), (100, 0.99, 97, 106), (3, 1.0, 3, 4)],
+    ("n", "sure", "watched", "low", "high"),
+    [
+        (1, 0.99, 1.0, 1, 1),
+        (1, 0.8, 1.0, 0, 1),
+        (5, 0.99, 1.0, 4, 6),
+        (100, 0.99, 1.0, 97, 106),
+        (3, 1.0, 1.0, 3, 4),
+        (0, 1.0, 1.0, 0, 0),
+        (10, 1.0, 0.5, 10, 31),  # 10 + 2 + ceil(10 + 1.96 sqrt(10 / 0.5))
+        (0, 1.0, 0.5, 0, 4),  # ceil(1 + 1.96 sqrt(1 / 0.5))
+    ],
 )
-def test_bounds_of_a_count_hold_passings_that_were_none_and_missed_ones(n, sure, low, high):
+def test_bounds_of_a_count_hold_passings_that_were_none_missed_or_not_watched(n, sure, watched, low, high):
     """Poisson numbers of means n (1 - sure) and 0.025 n sure, each below its bound with 97.5 %."""
     yes = np.ones(n, bool)
     passed = Passed(
         np.zeros(n), np.zeros(n, int), np.arange(n), np.zeros(n, int), *np.ones((4, n)), yes, ~yes,
         np.ones(n), *np.ones((2, n)), np.zeros(n), ~yes,
     )  # fmt: skip
-    found = figures(passed, np.full(n, sure), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=1)
-    assert (found.low.item(), found.count.item(), found.high.item()) == (low, n, high)
+    share = np.array([watched])
+    found = figures(passed, np.full(n, sure), np.full(n, 4.0), np.array([0.0, 900.0]), share, ways=1)
+    assert (found.low[0, 0], found.count[0, 0], found.high[0, 0]) == (low, n, high)
 
 
 def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():
