@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from vidtrack.traffic.measures.crossings import confidence, following
 from vidtrack.traffic.measures.gates import gates_of
+from vidtrack.traffic.measures.journeys import wrong_way
 from vidtrack.traffic.measures.measure import measured
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting
 from vidtrack.traffic.measures.rows import Rows, off_road
@@ -247,3 +248,46 @@ def test_confidence_grows_with_the_distance_on_both_sides():
     object.__setattr__(passed, "before", np.array([0.0, 1.0, 9.0]))
     object.__setattr__(passed, "after", np.array([9.0, 9.0, 9.0]))
     assert confidence(passed) == pytest.approx([0.5, 0.8413, 1.0], abs=1e-4)
+
+
+def against(gates, passings):
+    """Whether passings (gate, side) of gates name: (line, role, leg) are against them."""
+    lines = {name: {"line": line, "role": role, "leg": leg} for name, (line, role, leg) in gates.items()}
+    gate, side = np.array(passings).T
+    passed = passed_of(np.arange(len(gate)), gate, side, np.zeros(len(gate)), np.ones(len(gate)))
+    return wrong_way(gates_of(site(gates=lines), None), passed).tolist()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("role", ["entry", "exit", "both", "neutral"])
+def test_out_over_an_entry_and_in_over_an_exit_are_against_the_gate(role, turned):
+    """To the right is in over the western gate, which is drawn in either order."""
+    line = [[100, 0], [100, 400]][:: -1 if turned else 1]
+    gates = {"west": (line, role, "a"), "east": ([[500, 0], [500, 400]], "both", "b")}
+    right = int(turned)
+    expected = {"entry": [False, True], "exit": [True, False]}.get(role, [False, False])
+    assert against(gates, [(0, right), (0, 1 - right)]) == expected
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    "other",
+    [
+        {},
+        {"out": ([[100, 210], [100, 400]], "exit", "b")},
+        {"out": ([[103, 210], [103, 400]], "exit", "b")},
+        {"out": ([[160, 210], [160, 400]], "exit", "a")},
+    ],
+    ids=["one gate", "collinear", "at one cross-section", "staggered on one leg"],
+)
+def test_nobody_is_against_a_gate_whose_inner_side_is_not_known(other, turned):
+    line = [[100, 0], [100, 200]][:: -1 if turned else 1]
+    gates = {"in": (line, "entry", "a")} | other
+    assert not any(against(gates, [(gate, side) for gate in range(len(gates)) for side in (0, 1)]))
+
+
+def test_a_gate_that_most_pass_against_its_role_was_drawn_wrongly():
+    gates = {"west": ([[100, 0], [100, 400]], "entry", "a"), "east": ([[500, 0], [500, 400]], "both", "b")}
+    assert against(gates, [(0, 1)]) == [True]
+    assert against(gates, [(0, 1), (0, 1), (0, 0)]) == [True, True, False]
+    assert not any(against(gates, [(0, 1), (0, 1)]))

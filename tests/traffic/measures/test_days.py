@@ -95,16 +95,25 @@ def bounds(found, gate, direction):
     return row["count_low"], row["count"], row["count_high"]
 
 
-@pytest.mark.parametrize(("words", "step"), [("confirmed", -100), ("merged", 100)])
-def test_passings_out_over_an_entry_or_in_a_blob_are_doubtful(tmp_path, words, step):
+@pytest.mark.parametrize(("words", "step", "sure"), [("confirmed", -100, 0.99 * 0.04), ("merged", 100, 0.8)])
+def test_passings_out_over_an_entry_or_in_a_blob_are_doubtful(tmp_path, words, step, sure):
     """Perhaps it was none, or another vehicle: the bounds hold 0, too."""
     track = straight(1, 2.0, 300 - 2.5 * step, 240, step, 5)
     found = measured(
         [write_run(tmp_path / "run", [track], metres=True, status=np.full(len(track[1]), words))], site(CALIBRATED)
     )
     rows = [row for row in found.tables["crossings"].to_pylist() if row["gate"] == "west"]
-    assert [row["confidence"] < 0.9 for row in rows] == [True]
+    assert [row["confidence"] for row in rows] == pytest.approx([sure], rel=0.01)
     assert bounds(found, "west", rows[0]["direction"]) == (0, 1, 1)
+
+
+def test_a_passing_that_the_picture_does_not_show_is_no_surer_than_one_in_a_blob(tmp_path):
+    track = straight(1, 2.0, 50, 240, 100, 5)
+    status = np.where(np.abs(track[1] - 2.5) < 0.2, "coasting", "confirmed")
+    found = measured([write_run(tmp_path / "run", [track], metres=True, status=status)], site(CALIBRATED))
+    row = next(row for row in found.tables["crossings"].to_pylist() if row["gate"] == "west")
+    assert row["reason"] == "coasted"
+    assert 0.7 < row["confidence"] <= 0.8
 
 
 def test_files_follow_each_other_and_a_vehicle_of_one_is_none_of_the_other(tmp_path):
@@ -158,18 +167,28 @@ def test_figures_are_those_of_their_definitions(events):
 
 
 @pytest.mark.parametrize(
-    ("n", "sure", "low", "high"),
-    [(1, 0.99, 1, 1), (1, 0.8, 0, 1), (5, 0.99, 4, 6), (100, 0.99, 97, 106), (3, 1.0, 3, 4)],
+    ("n", "sure", "watched", "low", "high"),
+    [
+        (1, 0.99, 1.0, 1, 1),
+        (1, 0.8, 1.0, 0, 1),
+        (5, 0.99, 1.0, 4, 6),
+        (100, 0.99, 1.0, 97, 106),
+        (3, 1.0, 1.0, 3, 4),
+        (0, 1.0, 1.0, 0, 0),
+        (10, 1.0, 0.5, 10, 31),  # 10 + 2 + ceil(10 + 1.96 sqrt(10 / 0.5))
+        (0, 1.0, 0.5, 0, 4),  # ceil(1 + 1.96 sqrt(1 / 0.5))
+    ],
 )
-def test_bounds_of_a_count_hold_passings_that_were_none_and_missed_ones(n, sure, low, high):
+def test_bounds_of_a_count_hold_passings_that_were_none_missed_or_not_watched(n, sure, watched, low, high):
     """Poisson numbers of means n (1 - sure) and 0.025 n sure, each below its bound with 97.5 %."""
     yes = np.ones(n, bool)
     passed = Passed(
         np.zeros(n), np.zeros(n, int), np.arange(n), np.zeros(n, int), *np.ones((4, n)), yes, ~yes,
         np.ones(n), *np.ones((2, n)), np.zeros(n), ~yes,
     )  # fmt: skip
-    found = figures(passed, np.full(n, sure), np.full(n, 4.0), np.array([0.0, 900.0]), np.ones(1), ways=1)
-    assert (found.low.item(), found.count.item(), found.high.item()) == (low, n, high)
+    share = np.array([watched])
+    found = figures(passed, np.full(n, sure), np.full(n, 4.0), np.array([0.0, 900.0]), share, ways=1)
+    assert (found.low[0, 0], found.count[0, 0], found.high[0, 0]) == (low, n, high)
 
 
 def test_an_interval_has_a_v85_from_as_many_speeds_as_bound_it():

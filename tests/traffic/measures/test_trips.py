@@ -117,6 +117,19 @@ def test_a_broken_track_is_joined_and_its_gate_counted(tmp_path):
     assert middle[0]["speed_kmh"] is None
 
 
+@pytest.mark.parametrize("behind_px", [2.0, 8.0])
+def test_a_gate_within_the_overlap_of_two_joined_tracks_is_passed_once(tmp_path, behind_px):
+    """For 0.8 s both tracks show the vehicle, the second one a little behind the first."""
+    one, two, *others = broken(-0.8)
+    two[2][:, 0] -= behind_px
+    gates = PLACE["gates"] | {"middle": {"line": [[210, 0], [210, 479]]}}
+    found = measured([write_run(tmp_path / "run", [one, two, *others], metres=True)], site(PLACE | {"gates": gates}))
+    assert found.report["joins"] == 1
+    rows = [row for row in found.tables["crossings"].to_pylist() if row["gate"] == "middle" and row["time_s"] < 20]
+    assert [(row["track_id"], row["direction"], row["reason"]) for row in rows] == [(1, "right", "seen")]
+    assert rows[0]["time_s"] == pytest.approx(11.6, abs=0.01)
+
+
 @pytest.mark.parametrize(("gap_s", "aside_px"), [(0.8, 200.0), (-1.5, 0.0)])
 def test_tracks_that_do_not_fit_stay_apart(tmp_path, gap_s, aside_px):
     """Too far aside, or for long at the same time."""

@@ -37,13 +37,13 @@ def test_the_doubtful_come_first():
     events = [
         plain,
         Event(1.0, "a", "up", 0, 2, confidence=0.97, reason="seen"),
-        Event(2.0, "a", "up", 0, 3, confidence=1.0, reason="merged"),
+        Event(2.0, "a", "up", 0, 3, confidence=0.75, reason="merged"),
         Event(3.0, "a", "up", 0, 4, confidence=1.0, reason="seen", headway_s=0.2),
         Event(4.0, "a", "up", 0, 5, confidence=0.55, reason="joined"),
-        Event(5.0, "a", "up", 0, 6, confidence=1.0, reason="coasted"),
+        Event(5.0, "a", "up", 0, 6, confidence=0.79, reason="coasted"),
         Event(6.0, "a", "up", 0, 7),
     ]
-    assert doubtful_order(events).tolist() == [4, 3, 5, 2, 1, 0, 6]
+    assert doubtful_order(events).tolist() == [4, 2, 5, 3, 1, 0, 6]
 
 
 def test_the_random_order_is_always_the_same_and_of_no_other_column():

@@ -116,8 +116,19 @@ class Gates:
     def outside(self, gate: Ints, xy: Floats) -> Mask:
         """(N,) whether points (N, 2) lie on the outer side of gates (N,); a gate on the middle of all has none."""
         start, end = self._ends[:, gate]
-        inner, long = turn(start, end, self._middle), np.linalg.norm(end - start, axis=1)
-        return np.asarray((np.abs(inner) > _OFF * long**2) & (inner * turn(start, end, xy) < 0))
+        return np.asarray(self.sided[gate] & (turn(start, end, self._middle) * turn(start, end, xy) < 0))
+
+    @property
+    def sided(self) -> Mask:
+        """(G,) whether the middle of all entries and exits lies clearly beside each gate."""
+        start, end = self._ends
+        long = np.linalg.norm(end - start, axis=1)
+        return np.asarray(np.abs(turn(start, end, self._middle)) > _OFF * long**2)
+
+    @property
+    def crosses(self) -> bool:
+        """Whether entries and exits are of two legs at least, so that a road lies between them."""
+        return len(np.unique(self.leg[self.role("entry", "exit", "both")])) > 1
 
     @property
     def _ends(self) -> Floats:

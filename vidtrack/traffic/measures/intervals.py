@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta, tzinfo
 from typing import Any
 
 import numpy as np
-from scipy.special import pdtr, pdtrik
+from scipy.special import pdtrik
 
 from vidtrack.arrays.types import Floats, Ints
 from vidtrack.traffic.measures.passing import Passed
@@ -125,8 +125,7 @@ def figures(passed: Passed, confidence: Floats, length: Floats, edges: Floats, w
 
 def _most(mean: Floats) -> Floats:
     """Upper bounds of Poisson numbers of these means, one-sided 97.5 %: the first that so many are not above."""
-    bound = np.ceil(pdtrik(_ONE_SIDED, np.maximum(mean, 1e-9)))
-    return np.asarray(bound - (pdtr(np.maximum(bound - 1, 0), mean) >= _ONE_SIDED) * (bound > 0))
+    return np.asarray(np.ceil(pdtrik(_ONE_SIDED, np.maximum(mean, 1e-9))))
 
 
 def _sum(cell: Ints, weights: Floats | None, cells: int) -> Floats:

@@ -9,16 +9,17 @@ import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints, Mask
 from vidtrack.traffic.measures.beyond import INFERRED_SURE, at_gates, beyond
-from vidtrack.traffic.measures.crossings import INFERRED, JOINED, MERGED, SEEN, confidence, reasons
+from vidtrack.traffic.measures.crossings import COASTED, INFERRED, JOINED, MERGED, SEEN, confidence, reasons
 from vidtrack.traffic.measures.gates import Gates
-from vidtrack.traffic.measures.joins import Joins, gap_rows, joined
+from vidtrack.traffic.measures.joins import OVERLAP_S, Joins, gap_rows, joined
 from vidtrack.traffic.measures.passing import Passed, Passing, lasting, reaches
 from vidtrack.traffic.measures.stretches import Lives
 from vidtrack.traffic.measures.trips import Trips, at_edge, first_of, trips_of
 
 _SEEN_SURE, _MERGED_SURE, _AGAINST_SURE = 0.99, 0.8, 0.04
 """Share of the passings that are some vehicle's own among those that a track is seen to make, those in a shared blob,
-and those out over an entry or in over an exit, as `tools/ablate_measures.py` has them"""
+and those out over an entry or in over an exit (0 of 23 by Laplace's rule), as `tools/ablate_measures.py` has them.
+Those that the picture does not show are taken for no surer than those in a blob."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +82,7 @@ def journeys(
     passed = passed.only(lasting(lives.track[passed.track], passed.gate, passed.side, passed.t))
     joins = _joins(gates, passed, lives, spans, may) if metres else _NONE
     vehicle = joins.vehicles(len(lives.track))
+    passed = passed.only(_once(gates, passed, vehicle))
     together = joins.likely(vehicle)[vehicle]
     across = _across(gates, lives, joins, passed)
     across, joint = across.of(joins.before[across.track]).nowhere(), joins.probability[across.track]
@@ -116,14 +118,20 @@ def _inferred_beside(known: Passings) -> Passings:
 
 
 def wrong_way(gates: Gates, passed: Passed) -> Mask:
-    """(P,) whether passings are out over an entry or in over an exit."""
-    inwards = gates.inward[passed.gate] == passed.side
-    return np.where(inwards, gates.role("exit")[passed.gate], gates.role("entry")[passed.gate])
+    """(P,) whether passings are out over an entry or in over an exit.
+
+    None is where a gate's inner side is not known, or where more do so than not, by two at least: it was drawn wrongly.
+    """
+    gate, inwards = passed.gate, gates.inward[passed.gate] == passed.side
+    against = np.where(inwards, gates.role("exit")[gate], gates.role("entry")[gate])
+    drawn = gates.crosses & gates.sided & (np.bincount(gate, np.where(against, 1, -1), len(gates)) < 2)
+    return np.asarray(against & drawn[gate])
 
 
 def _as_sure(gates: Gates, known: Passings) -> Passings:
     """The same passings, as sure as those of their kind are."""
-    sure = np.select([known.reason == SEEN, known.reason == MERGED], [_SEEN_SURE, _MERGED_SURE], 1.0)
+    unseen = (known.reason == MERGED) | (known.reason == COASTED)
+    sure = np.select([known.reason == SEEN, unseen], [_SEEN_SURE, _MERGED_SURE], 1.0)
     sure *= np.where(wrong_way(gates, known.passed), _AGAINST_SURE, 1.0)
     return Passings(known.passed, sure * known.probability, known.reason)
 
@@ -203,11 +211,22 @@ def _joins(gates: Gates, passed: Passed, lives: Lives, spans: Floats, may: Mask)
     return joined(lives, ends, begins, last >= 0, float(np.diff(spans).sum()), possible)
 
 
+def _once(gates: Gates, passed: Passed, vehicle: Ints) -> Mask:
+    """(P,) whether a vehicle passes there and that way for the first time within OVERLAP_S: while two of its stretches
+    overlap, each may show the same passing."""
+    way = (vehicle[passed.track] * len(gates) + passed.gate) * 2 + passed.side
+    order = np.lexsort((passed.t, way))
+    once = np.ones(len(passed), bool)
+    once[order[1:]] = (np.diff(way[order]) != 0) | (np.diff(passed.t[order]) > OVERLAP_S)
+    return once
+
+
 def _across(gates: Gates, lives: Lives, joins: Joins, passed: Passed) -> Passed:
     """Gates that vehicles passed only while their track was broken; `track` is the number of the join."""
     passing = Passing(gates, *reaches(metres=True))
     passing.add(gap_rows(lives, joins))
     found = passing.passed()
+    found = found.only(lives.head.t[joins.after[found.track]] > lives.tail.t[joins.before[found.track]])  # a gap
     vehicle = joins.vehicles(len(lives.track))
 
     def ways(passed: Passed, stretch: Ints) -> Ints:

@@ -24,11 +24,10 @@ from vidtrack.traffic.metres import SITE_COPY
 from vidtrack.traffic.shapes import Point
 from vidtrack.traffic.site import Site, read_site
 
-MERGED, COASTED, DOUBLE = 0.05, 0.1, 0.2
-"""Least doubt of a crossing in a shared blob, of one that the picture did not show, and of one close behind another"""
+_DOUBLE = 0.2
+"""Least doubt of a crossing close behind another"""
 _DOUBLE_S = 0.5
 """s; a vehicle that follows another one faster than this is more often the same one, counted twice"""
-_REASONS = {"merged": MERGED, "coasted": COASTED}
 _NEEDED = ("time_s", "gate", "direction", "run", "track_id", "confidence", "reason")
 
 
@@ -50,10 +49,10 @@ class Event:
 
     @property
     def doubt(self) -> float:
-        """From 0 to 1: what the picture and the distance to the vehicle ahead give reason for."""
+        """From 0 to 1: what the confidence and the distance to the vehicle ahead give reason for."""
         close = self.headway_s is not None and self.headway_s < _DOUBLE_S
         sure = 1.0 if self.confidence is None else self.confidence
-        return max(1 - sure, _REASONS.get(self.reason or "", 0.0), DOUBLE if close else 0.0)
+        return max(1 - sure, _DOUBLE if close else 0.0)
 
     @property
     def lot(self) -> bytes:
