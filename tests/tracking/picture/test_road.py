@@ -44,16 +44,16 @@ def test_a_perspective_field_is_found_though_three_of_ten_samples_are_fragments(
         np.testing.assert_allclose(typical, perspective(y), rtol=0.2)
 
 
-def test_nothing_is_typical_before_three_vehicles_drove():
+def test_nothing_is_typical_before_five_vehicles_drove():
     sizes = SizeField(WIDTH, HEIGHT)
 
     def learn(tracks):
         sizes.learn(tracks, np.ones(len(tracks), bool))
 
-    drive(learn, perspective, vehicles=2)
+    drive(learn, perspective, vehicles=4)
     assert not sizes.known
     assert np.isnan(sizes.typical(np.array([[10.0, 10, 20, 10]]))).all()
-    drive(learn, perspective, vehicles=1, first=2)
+    drive(learn, perspective, vehicles=1, first=4)
     assert sizes.known
 
 

@@ -12,7 +12,7 @@ from vidtrack.tracks import CONFIRMED, Tracks
 
 _SAMPLES = 400  # kept, the newest
 _STRIDE = 1 / 3  # sizes that a vehicle moves between two samples of it
-_TRACKS = 3  # different vehicles that make a field
+_TRACKS = 5  # different vehicles that make a field
 _SPREAD = (0.4, 0.5)  # largest standard deviations of ln width and ln height of a field that says anything
 _REFIT_S = 1.0
 _ROUNDS = 6  # of reweighting
