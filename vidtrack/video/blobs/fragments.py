@@ -82,8 +82,8 @@ def together(
     Two regions are pieces of one vehicle if they are close together inside one predicted box; or if one is small and
     near the other, and both together are no larger than a vehicle; or if they are linked, not in two predicted boxes,
     and together no larger than a vehicle (while sizes are unknown: one is smaller than the other). Two regions that
-    are each like a vehicle at its own place are never pieces. The nearest pieces are joined first; a third region
-    between two vehicles joins the nearer one, not both.
+    are each like a vehicle are never pieces. The nearest pieces are joined first; a third region between two vehicles
+    joins the nearer one, not both.
     """
     vehicle = np.empty(len(box), np.int64)
     for i in range(len(box)):
@@ -98,11 +98,10 @@ def together(
             distance = _gap(box[i], box[j])
             same = vehicle[i] >= 0 and vehicle[i] == vehicle[j]
             two = vehicle[i] >= 0 and vehicle[j] >= 0 and vehicle[i] != vehicle[j]
-            usual = typical[i] if box[i, 1] + box[i, 3] >= box[j, 1] + box[j, 3] else typical[j]  # where both stand
             if (
                 (same and distance <= gap * max(predicted[vehicle[i], 2], predicted[vehicle[i], 3]))
-                or (pieces and _whole(box[i], box[j], usual))
-                or (pieces and link[i] == link[j] and not two and _fit(box[i], box[j], usual))
+                or (pieces and _whole(box[i], box[j], typical[i]))
+                or (pieces and link[i] == link[j] and not two and _fit(box[i], box[j], typical[i]))
             ):
                 one.append(i)
                 other.append(j)
@@ -148,9 +147,7 @@ def _one_vehicle(group: Ints, a: int, b: int, box: Floats, area: Floats, typical
             continue
         for j in range(len(box)):
             if group[j] == b and _both_vehicles(i, j, box, area, typical):
-                usual = min(typical[i, 0] * typical[i, 1], typical[j, 0] * typical[j, 1])
-                if not union <= _WHOLE * usual:
-                    return False
+                return not np.isnan(typical[i, 0]) and union <= _WHOLE * typical[i, 0] * typical[i, 1]
     return True
 
 
@@ -178,7 +175,8 @@ def _both_vehicles(i: int, j: int, box: Floats, area: Floats, typical: Floats) -
     """Whether two regions are each like a vehicle."""
     a, b = box[i, 2] * box[i, 3], box[j, 2] * box[j, 3]
     if not np.isnan(typical[i, 0]):
-        return a >= _LIKE * typical[i, 0] * typical[i, 1] and b >= _LIKE * typical[j, 0] * typical[j, 1]
+        usual = typical[i, 0] * typical[i, 1]
+        return min(a, b) >= _LIKE * usual
     union = _union(box[i], box[j])
     filled = area[i] > _LIKE_FILL * a and area[j] > _LIKE_FILL * b
     return filled and min(a, b) >= _LIKE_BOX * union and a + b < _APART * union
