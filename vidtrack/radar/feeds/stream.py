@@ -86,8 +86,9 @@ class ScanStream:
             self.losses.damaged += bool(payload.strip())
             return
         now = monotonic()
-        decoder = self._decoders.setdefault(kind, kind(self.losses))
-        found = [(now, message) for message in decoder.messages(payload)]
+        if kind not in self._decoders:
+            self._decoders[kind] = kind(self.losses)
+        found = [(now, message) for message in self._decoders[kind].messages(payload)]
         if found:
             self._kind = kind
         self._heard += found
