@@ -14,6 +14,7 @@ from vidtrack.traffic.road_scans import LAMP_M, LAMP_S, InPicture, RoadScans
 CAMERA = Pinhole()
 PLACES = np.array([[0.0, 20.0], [-2.0, 30.0], [3.0, 40.0]])
 HEADING = np.radians([10.0, 190.0, 0.0])
+NOBODY = np.empty((0, 2))
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def blobs_and_tracks():
 
 def test_a_blob_is_where_its_vehicle_stands(ground):
     blobs, tracks = blobs_and_tracks()
-    scan = RoadScans(ground, (WIDTH, HEIGHT)).scan(blobs, tracks, station=3)
+    scan = RoadScans(ground, (WIDTH, HEIGHT)).scan(blobs, tracks, PLACES, station=3)
     assert scan.station == 3
     assert len(scan) == 3
     off = scan.z - PLACES
@@ -50,7 +51,7 @@ def test_a_blob_is_where_its_vehicle_stands(ground):
 def test_what_lamps_light_is_off_its_vehicle_for_a_while(ground):
     blobs, tracks = blobs_and_tracks()
     roads = RoadScans(ground, (WIDTH, HEIGHT))
-    day, night = (roads.scan(blobs, tracks, 0, dark=dark) for dark in (False, True))
+    day, night = (roads.scan(blobs, tracks, NOBODY, 0, dark=dark) for dark in (False, True))
     np.testing.assert_array_equal(night.z, day.z)
     lamps = np.broadcast_to(LAMP_M**2 * np.eye(2), (3, 2, 2))
     np.testing.assert_allclose(night.R - day.R, lamps)
@@ -61,8 +62,18 @@ def test_a_blob_that_two_tracks_share_is_left_out(ground):
     blobs, tracks = blobs_and_tracks()
     group, measurement = np.array([0, 0, -1]), tracks.measurement.copy()
     measurement[:2] = measurement[0]
-    scan = RoadScans(ground, (WIDTH, HEIGHT)).scan(blobs, replace(tracks, group=group, measurement=measurement), 0)
+    shared = replace(tracks, group=group, measurement=measurement)
+    scan = RoadScans(ground, (WIDTH, HEIGHT)).scan(blobs, shared, NOBODY, 0)
     assert len(scan) == 2  # that of the third track, and the one that is nobody's
+
+
+def test_a_blob_where_another_sensor_knows_of_a_second_vehicle_is_left_out(ground):
+    blobs, tracks = blobs_and_tracks()
+    roads = RoadScans(ground, (WIDTH, HEIGHT))
+    alone = roads.scan(blobs, tracks, PLACES, 0)
+    behind, beside = PLACES[0] + [0.0, 3.0], PLACES[0] + [6.0, 0.0]
+    np.testing.assert_array_equal(roads.scan(blobs, tracks, np.vstack([PLACES, behind]), 0).z, alone.z[1:])
+    np.testing.assert_array_equal(roads.scan(blobs, tracks, np.vstack([PLACES, beside]), 0).z, alone.z)
 
 
 def test_the_picture_covers_the_calibrated_road_in_it(ground):

@@ -33,6 +33,7 @@ from vidtrack.tracking.picture.picture import NoPicture
 from vidtrack.tracking.rates import Rates
 from vidtrack.tracking.station import Station, Visibility
 from vidtrack.tracking.tracker import Tracker
+from vidtrack.tracks import TENTATIVE
 from vidtrack.traffic.calibration.calibrate import calibrated
 from vidtrack.traffic.road_scans import InPicture, RoadScans
 from vidtrack.traffic.site import read_site
@@ -240,7 +241,9 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
             return network.scan(seen)
         assert camera is not None
         dark = seen.foreground is not None and seen.foreground.dark
-        return camera.scans.scan(seen.scan, seen.tracks, number, dark=dark)
+        expected = tracker.predict(seen.time_s)
+        vehicles = expected.xy[(expected.status != TENTATIVE) & (camera.coverage.share(expected.xy) > 0)]
+        return camera.scans.scan(seen.scan, seen.tracks, vehicles, number, dark=dark)
 
     merged, again = tee(one for _, _, one in heapq.merge(plots, pictures, key=lambda one: one[:2]))
     for one, step in zip(merged, scan_steps(enumerate(map(scan_of, again)), tracker), strict=True):

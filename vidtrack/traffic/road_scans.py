@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Mask
 from vidtrack.estimate.noise import LASTING_S
 from vidtrack.scan import Scan
 from vidtrack.tracks import Tracks
@@ -66,12 +66,14 @@ class RoadScans:
         self._ground = ground
         self._footprints = Footprints(ground, size)
 
-    def scan(self, blobs: Scan, tracks: Tracks, station: int, *, dark: bool = False) -> Scan:
+    def scan(self, blobs: Scan, tracks: Tracks, vehicles: Floats, station: int, *, dark: bool = False) -> Scan:
         """The blobs of one vehicle each, on the road; those that the calibration does not cover are left out.
 
-        The heading of a vehicle is that of its track. R is the error of the border, of the vehicle's shape and heading,
-        and of the calibration; all but the first last from picture to picture. In the dark a blob shows what lamps
-        light, which moves with the vehicle.
+        Several share a blob if the camera's tracks do, or if more than one of the vehicles (K, 2) [m] that all sensors
+        together know of stands in its box: of those in a queue the camera may take two for one. The heading of a
+        vehicle is that of its track. R is the error of the border, of the vehicle's shape and heading, and of the
+        calibration; all but the first last from picture to picture. In the dark a blob shows what lamps light, which
+        moves with the vehicle.
         """
         assert blobs.box is not None, "blobs have boxes"
         owner = np.full(len(blobs), -1)
@@ -79,7 +81,8 @@ class RoadScans:
         owner[tracks.measurement[taken]] = taken
         alone = owner < 0
         alone[owner >= 0] = tracks.group[owner[owner >= 0]] < 0
-        rows = np.flatnonzero(alone)
+        box = within(np.hstack([blobs.z + blobs.box[:, :2], blobs.box[:, 2:]]), blobs.rim)
+        rows = np.flatnonzero(alone & (self._shown(vehicles, box).sum(axis=1) < 2))
         owner, known = owner[rows], owner[rows] >= 0
         u, P, name = np.zeros((len(rows), 2)), np.zeros((len(rows), 4, 4)), -1 - np.arange(len(rows))
         P[:, 2, 2] = P[:, 3, 3] = UNKNOWN_PX_S**2
@@ -89,8 +92,7 @@ class RoadScans:
         P[:, :2, 2:] = P[:, 2:, :2] = 0.0
         P[:, :2, :2] = blobs.R[rows]
         name[known] = tracks.id[owner[known]]
-        box = within(np.hstack([blobs.z[rows] + blobs.box[rows, :2], blobs.box[rows, 2:]]), blobs.rim)
-        stand = self._footprints.place(name, np.full(len(rows), blobs.t), blobs.z[rows], u, P, box)
+        stand = self._footprints.place(name, np.full(len(rows), blobs.t), blobs.z[rows], u, P, box[rows])
         good = np.isfinite(stand.xy).all(axis=1) & np.isfinite(stand.xy_own).all(axis=(1, 2))
         xy, own, shared = stand.xy[good], stand.xy_own[good], stand.xy_shared[good]
         K = self._ground.by_own_error(xy)
@@ -101,3 +103,8 @@ class RoadScans:
             lamps = LAMP_M**2 * np.eye(2)
             R, lasting = R + lamps, lasting + LAMP_S / LASTING_S * lamps
         return Scan(blobs.t, xy, R, lasting=lasting, noise=np.eye(2), station=station)
+
+    def _shown(self, vehicles: Floats, box: Floats) -> Mask:
+        """(N, K) whether vehicles (K, 2) [m] stand in boxes (N, 4) of the picture."""
+        at = self._ground.pixels(vehicles) - box[:, None, :2]
+        return np.asarray(((at > 0) & (at < box[:, None, 2:])).all(axis=2))
