@@ -67,7 +67,7 @@ def test_a_blob_that_two_tracks_share_is_left_out(ground):
     assert len(scan) == 2  # that of the third track, and the one that is nobody's
 
 
-def test_a_blob_where_another_sensor_knows_of_a_second_vehicle_is_left_out(ground):
+def test_a_blob_in_which_two_vehicles_are_known_is_left_out(ground):
     blobs, tracks = blobs_and_tracks()
     roads = RoadScans(ground, (WIDTH, HEIGHT))
     alone = roads.scan(blobs, tracks, PLACES, 0)

@@ -15,12 +15,14 @@ from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.output.linked import refuse_link
-from vidtrack.output.sink import Step
+from vidtrack.output.registration import RegistrationTable
+from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.network.network import Feed, Network, Turn, overlap, read_feeds, warn_if_apart
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.radar.scans import surveyed
+from vidtrack.run.network import learn_ahead
 from vidtrack.run.radar import radar_sinks, refuse_smoothing
 from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
@@ -92,6 +94,7 @@ def _pipeline(
         raise ConfigError(f"{radars.path} has latitudes; with a camera give x_m and y_m, in the metres of {site}")
     refuse_link(settings.output, "radar runs")
     network = Network(read_feeds(paths, radars, settings.radar))
+    learn_ahead(settings, network, seed)
     with open_camera(video, site, settings) as camera:
         tracker = build_road_tracker(settings, network.feeds, camera, explain=extras.explain, seed=seed)
         shown = [k for k, feed in enumerate(network.feeds) if is_shown(feed, camera.coverage)]
@@ -104,11 +107,17 @@ def _pipeline(
 
         def reading() -> dict[str, object]:
             names = [*(feed.placed.name for feed in network.feeds), "camera"]
-            rates = (station.rates.as_dict() for station in tracker.stations.each)
+            biases = network.as_dict()
+            own = zip(names, tracker.stations.each, strict=True)
             return {
                 "plots": sum(len(feed.plots) for feed in network.feeds),
-                "stations": dict(zip(names, rates, strict=True)),
+                "stations": {name: station.rates.as_dict() | biases.get(name, {}) for name, station in own},
             }
+
+        def sinks(folder: Path) -> Iterator[Sink]:
+            places = [feed.placed.xyz[:2] for feed in network.feeds]
+            yield from radar_sinks(settings, extras, 2, places, folder)
+            yield RegistrationTable(folder / "registration.csv", network)
 
         steps, coast_s = road_steps(network, camera, tracker), max(feed.coast_s for feed in network.feeds)
         begin_s, end_s = zip(*(feed.span_s for feed in network.feeds), strict=True)
@@ -121,9 +130,7 @@ def _pipeline(
             count=None,
             steps=steps,
             summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
-            sinks=lambda folder: radar_sinks(
-                settings, extras, 2, [feed.placed.xyz[:2] for feed in network.feeds], folder
-            ),
+            sinks=sinks,
         )
 
 

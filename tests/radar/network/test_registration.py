@@ -61,6 +61,22 @@ def test_radars_at_one_place_tell_the_difference_of_their_biases_only():
     np.testing.assert_allclose(np.degrees(wrap(found.bias[1, 1] - found.bias[0, 1])), 1.0, atol=0.1)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_common_to_radars_at_one_place_stays_unknown_at_ranges_like_the_prior(seed):
+    rng = np.random.default_rng(seed)
+    sigma, place = np.array([0.4, np.radians(1.0)]), [(0.0, 0.0)] * 2
+    found = Registration(place, np.tile([30.0, np.radians(1.0), 0.0], (2, 1)), np.array([0.2, 0.2]), jerk=4.0)
+    start, velocity = np.column_stack([rng.uniform(-30, 30, 5), rng.uniform(20, 60, 5)]), rng.normal(0, 3, (5, 2))
+    for k in range(200):
+        t = 0.1 * k
+        z = to_polar(start + velocity * t) + sigma * rng.normal(size=(5, 2))
+        R = np.tile(np.diag(sigma**2), (5, 1, 1))
+        found.learn(t, Plotted(k % 2, np.arange(5), np.full(5, t), z, R, velocity))
+    assert not found.observed()[:, :2].any()
+    assert (np.abs(found.bias[:, :2]) < [1.0, np.radians(0.3)]).all()
+    assert abs(found.bias[1, 0] - found.bias[0, 0]) < 0.3
+
+
 def test_plots_of_different_targets_teach_nothing():
     found = learnt(np.random.default_rng(3), np.zeros((2, 3)), wrong=1)
     assert found.used < 10

@@ -31,6 +31,8 @@ from vidtrack.tracks import TENTATIVE, Tracks
 
 _log = logging.getLogger(__name__)
 
+BIAS_M, BIAS_SHARE = 30.0, 0.005
+"""m; standard deviation of the unknown bias of a range, and the share of the radar's range that it is at most."""
 CLOCK_S = 1.0
 """s; standard deviation of the error of a clock that is expected to have none, by which one is found."""
 SURE = 3.3
@@ -71,6 +73,15 @@ class Feed:
         return too_slow(self.placed.xyz[:2], self.placed.radar.slowest_m_s)
 
     @property
+    def bias_sigma(self) -> tuple[float, float, float]:
+        """Standard deviations of the unknown biases in range [m], azimuth [rad] and time [s]."""
+        radar = self.placed.radar
+        in_range = (
+            min(BIAS_M, BIAS_SHARE * self.coverage.farthest) if radar.bias_range_m is None else radar.bias_range_m
+        )
+        return in_range, float(np.radians(radar.bias_azimuth_deg)), radar.bias_time_s
+
+    @property
     def xy(self) -> Floats:
         """(N, 2) m; where the plots are, on the common plane."""
         return self.found.sensor.locate(self.found.z, self.found.R)[0][:, :2]
@@ -103,8 +114,7 @@ class Network:
 
     def __init__(self, feeds: Sequence[Feed]) -> None:
         self.feeds = tuple(feeds)
-        radars = [feed.placed.radar for feed in feeds]
-        sigma = np.array([(r.bias_range_m, np.radians(r.bias_azimuth_deg), r.bias_time_s) for r in radars])
+        sigma = np.array([feed.bias_sigma for feed in feeds])
         sigma[0, 2] = 0.0  # common to all clocks nothing can be told
         if len(feeds) == 1:
             sigma[:] = 0.0
@@ -204,9 +214,12 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     """The feeds of tables and recordings: the file NAME.csv, NAME.ast, ... has the plots of the radar NAME.
 
     A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
-    Raises SourceError, PlotFormatError, and ConfigError for a file of no radar, or two of one, for two radars with the
+    Raises SourceError, PlotFormatError, and ConfigError for a stream, a file of no radar, or two of one, for two radars with the
     same plots, and for radar.scan_s if it is for none of these.
     """
+    for path in paths:
+        if "://" in path:
+            raise ConfigError(f"{path} is a stream; here plots are read from tables and recordings")
     feeds = [feed for path in paths for feed in _feeds(Path(path), radars, settings)]
     _refuse_idle(feeds, radars, settings)
     names = [feed.placed.name for feed in feeds]
@@ -360,5 +373,5 @@ def _unbiased(plots: Plots, bias: Floats, cov: Floats, speed: float) -> Plots:
     z[:, 1] = wrap(z[:, 1])
     late = cov[2, 2] * speed**2
     sigma[:, 0] = np.sqrt(sigma[:, 0] ** 2 + cov[0, 0] + late)
-    sigma[:, 1] = np.sqrt(sigma[:, 1] ** 2 + cov[1, 1] + late / np.maximum(z[:, 0], 1.0) ** 2)
+    sigma[:, 1] = np.sqrt(sigma[:, 1] ** 2 + cov[1, 1] + late / np.maximum(z[:, 0] ** 2 + late, 1.0))  # at most 1 rad
     return replace(plots, z=z, sigma=sigma)

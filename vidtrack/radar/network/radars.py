@@ -50,8 +50,8 @@ class Radar(Group):
     """m/s; range rate below which targets are not told from the ground; P_D is half there"""
     detection_probability: float | None = Field(None, gt=0, lt=1)
     """probability that a scan detects a target in range; None: radar.detection_probability"""
-    bias_range_m: float = Field(30.0, ge=0)
-    """m; standard deviation of the unknown bias in range; 0: there is none"""
+    bias_range_m: float | None = Field(None, ge=0)
+    """m; standard deviation of the unknown bias in range; 0: there is none; None: by how far the radar sees"""
     bias_azimuth_deg: float = Field(1.0, ge=0, le=45)
     """degrees; the same in azimuth"""
     bias_time_s: float = Field(0.0, ge=0)

@@ -137,30 +137,38 @@ class Registration:
         """y, H, N of plots `other` (N,) between plots of another radar before and after them."""
         step = after.t - before.t
         share = ((other.t - before.t) / step)[:, None]
-        p0, J0, R0 = self._placed(before)
-        p1, J1, R1 = self._placed(after)
-        p, J, R = self._placed(other)
+        p0, p1, p = (self._place(plots) for plots in (before, after, other))
         y = p - (1 - share) * p0 - share * p1
+        # where the target is, for all plots alike: at the places of single plots, their errors would be in y and in H,
+        # and would tell what nobody can of the biases, as what is common to radars at one place
+        target = p - y / 2
+        J, R = self._derivatives(other.radar, other.v, other.R, target)
         w = share[:, :, None]
+        v, both = (1 - share) * before.v + share * after.v, (1 - w) * before.R + w * after.R
+        J1, R1 = self._derivatives(after.radar, v, both, target)
         H = np.zeros((len(y), 2, self.cov.shape[0]))
         H[:, :, KINDS * other.radar : KINDS * (other.radar + 1)] = J
-        H[:, :, KINDS * after.radar : KINDS * (after.radar + 1)] -= (1 - w) * J0 + w * J1
+        H[:, :, KINDS * after.radar : KINDS * (after.radar + 1)] -= J1
         motion = self.jerk * step**3 * (share[:, 0] * (1 - share[:, 0])) ** 2 / 3
         # a plot may serve in two interpolations, with weights that sum to one: not squared, they count it once
-        N = R + (1 - w) * R0 + w * R1 + motion[:, None, None] * np.eye(2)
+        N = R + R1 + motion[:, None, None] * np.eye(2)
         # of S radars S - 1 differences are independent, and all S (S - 1) / 2 are used
         return y, H, N * len(self.bias) / 2
 
-    def _placed(self, plots: Plotted) -> tuple[Floats, Floats, Floats]:
-        """Positions (N, 2) of plots without the estimated biases, their derivatives by these, and covariances."""
+    def _place(self, plots: Plotted) -> Floats:
+        """(N, 2) positions of plots without the estimated biases."""
         bias = self.bias[plots.radar]
-        polar = plots.z - bias[:2]
-        p = to_cartesian(polar)
-        unit = p / np.maximum(polar[:, :1], 1.0)
-        across = np.column_stack([p[:, 1], -p[:, 0]])
-        J = np.stack([unit, across, -plots.v], axis=2)
-        R = J[:, :, :2] @ plots.R @ J[:, :, :2].transpose(0, 2, 1)
-        return p + plots.v * bias[2] + self.origins[plots.radar], J, R
+        return to_cartesian(plots.z - bias[:2]) + plots.v * bias[2] + self.origins[plots.radar]
+
+    def _derivatives(self, radar: int, v: Floats, R: Floats, target: Floats) -> tuple[Floats, Floats]:
+        """Derivatives (N, 2, 3) of the positions of a radar's plots by its biases, and covariances (N, 2, 2).
+
+        v (N, 2) velocities, R (N, 2, 2) errors of range and azimuth, target (N, 2) where the targets are
+        """
+        away = target - self.origins[radar]
+        unit = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1.0)
+        J = np.stack([unit, np.column_stack([away[:, 1], -away[:, 0]]), -v], axis=2)
+        return J, J[:, :, :2] @ R @ J[:, :, :2].transpose(0, 2, 1)
 
     def _update(self, y: Floats, H: Floats, N: Floats) -> None:
         """Update the biases by differences (N, 2), without those that cannot be of one target."""
