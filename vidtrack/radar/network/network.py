@@ -214,8 +214,8 @@ def read_feeds(paths: Sequence[str], radars: Radars, settings: RadarSettings) ->
     """The feeds of tables and recordings: the file NAME.csv, NAME.ast, ... has the plots of the radar NAME.
 
     A recording of ASTERIX with another name is of all the radars whose sac and sic are in it.
-    Raises SourceError, PlotFormatError, and ConfigError for a stream, a file of no radar, or two of one, for two radars with the
-    same plots, and for radar.scan_s if it is for none of these.
+    Raises SourceError, PlotFormatError, and ConfigError for a stream, a file of no radar, or two of one, for two radars
+    with the same plots, and for radar.scan_s if it is for none of these.
     """
     for path in paths:
         if "://" in path:
