@@ -70,19 +70,21 @@ def network_pipeline(
     def summary(folder: Path) -> Summary:
         return Summary(folder / "summary.json", ", ".join(paths), settings, reading, unit="scans")
 
-    def sinks(folder: Path) -> Iterator[Sink]:
-        places = [feed.placed.xyz[:2] for feed in network.feeds]
-        yield from radar_sinks(settings, extras, network.feeds[0].found.dim, places, folder)
-        yield RegistrationTable(folder / "registration.csv", network)
-
     yield Pipeline(
         name="-".join(Path(path).stem for path in paths),
         place=Path(paths[0]),
         count=network.count,
         steps=network_steps(network, tracker, settings.tracker.redundant),
         summary=summary,
-        sinks=sinks,
+        sinks=lambda folder: network_sinks(settings, extras, network, folder),
     )
+
+
+def network_sinks(settings: Settings, extras: Extras, network: Network, folder: Path) -> Iterator[Sink]:
+    """The sinks of a run over these radars, the last one for their biases."""
+    places = [feed.placed.xyz[:2] for feed in network.feeds]
+    yield from radar_sinks(settings, extras, network.feeds[0].found.dim, places, folder)
+    yield RegistrationTable(folder / "registration.csv", network)
 
 
 def _losses(network: Network) -> dict[str, int]:

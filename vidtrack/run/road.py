@@ -15,15 +15,14 @@ from vidtrack.config.settings import Settings, SourceSettings
 from vidtrack.errors import ConfigError
 from vidtrack.estimate.kalman import KalmanBank
 from vidtrack.output.linked import refuse_link
-from vidtrack.output.registration import RegistrationTable
-from vidtrack.output.sink import Sink, Step
+from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.radar.filters import estimator, motion
 from vidtrack.radar.network.network import Feed, Network, Turn, overlap, read_feeds, warn_if_apart
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.radar.scans import surveyed
-from vidtrack.run.network import learn_ahead
-from vidtrack.run.radar import radar_sinks, refuse_smoothing
+from vidtrack.run.network import learn_ahead, network_sinks
+from vidtrack.run.radar import refuse_smoothing
 from vidtrack.run.radar_life import radar_life
 from vidtrack.run.run import Extras, Pipeline, Run
 from vidtrack.run.steps import scan_steps
@@ -114,11 +113,6 @@ def _pipeline(
                 "stations": {name: station.rates.as_dict() | biases.get(name, {}) for name, station in own},
             }
 
-        def sinks(folder: Path) -> Iterator[Sink]:
-            places = [feed.placed.xyz[:2] for feed in network.feeds]
-            yield from radar_sinks(settings, extras, 2, places, folder)
-            yield RegistrationTable(folder / "registration.csv", network)
-
         steps, coast_s = road_steps(network, camera, tracker), max(feed.coast_s for feed in network.feeds)
         begin_s, end_s = zip(*(feed.span_s for feed in network.feeds), strict=True)
         pictures = stated_span(video, settings.source)
@@ -130,7 +124,7 @@ def _pipeline(
             count=None,
             steps=steps,
             summary=lambda folder: Summary(folder / "summary.json", video, settings, reading, unit="scans"),
-            sinks=sinks,
+            sinks=lambda folder: network_sinks(settings, extras, network, folder),
         )
 
 
