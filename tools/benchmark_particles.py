@@ -41,7 +41,7 @@ def ours(rounds: int, threads: int) -> tuple[float, float]:
     """Seconds for all channels and runs, and the error [m]."""
     seen = measured(RUNS * CHANNELS)
     seconds = []
-    with patch("vidtrack.estimate.parts.ThreadPoolExecutor", lambda _: ThreadPoolExecutor(threads)):
+    with patch("vidtrack.estimate.blocks.ThreadPoolExecutor", lambda _: ThreadPoolExecutor(threads)):
         for _ in range(rounds + 1):
             begin = perf_counter()
             found = estimate(ParticleBank(ConstantVelocity(1, accel=ACCEL), PARTICLES), seen, np.ones(RUNS * CHANNELS))

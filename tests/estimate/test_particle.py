@@ -168,6 +168,66 @@ def test_successors_of_one_row_part_ways():
     assert len(np.intersect1d(bank.particles[0, :, 1], bank.particles[1, :, 1])) == 0
 
 
+@pytest.mark.parametrize("off", [5.0, 12.0, -30.0])
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_a_measurement_in_the_tail_gives_the_estimates_of_kalman(kind, off):
+    """Up to thirteen standard deviations from all particles; bootstrap filters keep a single one, without errors."""
+    particle, kalman = (bank_of(bank, 12, **options) for bank, options in (
+        (ParticleBank, {"number": 2000, "resampling": kind}), (KalmanBank, {})
+    ))  # fmt: skip
+    for bank in (particle, kalman):
+        bank.predict(1.0)
+        bank.update(one_to_one(12), scan_of(np.full((12, 1), off), sigma=0.5), POSITION)
+    sigma = np.sqrt(np.diagonal(kalman.P[0]))
+    np.testing.assert_allclose(particle.x.mean(axis=0) / sigma, kalman.x[0] / sigma, atol=0.05 * abs(off))
+    np.testing.assert_allclose(particle.P.mean(axis=0), kalman.P[0], rtol=0.25, atol=0.05)
+    lost = bank_of(ParticleBank, number=2000, resampling=kind, least=0)
+    lost.predict(1.0)
+    lost.update(one_to_one(1), scan_of([abs(off) + 7], sigma=0.5), POSITION)
+    assert lost.P[0, 0, 0] < 0.25 * kalman.P[0, 0, 0]
+
+
+def test_measurements_in_the_tail_mix_by_their_weights():
+    """One of a PDA's measurements is far off: the mixture of both, and of a miss, has the moments of Kalman's."""
+    decision = Decision(np.arange(2), np.array([0, 0, 1]), np.array([0, 1, 1]), np.array([0.3, 0.5, 0.4]),
+                        np.array([0.2, 0.6]))  # fmt: skip
+    particle, kalman = bank_of(ParticleBank, 2, number=20_000), bank_of(KalmanBank, 2)
+    for bank in (particle, kalman):
+        bank.update(decision, scan_of([[-1.0], [9.0]], sigma=0.3), POSITION)
+    np.testing.assert_allclose(particle.x, kalman.x, atol=0.15)
+    np.testing.assert_allclose(particle.P, kalman.P, rtol=0.06, atol=0.15)
+    np.testing.assert_allclose(np.exp(particle.log_weight), 1 / 20_000)
+
+
+def test_measurements_in_the_tail_that_act_as_one_are_their_mean():
+    decision = Decision(np.zeros(1, np.int64), np.zeros(2, np.int64), np.arange(2), np.array([0.4, 0.6]),
+                        np.zeros(1), spread=False)  # fmt: skip
+    together, alone = (bank_of(ParticleBank, number=5000) for _ in range(2))
+    together.update(decision, scan_of([[8.0], [13.0]]), POSITION)
+    alone.update(one_to_one(1), scan_of([[11.0]]), POSITION)
+    np.testing.assert_allclose(together.x, alone.x, atol=1e-6)
+
+
+def test_a_target_that_turns_is_followed_with_true_errors():
+    """The mean NEES of 60 turns lies in its 99.9 % interval; that of a bootstrap filter is of the order of 1,000."""
+    rng = np.random.default_rng(6)
+    rows, turn_s = 60, np.arange(1, 4)
+    bank = ParticleBank(ConstantVelocity(2, accel=8.0), seed=2)
+    bank.insert(
+        np.tile([0.0, 200.0, 0.0, 0.0], (rows, 1)), np.tile(np.diag([25.0, 4, 25, 4]), (rows, 1, 1)), np.ones(rows)
+    )
+    rate = 20.0 / 200.0
+    for t in turn_s:
+        place = 2000 * np.array([np.sin(rate * t), 1 - np.cos(rate * t)])
+        bank.predict(1.0)
+        z = place + 5 * rng.standard_normal((rows, 2))
+        bank.update(one_to_one(rows), Scan(float(t), z, 25 * np.eye(2)), POSITION)
+    off = bank.x[:, [0, 2]] - place
+    P = bank.P[:, [0, 2]][:, :, [0, 2]]
+    nees = np.einsum("ni,ni->n", off, np.linalg.solve(P, off[..., None])[..., 0]).mean()
+    assert nees < 4
+
+
 @pytest.mark.parametrize("bank", [
     bank_of(ParticleBank, number=100), bank_of(ParticleBank, number=100, resampling=Resampling.NONE),
     bank_of(ParticleBank, number=100, glint=Glint(0.1)), bank_of(ErrorSignalBank, number=100),

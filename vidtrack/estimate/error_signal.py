@@ -34,7 +34,7 @@ class ErrorSignalBank(ParticleBank):
     ) -> None:
         if not alpha > 0:
             raise ConfigError(f"error-signal resampling: alpha is {alpha}; it must be above zero")
-        super().__init__(model, number, glint=glint, seed=seed)
+        super().__init__(model, number, least=0, glint=glint, seed=seed)
         self.alpha = alpha
 
     def _chosen(

@@ -14,6 +14,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.estimate.blocks import in_blocks
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
+from vidtrack.estimate.progressive import STEPS, Parts, effective, powers, weights
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
 from vidtrack.estimate.smoother import linearised_cross
@@ -39,6 +40,8 @@ class ParticleBank:
     number      N, particles per row
     resampling  scheme of resampling
     threshold   a row is resampled when the effective number 1 / sum of w^2 falls below this share of N
+    least       a row that one scan would leave with a smaller share is corrected progressively (`progressive`): its
+                plot lies in the tail of the particles, as in a turn; 0: never, as in the bootstrap filter
     glint       distribution of the measurement errors, if not normal
     seed        of all random numbers, which do not depend on the number of threads
 
@@ -54,6 +57,7 @@ class ParticleBank:
         *,
         resampling: Resampling = Resampling.SYSTEMATIC,
         threshold: float = 0.5,
+        least: float = 0.1,
         glint: Glint = NO_GLINT,
         seed: int = 0,
     ) -> None:
@@ -65,6 +69,7 @@ class ParticleBank:
         self.number = number
         self.resampling = resampling
         self.threshold = threshold
+        self.least = least
         self.glint = glint
         self.rng = np.random.default_rng(seed)
         self.particles = np.empty((0, number, model.states))
@@ -113,7 +118,10 @@ class ParticleBank:
         return wrapped(centre + mean, sensor.angles), cov
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
-        """Successor rows from the weights of a decision; x, P are the moments before resampling."""
+        """Successor rows from the weights of a decision; x, P are the moments before resampling.
+
+        Rows with few effective particles are corrected progressively.
+        """
         parent, rows = decision.parent, len(decision.parent)
         seen = self._seen(sensor)
         start = starts(decision.row, rows)
@@ -129,20 +137,61 @@ class ParticleBank:
             moments(self.model.states)(weight[block], self.particles, parent[block], x[block], P[block])
 
         in_blocks(rows, self._block, work)
-        self.particles = self._chosen(decision, start, scan, sensor, seen, weight, log_weight)
+        particles = self._chosen(decision, start, scan, sensor, seen, weight, log_weight)
+        few = np.flatnonzero(effective(weight) < self.least * self.number)
+        if len(few) and self.resampling != Resampling.NONE:
+            particles[few] = self._progressed(decision, few, scan, sensor)
+            equal = np.full((len(few), self.number), 1 / self.number)
+            log_weight[few] = np.log(equal)
+            x[few], P[few] = self._moments_of(particles[few], equal)
+        self.particles = particles
         self.log_weight = log_weight
         self._moments = x, P
         self.hits = self.hits[parent] + decision.hit
         self.scale = self.scale[parent]
+
+    def _progressed(self, decision: Decision, rows: Ints, scan: Scan, sensor: Sensor) -> Floats:
+        """Particles (K, N, n), of equal weights, of the successors `rows` (K,), corrected progressively."""
+        parts = Parts.of(decision, rows)
+        sets = self.only(decision.parent[parts.row])
+        left = np.ones(len(sets))
+        for step in range(STEPS):
+            gain = sets._gain(parts, scan, sensor)
+            power = powers(sets.log_weight, gain, left) if step < STEPS - 1 else left
+            sets._redraw(weights(sets.log_weight, gain, power), np.flatnonzero(left))
+            left = left - power
+            if not left.any():
+                break
+        return parts.mixture(sets.particles)
+
+    def _gain(self, parts: Parts, scan: Scan, sensor: Sensor) -> Floats:
+        """(C, N) logarithms, up to a constant a row, of the likelihoods of the parts' measurements."""
+        seen, everyone = self._seen(sensor), np.arange(len(self))
+        weight, gain = np.empty((2, *self.log_weight.shape))
+        weigh(seen.shape[2], sensor.angles)(
+            np.zeros_like(gain), seen, scan.z, scan.R, everyone, parts.start, parts.measurement, parts.beta,
+            np.zeros(len(self)), False, *self.glint, weight, gain,
+        )  # fmt: skip
+        return gain
+
+    def _redraw(self, weight: Floats, rows: Ints) -> None:
+        """Draw rows (R,) anew from normal distributions with the moments that weights (T, N) give them."""
+        x, P = self._moments_of(self.particles, weight)
+        self.particles[rows] = self._normal(x[rows], P[rows])
+        self.log_weight[rows] = -np.log(self.number)
+
+    def _normal(self, x: Floats, P: Floats) -> Floats:
+        """Particles (K, N, n) drawn from normal distributions with means x (K, n) and covariances P (K, n, n)."""
+        drawn = np.repeat(np.asarray(x, float)[:, None], self.number, axis=1)
+        self._move(drawn, np.eye(self.model.states)[None], P)
+        return drawn
 
     def append(self, position: Floats, cov: Floats, scale: Floats) -> None:
         self.insert(*self.model.birth(position, cov, scale), scale)
 
     def insert(self, x: Floats, P: Floats, scale: Floats) -> None:
         """New rows, drawn from normal distributions with means x (B, n) and covariances P (B, n, n); scale (B,)."""
-        new = np.repeat(np.asarray(x, float)[:, None], self.number, axis=1)
-        self._move(new, np.eye(self.model.states)[None], P)
-        before = self.x, self.P
+        new, before = self._normal(x, P), (self.x, self.P)
         self.particles = np.concatenate([self.particles, new])
         self.log_weight = np.concatenate([self.log_weight, np.full(new.shape[:2], -np.log(self.number))])
         self._moments = np.concatenate([before[0], x]), np.concatenate([before[1], P])
@@ -150,7 +199,9 @@ class ParticleBank:
         self.scale = np.concatenate([self.scale, scale])
 
     def keep(self, rows: np.ndarray) -> None:
-        self._moments = self.x[rows], self.P[rows]
+        if self._moments is not None:
+            x, P = self._moments
+            self._moments = x[rows], P[rows]
         self.particles, self.log_weight = self.particles[rows], self.log_weight[rows]
         self.hits, self.scale = self.hits[rows], self.scale[rows]
 
@@ -225,13 +276,17 @@ class ParticleBank:
         return self._moments
 
     def _mean_and_cov(self, particles: Floats) -> tuple[Floats, Floats]:
-        """Weighted mean (T, c) and covariance (T, c, c) of `particles` (T, N, c)."""
+        """Mean (T, c) and covariance (T, c, c) of `particles` (T, N, c) with the rows' weights."""
+        return self._moments_of(particles, np.exp(self.log_weight))
+
+    def _moments_of(self, particles: Floats, weight: Floats) -> tuple[Floats, Floats]:
+        """Mean (T, c) and covariance (T, c, c) of `particles` (T, N, c) with weights (T, N)."""
         rows, c = len(particles), particles.shape[2]
         mean, cov = _empty(rows, c)
         everyone = np.arange(rows)
 
         def work(block: slice) -> None:
-            moments(c)(np.exp(self.log_weight[block]), particles, everyone[block], mean[block], cov[block])
+            moments(c)(weight[block], particles, everyone[block], mean[block], cov[block])
 
         in_blocks(rows, self._block, work)
         return mean, cov

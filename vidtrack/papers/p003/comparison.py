@@ -92,7 +92,7 @@ def _sir(glint: Glint = NO_GLINT) -> Make:
 
 
 def _bootstrap(glint: Glint = NO_GLINT) -> Make:
-    return lambda model, sigma, seed: ParticleBank(model, PARTICLES, glint=glint, seed=seed)
+    return lambda model, sigma, seed: ParticleBank(model, PARTICLES, least=0, glint=glint, seed=seed)
 
 
 RAW = Candidate("measurement")

@@ -47,7 +47,9 @@ WAYS = (
     Way("measurement", style.GREY, None),
     Way("Kalman, told a tenth", style.ORANGE, lambda seed: KalmanBank(MODEL), TOLD),
     Way("Kalman, tuned", style.BLUE, lambda seed: KalmanBank(MODEL)),
-    Way("particles, bootstrap", style.GREEN, lambda seed: ParticleBank(MODEL, PARTICLES, seed=seed), line="--"),
+    Way(
+        "particles, bootstrap", style.GREEN, lambda seed: ParticleBank(MODEL, PARTICLES, least=0, seed=seed), line="--"
+    ),
     Way("particles, the paper's", style.RED, lambda seed: ErrorSignalBank(MODEL, PARTICLES, seed=seed)),
 )
 
