@@ -20,6 +20,7 @@ SHADOW, BEAM = np.uint8(2), np.uint8(3)  # values of a hit where the scene is se
 RELIT = np.uint8(2)  # the bit that both have
 NEVER = np.float32(-1000)  # unlike any luminance
 UNKNOWN = np.float32(1e4)  # noise of what was never in the picture
+FREE = np.uint8(0)  # value of what is covered by nothing
 UNSEEN = np.uint8(1)  # value of what is covered by nothing, but outside the picture
 _SURPRISE = np.float32(4)  # a deviation counts as at most this many times the noise: one bird is not noise
 _NONE, _ALL = np.float32(0), np.float32(1)
@@ -85,17 +86,18 @@ def learn(
     h, w = covered.shape
     taken = np.zeros(w + w % 2, np.uint8)  # not 0: not learnt
     for y in range(h):
-        free = True
+        for x in range(w):  # without a choice it is vectorised
+            taken[x] = covered[y, x] | (hit[y, x] & RELIT) * np.uint8(covered[y, x] != UNSEEN)
+        most = FREE
         for x in range(w):
-            taken[x] = UNSEEN if covered[y, x] == UNSEEN else covered[y, x] | hit[y, x] & RELIT
-            free &= taken[x] == 0
+            most = max(most, taken[x])
         for x in range(w):
             noise = scene.noise[y, x]
             d = np.float32(picture.luma[y, x]) - scene.luma[y, x]
             deviation = min(abs(d), _SURPRISE * max(noise, _QUIET))
             scene.luma[y, x] += (weight if taken[x] == 0 else _NONE) * d
             scene.noise[y, x] = noise + (noise_weight if taken[x] == 0 else _NONE) * (deviation - noise)
-        if free:
+        if most == FREE:
             scene.covered_s[y], scene.steady_s[y] = _NONE, _NONE
         else:
             _count(picture.luma[y], scene, y, taken, weight, dt)
