@@ -101,24 +101,27 @@ def mark_shadow(picture: Picture, scene: Scene, air: Air, tolerance: Tolerance, 
     there is structure and less light.
     """
     count = np.zeros(_BINS + 1)
-    darkened = 0
+    darkened, h = 0, len(hit)
     row, start, stop = find_runs(hit, OBJECTS)
     coloured = len(picture.cb) > 0
     share = tolerance.texture_share if coloured else _GREY_SHARE
     for k in range(len(row)):
         y = row[k]
-        for x in range(start[k], stop[k]):
+        up, down = max(y - _REACH, 0), min(y + _REACH, h - 1)
+        for x in range(np.uint64(start[k]), np.uint64(stop[k])):  # without a sign it is faster
             light = scene.luma[y, x] - air.black[y, x]
             if light <= 0:
                 continue
             r = (np.float32(picture.luma[y, x]) - air.black[y, x]) / light
             if not r < _LIGHTEST:
                 continue
-            missed, structure = _texture(picture.luma, scene.luma, y, x, r)
+            missed, structure = _texture(picture.luma, scene.luma, up, y, down, x, r)
             darkened += structure > _STRUCTURE
             if r * _BINS < _HARDEST:
                 continue
-            off, colour = _colour(picture, scene, y // 2, x // 2, r) if coloured else (np.float32(0), np.float32(0))
+            off, colour = (
+                _colour(picture, scene, y // 2, x // np.uint64(2), r) if coloured else (np.float32(0), np.float32(0))
+            )
             if structure > _STRUCTURE and missed < _SEEN * structure and off < _CHROMA:
                 count[int(r * _BINS)] += 1
             if (
@@ -141,10 +144,12 @@ def _colour(picture: Picture, scene: Scene, y: int, x: int, r: np.float32) -> tu
 
 
 @inlined
-def _texture(luma: Image, scene: Levels, y: int, x: int, r: np.float32) -> tuple[np.float32, np.float32]:
+def _texture(
+    luma: Image, scene: Levels, up: int, y: int, down: int, x: np.uint64, r: np.float32
+) -> tuple[np.float32, np.float32]:
     """Deviation of the luminance differences from the scene's times r, and the scene's differences."""
-    h, w = luma.shape
-    up, down, left, right = max(y - _REACH, 0), min(y + _REACH, h - 1), max(x - _REACH, 0), min(x + _REACH, w - 1)
+    reach = np.uint64(_REACH)
+    left, right = x - min(x, reach), min(x + reach, np.uint64(luma.shape[1] - 1))
     across, along = r * (scene[y, right] - scene[y, left]), r * (scene[down, x] - scene[up, x])
     off_across = np.float32(luma[y, right]) - np.float32(luma[y, left]) - across
     off_along = np.float32(luma[down, x]) - np.float32(luma[up, x]) - along
@@ -234,7 +239,7 @@ def _is_inside(shadow: Image, y: int, x: int) -> bool:
 def _is_own_edge(luma: Image, scene: Scene, black: np.float32, y: int, x: int) -> bool:
     """Whether there is an edge that is neither the scene's nor noise."""
     r = (np.float32(luma[y, x]) - black) / (scene.luma[y, x] - black)
-    missed, structure = _texture(luma, scene.luma, y, x, r)
+    missed, structure = _texture(luma, scene.luma, y - _REACH, y, y + _REACH, np.uint64(x), r)
     return missed > _EDGE + _EDGE_NOISE * scene.noise[y, x] + _SEEN * structure
 
 
