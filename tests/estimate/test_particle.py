@@ -351,6 +351,8 @@ def test_uniform_bins_count_azimuth_from_north_all_around():
 def test_impossible_settings_are_refused():
     with pytest.raises(ConfigError, match="1 particles"):
         ParticleBank(MODEL, 1)
+    with pytest.raises(ConfigError, match="least is 1.5"):
+        ParticleBank(MODEL, least=1.5)
     with pytest.raises(ConfigError, match="factor"):
         ParticleBank(MODEL, glint=Glint(0.1, 0.5))
     with pytest.raises(ConfigError, match="alpha is 0"):

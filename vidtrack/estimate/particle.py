@@ -63,6 +63,8 @@ class ParticleBank:
     ) -> None:
         if number < 2:
             raise ConfigError(f"particle filter: {number} particles; it needs two at least")
+        if not 0 <= least < 1:
+            raise ConfigError(f"particle filter: least is {least}; it is a share, at least zero and below one")
         if not 0 <= glint.probability < 1 or not glint.factor >= 1:
             raise ConfigError(f"particle filter: {glint}; the probability is below one and the factor at least one")
         self.model = model
