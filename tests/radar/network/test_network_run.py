@@ -101,6 +101,11 @@ def test_a_known_bias_of_none_is_not_estimated(biased):
     np.testing.assert_array_equal(network.scan(turns[1]).z, feed.found.z[turns[1].span.rows])
 
 
+def test_a_clock_that_is_not_expected_to_be_off_is_not_estimated(biased):
+    rows = list(csv.DictReader((biased / "run" / "registration.csv").open()))
+    assert {(row["bias_time_s"], row["bias_time_sigma_s"]) for row in rows} == {("0", "0")}
+
+
 def test_a_clock_that_is_off_unexpectedly_is_named(biased, tmp_path, caplog):
     for name in ("north.csv", "south.csv", "radars.toml"):
         (tmp_path / name).write_text((biased / name).read_text())

@@ -69,7 +69,7 @@ class Registration:
 
     def __init__(self, origins: Sequence[tuple[float, float]], sigma: Floats, scan_s: Floats, jerk: float) -> None:
         self.origins = np.asarray(origins, float)
-        self.prior = np.asarray(sigma, float)
+        self.prior = np.array(sigma, float)
         self.scan_s = np.asarray(scan_s, float)
         self.jerk = jerk
         self.bias = np.zeros_like(self.prior)
