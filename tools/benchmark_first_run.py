@@ -21,9 +21,9 @@ from time import perf_counter
 ROOT = Path(__file__).parent.parent
 SAMPLES = ROOT / "samples"
 COMMANDS = {
-    "video": ["track", str(SAMPLES / "junction.avi"), "-o", "run"],
-    "stored": ["track", "boxes/junction/det.txt", "-o", "run"],
-    "radar": ["radar", "tws/plots.csv", "-o", "run"],
+    "video": ["track", str(SAMPLES / "junction.avi"), "-o", "run", "--force"],
+    "stored": ["track", "boxes/junction/det.txt", "-o", "run", "--force"],
+    "radar": ["radar", "tws/plots.csv", "-o", "run", "--force"],
     "predict": ["predict", "--snr-db", "13", "--pfa", "1e-3", "--runs", "1000"],
     "threshold": ["threshold", "--filter", "pda", "--snr-db", "13", "--cells", "100"],
     "psn": ["threshold", "--filter", "psn", "--snr-db", "13"],
@@ -70,22 +70,21 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=2)
     options = parser.parse_args()
     print(f"{'':12s}{'first, s':>20s}{'processor, s':>14s}{'again, s':>10s}{'kernels':>9s}")
-    for name in options.commands or COMMANDS:
-        first, processor, again, kept = [], [], [], 0
-        for _ in range(options.rounds):
-            with TemporaryDirectory() as place:
-                kernels = Path(place, "kernels")
-                runs = []
-                for part in ("first", "again"):
-                    folder = Path(place, part)
-                    prepare(folder)
-                    runs.append(vidtrack(COMMANDS[name], folder, kernels))
-                first.append(runs[0][0])
-                processor.append(runs[0][1])
-                again.append(runs[1][0])
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        prepare(folder)
+        for name in options.commands or COMMANDS:
+            first, processor, again, kept = [], [], [], 0
+            for k in range(options.rounds):
+                kernels = folder / f"kernels of {name} {k}"
+                seconds, used = vidtrack(COMMANDS[name], folder, kernels)
+                first.append(seconds)
+                processor.append(used)
+                again.append(vidtrack(COMMANDS[name], folder, kernels)[0])
                 kept = sum(1 for _ in kernels.rglob("*.nbi"))
-        times = ", ".join(f"{each:.1f}" for each in first)
-        print(f"{name:12s}{times:>20s}{sum(processor) / len(processor):14.1f}{min(again):10.1f}{kept:9d}", flush=True)
+            times = ", ".join(f"{each:.1f}" for each in first)
+            mean = sum(processor) / len(processor)
+            print(f"{name:12s}{times:>20s}{mean:14.1f}{min(again):10.1f}{kept:9d}", flush=True)
 
 
 if __name__ == "__main__":
