@@ -14,7 +14,7 @@ from vidtrack.errors import ConfigError
 from vidtrack.estimate.blocks import in_blocks
 from vidtrack.estimate.motion.model import Motion
 from vidtrack.estimate.particle_kernels import moments, move, resample, weigh
-from vidtrack.estimate.progressive import STEPS, Parts, effective, powers, weights
+from vidtrack.estimate.progressive import STEPS, Parts, effective, powers, weighed
 from vidtrack.estimate.resampling import Resampling
 from vidtrack.estimate.sensor import Sensor, wrapped
 from vidtrack.estimate.smoother import linearised_cross
@@ -100,7 +100,7 @@ class ParticleBank:
     def ahead(self, dt: float) -> tuple[Floats, Floats]:
         moved = self.particles.copy()
         self._move(moved, self._transition(dt), np.zeros_like(self.P))
-        x, P = self._mean_and_cov(moved)
+        x, P = self._mean_and_cov(moved, self.log_weight)
         return x, P + self._process_noise(dt)
 
     def predict(self, dt: float) -> None:
@@ -116,7 +116,7 @@ class ParticleBank:
             sine, cosine = ((weight * part(seen[..., a])).sum(axis=1) for part in (np.sin, np.cos))
             centre[:, a] = np.arctan2(sine, cosine)
         off = wrapped((seen - centre[:, None]).reshape(-1, seen.shape[2]), sensor.angles)
-        mean, cov = self._mean_and_cov(off.reshape(seen.shape))
+        mean, cov = self._mean_and_cov(off.reshape(seen.shape), self.log_weight)
         return wrapped(centre + mean, sensor.angles), cov
 
     def update(self, decision: Decision, scan: Scan, sensor: Sensor) -> None:
@@ -140,12 +140,12 @@ class ParticleBank:
 
         in_blocks(rows, self._block, work)
         particles = self._chosen(decision, start, scan, sensor, seen, weight, log_weight)
-        few = np.flatnonzero(effective(weight) < self.least * self.number)
-        if len(few) and self.resampling != Resampling.NONE:
-            particles[few] = self._progressed(decision, few, scan, sensor)
-            equal = np.full((len(few), self.number), 1 / self.number)
-            log_weight[few] = np.log(equal)
-            x[few], P[few] = self._moments_of(particles[few], equal)
+        if self.least > 0 and self.resampling != Resampling.NONE:
+            few = np.flatnonzero(effective(weight) < self.least * self.number)
+            if len(few):
+                particles[few] = self._progressed(decision, few, scan, sensor)
+                log_weight[few] = -np.log(self.number)
+                x[few], P[few] = self._mean_and_cov(particles[few], log_weight[few])
         self.particles = particles
         self.log_weight = log_weight
         self._moments = x, P
@@ -156,14 +156,17 @@ class ParticleBank:
         """Particles (K, N, n), of equal weights, of the successors `rows` (K,), corrected progressively."""
         parts = Parts.of(decision, rows)
         sets = self.only(decision.parent[parts.row])
-        left = np.ones(len(sets))
+        left, going = np.ones(len(sets)), np.arange(len(sets))
         for step in range(STEPS):
-            gain = sets._gain(parts, scan, sensor)
-            power = powers(sets.log_weight, gain, left) if step < STEPS - 1 else left
-            sets._redraw(weights(sets.log_weight, gain, power), np.flatnonzero(left))
-            left = left - power
-            if not left.any():
+            gain = sets._gain(parts, scan, sensor)[going]
+            power = powers(sets.log_weight[going], gain, left[going], self.least) if step < STEPS - 1 else left[going]
+            sets.log_weight[going] = weighed(sets.log_weight[going], gain, power)
+            left[going] -= power
+            sets._resample(going[left[going] == 0])
+            going = going[left[going] > 0]
+            if not len(going):
                 break
+            sets._redraw(going)
         return parts.mixture(sets.particles)
 
     def _gain(self, parts: Parts, scan: Scan, sensor: Sensor) -> Floats:
@@ -176,10 +179,18 @@ class ParticleBank:
         )  # fmt: skip
         return gain
 
-    def _redraw(self, weight: Floats, rows: Ints) -> None:
-        """Draw rows (R,) anew from normal distributions with the moments that weights (T, N) give them."""
-        x, P = self._moments_of(self.particles, weight)
-        self.particles[rows] = self._normal(x[rows], P[rows])
+    def _resample(self, rows: Ints) -> None:
+        """Choose the particles of rows (R,) anew by their weights."""
+        weight, chosen = np.exp(self.log_weight[rows]), np.empty((len(rows), *self.particles.shape[1:]))
+        everyone = np.full(weight.shape, -np.log(self.number))
+        resample(
+            int(self.resampling), np.inf, weight, self.particles, rows, self._streams(len(rows)), everyone, chosen
+        )  # fmt: skip
+        self.particles[rows], self.log_weight[rows] = chosen, everyone
+
+    def _redraw(self, rows: Ints) -> None:
+        """Draw rows (R,) anew from normal distributions of the same means and covariances."""
+        self.particles[rows] = self._normal(*self._mean_and_cov(self.particles[rows], self.log_weight[rows]))
         self.log_weight[rows] = -np.log(self.number)
 
     def _normal(self, x: Floats, P: Floats) -> Floats:
@@ -274,21 +285,17 @@ class ParticleBank:
     def _known(self) -> tuple[Floats, Floats]:
         """x, P, computed on first use."""
         if self._moments is None:
-            self._moments = self._mean_and_cov(self.particles)
+            self._moments = self._mean_and_cov(self.particles, self.log_weight)
         return self._moments
 
-    def _mean_and_cov(self, particles: Floats) -> tuple[Floats, Floats]:
-        """Mean (T, c) and covariance (T, c, c) of `particles` (T, N, c) with the rows' weights."""
-        return self._moments_of(particles, np.exp(self.log_weight))
-
-    def _moments_of(self, particles: Floats, weight: Floats) -> tuple[Floats, Floats]:
-        """Mean (T, c) and covariance (T, c, c) of `particles` (T, N, c) with weights (T, N)."""
+    def _mean_and_cov(self, particles: Floats, log_weight: Floats) -> tuple[Floats, Floats]:
+        """Weighted mean (T, c) and covariance (T, c, c) of `particles` (T, N, c) with log_weight (T, N)."""
         rows, c = len(particles), particles.shape[2]
         mean, cov = _empty(rows, c)
         everyone = np.arange(rows)
 
         def work(block: slice) -> None:
-            moments(c)(weight[block], particles, everyone[block], mean[block], cov[block])
+            moments(c)(np.exp(log_weight[block]), particles, everyone[block], mean[block], cov[block])
 
         in_blocks(rows, self._block, work)
         return mean, cov

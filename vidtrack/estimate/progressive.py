@@ -3,7 +3,8 @@
 Weighted at once, all particles but a few would be lost, and the covariance with them. By powers they move to the
 measurement step by step (progressive correction, Oudjane and Musso 2000). After each power they are drawn again from
 the normal distribution of the same mean and covariance (as in the Gaussian particle filter, Kotecha and Djuric 2003):
-what is far from all particles is so by their tail, of which they do not know the shape.
+what is far from all particles is so by their tail, of which they do not know the shape. Where enough particles remain
+when the rest of the likelihood acts at once, it does, and they are resampled as they are.
 """
 
 from __future__ import annotations
@@ -56,15 +57,20 @@ class Parts(NamedTuple):
         return cls(row[order], share[order], start, measurement, np.ones(len(pairs)))
 
     def mixture(self, particles: Floats) -> Floats:
-        """(K, N, n) particles of each row, as many of each part (C, N, n), which are in no order, as its share says."""
+        """(K, N, n) particles of each row, as many of each part (C, N, n) as its share says."""
         number = particles.shape[1]
         mixed = []
         for row in dict.fromkeys(self.row.tolist()):
             own = np.flatnonzero(self.row == row)
             ends = np.rint(number * self.share[own].cumsum() / self.share[own].sum()).astype(np.int64)
             counts = np.diff(ends, prepend=0)
-            mixed.append(np.concatenate([particles[c, :n] for c, n in zip(own, counts, strict=True)]))
+            mixed.append(np.concatenate([_evenly(particles[c], n) for c, n in zip(own, counts, strict=True)]))
         return np.stack(mixed)
+
+
+def _evenly(particles: Floats, count: int) -> Floats:
+    """So many of the particles (N, n), evenly spread over their order: those of one mode may stand together."""
+    return particles[((np.arange(count) + 0.5) * (len(particles) / max(count, 1))).astype(np.int64)]
 
 
 def effective(weight: Floats) -> Floats:
@@ -72,20 +78,19 @@ def effective(weight: Floats) -> Floats:
     return np.asarray(1.0 / np.einsum("kn,kn->k", weight, weight))
 
 
-def weights(log_weight: Floats, gain: Floats, power: Floats) -> Floats:
-    """(C, N) weights after a power (C,) of likelihoods with logarithms `gain` (C, N), summing to one."""
+def weighed(log_weight: Floats, gain: Floats, power: Floats) -> Floats:
+    """(C, N) logarithms of the weights after a power (C,) of likelihoods with logarithms `gain` (C, N)."""
     log_weight = log_weight + power[:, None] * gain
-    weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
-    return np.asarray(weight / weight.sum(axis=1, keepdims=True))
+    log_weight -= log_weight.max(axis=1, keepdims=True)
+    return np.asarray(log_weight - np.log(np.exp(log_weight).sum(axis=1, keepdims=True)))
 
 
-def powers(log_weight: Floats, gain: Floats, left: Floats) -> Floats:
-    """(C,) the largest powers, up to `left` (C,), that leave enough particles effective."""
-    least = _EFFECTIVE * log_weight.shape[1]
-    low, high = np.full(len(left), np.log(_LEAST)), np.log(np.maximum(left, _LEAST))
-    enough = effective(weights(log_weight, gain, left)) >= least
+def powers(log_weight: Floats, gain: Floats, left: Floats, least: float) -> Floats:
+    """(C,) `left` (C,), where such a power leaves a share `least` effective, else the largest that leaves half."""
+    number = log_weight.shape[1]
+    low, high = np.full(len(left), np.log(_LEAST)), np.log(left)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        fits = effective(weights(log_weight, gain, np.exp(middle))) >= least
+        fits = effective(np.exp(weighed(log_weight, gain, np.exp(middle)))) >= _EFFECTIVE * number
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    return np.where(enough, left, np.exp(low))
+    return np.where(effective(np.exp(weighed(log_weight, gain, left))) >= least * number, left, np.exp(low))
