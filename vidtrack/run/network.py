@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,7 +126,7 @@ def network_steps(network: Network, tracker: Tracker, redundant: float | None = 
     scans = ((index, network.scan(turn)) for index, turn in enumerate(network))
     for turn, step in zip(network, scan_steps(scans, tracker, redundant), strict=True):
         network.learn(turn, step.tracks)
-        yield step
+        yield replace(step, tracks=network.stated(step.tracks))
     network.warn_of_biases()
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from vidtrack.arrays.types import Floats
+from vidtrack.arrays.types import Floats, Ints
 from vidtrack.config.radar import RadarSettings
 from vidtrack.errors import ConfigError
 from vidtrack.radar.coordinates import wrap
@@ -22,6 +22,7 @@ from vidtrack.radar.network.copies import Measured, copies
 from vidtrack.radar.network.coverage import Sector, too_slow
 from vidtrack.radar.network.radars import Placed, Radars
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
+from vidtrack.radar.network.untold import with_untold
 from vidtrack.radar.plots import Plots
 from vidtrack.radar.reading import read_any
 from vidtrack.radar.scans import Measurements, Span, measurements, spans
@@ -37,6 +38,8 @@ CLOCK_S = 1.0
 """s; standard deviation of the error of a clock that is expected to have none, by which one is found."""
 SURE = 3.3
 """Standard deviations of the estimate beyond which a clock is off."""
+FARTHEST_S = 3 * CLOCK_S
+"""s; errors of a clock beyond this come out too small, and are not estimated."""
 SAME_TIME_S = 0.01
 """s; delays of a copy that are shorter are not told."""
 _OWN = ("sigma_range_m", "sigma_azimuth_deg", "sigma_doppler_m_s", "scan_s", "sac", "sic")
@@ -109,7 +112,10 @@ class Network:
     """The scans of several feeds in order of time, and the registration of their radars.
 
     `scan` makes the scan of a turn, without the biases that are known by then; `learn` learns from what the tracker
-    made of it.
+    made of it, and `stated` has in the tracks' errors what is not known of the biases.
+
+    A second registration allows an error to each clock that is expected to have none; once it is sure that one is off,
+    it takes over.
     """
 
     def __init__(self, feeds: Sequence[Feed]) -> None:
@@ -119,11 +125,12 @@ class Network:
         if len(feeds) == 1:
             sigma[:] = 0.0
         self._told_s = -np.inf
+        self._R = np.array([np.diag(np.median(feed.plots.sigma[:, :2], axis=0) ** 2) for feed in feeds])
         self.registration = self._registration(sigma)
         unexpected = sigma[:, :2].any(axis=1) & (sigma[:, 2] == 0)
         unexpected[0] = False
         sigma[unexpected, 2] = CLOCK_S
-        self._with_clocks, self._unexpected = self._registration(sigma), np.flatnonzero(unexpected)
+        self._unexpected, self._with_clocks = np.flatnonzero(unexpected), self._registration(sigma)
 
     def _registration(self, sigma: Floats) -> Registration:
         """A registration of all radars with these standard deviations of their biases (S, 3)."""
@@ -157,6 +164,12 @@ class Network:
         own = turn.span._replace(rows=slice(0, len(plots)))
         return measurements(plots, feed.settings).scan_of(own, noise, bias[KINDS - 1], turn.station)
 
+    def stated(self, tracks: Tracks) -> Tracks:
+        """The tracks with what is not known of the biases in their covariances."""
+        if not len(tracks) or not self.registration.cov.any():
+            return tracks
+        return with_untold(tracks, self.registration, [feed.coverage.share(tracks.xy) for feed in self.feeds], self._R)
+
     def learn(self, turn: Turn, tracks: Tracks) -> None:
         """Learn the biases from the plots that confirmed tracks took in this scan, unless it has told them already."""
         if turn.span.t <= self._told_s:
@@ -168,8 +181,16 @@ class Network:
         R = np.einsum("ni,ij->nij", plots.sigma[rows, :2] ** 2, np.eye(2))
         taken = Plotted(turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.v[took])
         self.registration.learn(turn.span.t, taken)
-        if len(self._unexpected):
+        if len(self._unexpected) and self.registration is not self._with_clocks:
             self._with_clocks.learn(turn.span.t, taken)
+            off = self._off()
+            if len(off) and (np.abs(self._with_clocks.bias[off, 2]) < FARTHEST_S).all():
+                self.registration = self._with_clocks
+
+    def _off(self) -> Ints:
+        """The radars whose clocks are off, though no error of them is expected."""
+        off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
+        return self._unexpected[np.abs(off_s[self._unexpected]) > SURE * sigma_s[self._unexpected]]
 
     def learnt_until(self, t: float) -> None:
         """The scans up to t come once more: they have told what they can of the biases."""
@@ -188,16 +209,19 @@ class Network:
                 "directions of %s wrong?", _radars(self.feeds),
             )  # fmt: skip
         off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
-        for k in self._unexpected[np.abs(off_s[self._unexpected]) > SURE * sigma_s[self._unexpected]].tolist():
+        for k in self._off().tolist():
             _log.warning(
-                "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect: "
-                "give the radar bias_time_s there, and it is estimated", self.feeds[k].placed.name,
-                "more than " if abs(off_s[k]) > 3 * CLOCK_S else "", abs(off_s[k]),
+                "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect%s: "
+                "give the radar bias_time_s there", self.feeds[k].placed.name,
+                "more than " if abs(off_s[k]) > FARTHEST_S else "", abs(off_s[k]),
                 "ahead of" if off_s[k] > 0 else "behind", self.feeds[0].placed.name, sigma_s[k],
+                ", and is estimated since it was sure" if self.registration is self._with_clocks else "",
             )  # fmt: skip
 
     def as_dict(self) -> dict[str, dict[str, float | bool]]:
         """The biases of each radar by name, with their standard deviations, and whether the targets have told them."""
+        if len(self.feeds) == 1:
+            return {self.feeds[0].placed.name: {}}  # nothing to compare with
         estimate, sigma, observed = self.registration.bias, self.registration.sigma(), self.registration.observed()
         found: dict[str, dict[str, float | bool]] = {}
         for k, feed in enumerate(self.feeds):

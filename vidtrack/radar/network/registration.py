@@ -64,7 +64,10 @@ class Registration:
     scan_s   (S,) scan time of each radar [s]: of two radars the faster one is interpolated
     jerk     spectral density of targets' accelerations [m^2/s^3], for errors of the interpolation
 
-    bias (S, 3), cov (3 S, 3 S) the estimate and its covariance; used: number of comparisons so far
+    used     number of comparisons in the estimate
+
+    An estimate that most comparisons of late contradict came from plots of different targets, or was right until a
+    clock or a radar was turned: it is given up, and the biases are learnt anew from the prior.
     """
 
     def __init__(self, origins: Sequence[tuple[float, float]], sigma: Floats, scan_s: Floats, jerk: float) -> None:
@@ -72,11 +75,30 @@ class Registration:
         self.prior = np.array(sigma, float)
         self.scan_s = np.asarray(scan_s, float)
         self.jerk = jerk
-        self.bias = np.zeros_like(self.prior)
-        self.cov = np.diag(self.prior.ravel() ** 2)
-        self.used = 0
         self._t: float | None = None
         self._taken: list[Plotted] = []
+        self._forget()
+
+    def _forget(self) -> None:
+        """Know the prior only."""
+        self._bias = np.zeros_like(self.prior)
+        self._cov = np.diag(self.prior.ravel() ** 2)
+        self.used, self._contradicted = 0, 0
+
+    @property
+    def told(self) -> bool:
+        """Whether there were as many comparisons as there are biases to tell: fewer may all be of different targets."""
+        return self.used >= int(np.count_nonzero(self.prior))
+
+    @property
+    def bias(self) -> Floats:
+        """(S, 3) the estimate; zero until the biases are told."""
+        return self._bias if self.told else np.zeros_like(self.prior)
+
+    @property
+    def cov(self) -> Floats:
+        """(3 S, 3 S) its covariance; that of the prior until the biases are told."""
+        return self._cov if self.told else np.diag(self.prior.ravel() ** 2)
 
     def sigma(self) -> Floats:
         """(S, 3) standard deviations of the biases."""
@@ -112,7 +134,7 @@ class Registration:
         """Let the biases wander until t."""
         dt = 0.0 if self._t is None else max(t - self._t, 0.0)
         self._t = t
-        self.cov = self.cov + np.diag((DRIFT * self.prior.ravel()) ** 2 * dt / DRIFT_S)
+        self._cov = self._cov + np.diag((DRIFT * self.prior.ravel()) ** 2 * dt / DRIFT_S)
 
     def _compare(self, old: Plotted, new: Plotted) -> list[tuple[Floats, Floats, Floats]]:
         """y (N, 2), H (N, 2, 3 S), N (N, 2, 2) of plots of another radar that lie between two of this one."""
@@ -142,48 +164,65 @@ class Registration:
         # where the target is, for all plots alike: at the places of single plots, their errors would be in y and in H,
         # and would tell what nobody can of the biases, as what is common to radars at one place
         target = p - y / 2
-        J, R = self._derivatives(other.radar, other.v, other.R, target)
+        J = derivatives(self.origins[other.radar], target, other.v)
         w = share[:, :, None]
         v, both = (1 - share) * before.v + share * after.v, (1 - w) * before.R + w * after.R
-        J1, R1 = self._derivatives(after.radar, v, both, target)
-        H = np.zeros((len(y), 2, self.cov.shape[0]))
+        J1 = derivatives(self.origins[after.radar], target, v)
+        H = np.zeros((len(y), 2, self._cov.shape[0]))
         H[:, :, KINDS * other.radar : KINDS * (other.radar + 1)] = J
         H[:, :, KINDS * after.radar : KINDS * (after.radar + 1)] -= J1
         motion = self.jerk * step**3 * (share[:, 0] * (1 - share[:, 0])) ** 2 / 3
         # a plot may serve in two interpolations, with weights that sum to one: not squared, they count it once
-        N = R + R1 + motion[:, None, None] * np.eye(2)
-        # of S radars S - 1 differences are independent, and all S (S - 1) / 2 are used
-        return y, H, N * len(self.bias) / 2
+        N = in_plane(J, other.R) + in_plane(J1, both) + motion[:, None, None] * np.eye(2)
+        # of a target's S radars S - 1 differences are independent, and all S (S - 1) / 2 are used
+        return y, H, N * self._radars_of(other.track)[:, None, None] / 2
+
+    def _radars_of(self, track: Ints) -> Ints:
+        """(N,) how many radars have plots of each track."""
+        own = (
+            np.concatenate([old.track for old in self._taken if old.radar == k] or [[]]) for k in range(len(self.prior))
+        )
+        return np.sum([np.isin(track, tracks) for tracks in own], axis=0)
 
     def _place(self, plots: Plotted) -> Floats:
         """(N, 2) positions of plots without the estimated biases."""
-        bias = self.bias[plots.radar]
+        bias = self._bias[plots.radar]
         return to_cartesian(plots.z - bias[:2]) + plots.v * bias[2] + self.origins[plots.radar]
-
-    def _derivatives(self, radar: int, v: Floats, R: Floats, target: Floats) -> tuple[Floats, Floats]:
-        """Derivatives (N, 2, 3) of the positions of a radar's plots by its biases, and covariances (N, 2, 2).
-
-        v (N, 2) velocities, R (N, 2, 2) errors of range and azimuth, target (N, 2) where the targets are
-        """
-        away = target - self.origins[radar]
-        unit = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1.0)
-        J = np.stack([unit, np.column_stack([away[:, 1], -away[:, 0]]), -v], axis=2)
-        return J, J[:, :, :2] @ R @ J[:, :, :2].transpose(0, 2, 1)
 
     def _update(self, y: Floats, H: Floats, N: Floats) -> None:
         """Update the biases by differences (N, 2), without those that cannot be of one target."""
-        S = H @ self.cov @ H.transpose(0, 2, 1) + N
+        S = H @ self._cov @ H.transpose(0, 2, 1) + N
         d2 = np.einsum("ni,ni->n", y, np.linalg.solve(S, y[:, :, None])[:, :, 0])
         one = d2 < FARTHEST_D2
+        self._contradicted = max(self._contradicted + int(np.count_nonzero(~one) - np.count_nonzero(one)), 0)
+        if self._contradicted > np.count_nonzero(self.prior):
+            self._forget()
+            return
         y, H, N = y[one], H[one], N[one]
         weighted = np.linalg.solve(N, H)
         information = np.einsum("nik,nil->kl", H, weighted)
-        root = np.linalg.cholesky(self.cov + np.diag(self.prior.ravel() == 0))  # what is known has no uncertainty
+        root = np.linalg.cholesky(self._cov + np.diag(self.prior.ravel() == 0))  # what is known has no uncertainty
         root[:, self.prior.ravel() == 0] = 0.0
-        self.cov = root @ np.linalg.solve(np.eye(len(root)) + root.T @ information @ root, root.T)
-        self.cov = (self.cov + self.cov.T) / 2
-        self.bias = self.bias + (self.cov @ np.einsum("nik,ni->k", weighted, y)).reshape(-1, KINDS)
+        self._cov = root @ np.linalg.solve(np.eye(len(root)) + root.T @ information @ root, root.T)
+        self._cov = (self._cov + self._cov.T) / 2
+        self._bias = self._bias + (self._cov @ np.einsum("nik,ni->k", weighted, y)).reshape(-1, KINDS)
         self.used += len(y)
+
+
+def derivatives(origin: Floats, xy: Floats, v: Floats) -> Floats:
+    """(N, 2, KINDS) derivatives of the positions that a radar at `origin` (2,) measures by its biases.
+
+    xy, v  (N, 2) where the targets are [m], and their velocities [m/s]
+    """
+    away = xy - origin
+    unit = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1.0)
+    return np.stack([unit, np.column_stack([away[:, 1], -away[:, 0]]), -v], axis=2)
+
+
+def in_plane(J: Floats, R: Floats) -> Floats:
+    """(N, 2, 2) covariances of positions with errors R (N, 2, 2) of range and azimuth; J (N, 2, KINDS) derivatives."""
+    polar = J[:, :, :2]
+    return polar @ R @ polar.transpose(0, 2, 1)
 
 
 def _rows(ids: Ints, wanted: Ints) -> Ints:
