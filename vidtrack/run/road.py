@@ -6,7 +6,7 @@ import heapq
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import tee
 from pathlib import Path
 from typing import Any
@@ -250,6 +250,6 @@ def road_steps(network: Network | None, camera: Camera | None, tracker: Tracker)
     for one, step in zip(merged, scan_steps(enumerate(map(scan_of, again)), tracker), strict=True):
         if isinstance(one, Turn) and network is not None:
             network.learn(one, step.tracks)
-        yield step
+        yield step if network is None else replace(step, tracks=network.stated(step.tracks))
     if network is not None:
         network.warn_of_biases()

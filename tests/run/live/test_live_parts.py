@@ -319,7 +319,9 @@ def test_finished_parts_leave_nothing_in_memory(tmp_path, clock):
         station.parts.finish()
         del station
         kept = (Part, TrajectoryPlot, Summary)
-        left = [one for one in gc.get_objects() if type(one) in kept]  # isinstance would follow a library's dead proxies
+        left = [
+            one for one in gc.get_objects() if type(one) in kept
+        ]  # isinstance would follow a library's dead proxies
     finally:
         gc.enable()
     assert len(parts_of(tmp_path)) == 3

@@ -179,7 +179,9 @@ class Network:
         plots = feed.plots.rows(turn.span.rows).of_extended_targets(feed.settings.extent_m)
         rows = tracks.measurement[took]
         R = np.einsum("ni,ij->nij", plots.sigma[rows, :2] ** 2, np.eye(2))
-        taken = Plotted(turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.v[took])
+        taken = Plotted(
+            turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.xy[took], tracks.v[took]
+        )
         self.registration.learn(turn.span.t, taken)
         if len(self._unexpected) and self.registration is not self._with_clocks:
             self._with_clocks.learn(turn.span.t, taken)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vidtrack.arrays.types import Floats, Ints
-from vidtrack.radar.coordinates import to_cartesian
+from vidtrack.radar.coordinates import unbiased
 
 KINDS = 3
 """Biases of a radar: range [m], azimuth [rad], time [s]."""
@@ -41,7 +41,7 @@ class Plotted:
     t      (N,) stated times [s]
     z      (N, 2) range [m] and azimuth [rad] as measured
     R      (N, 2, 2) covariances of their errors without bias
-    v      (N, 2) velocities of the targets [m/s]
+    xy, v  (N, 2) positions [m] and velocities [m/s] of the targets, by their tracks
     """
 
     radar: int
@@ -49,11 +49,13 @@ class Plotted:
     t: Floats
     z: Floats
     R: Floats
+    xy: Floats
     v: Floats
 
     def at(self, rows: Ints) -> Plotted:
         """The plots of these rows."""
-        return Plotted(self.radar, self.track[rows], self.t[rows], self.z[rows], self.R[rows], self.v[rows])
+        columns = (self.track, self.t, self.z, self.R, self.xy, self.v)
+        return Plotted(self.radar, *(column[rows] for column in columns))
 
 
 class Registration:
@@ -163,11 +165,10 @@ class Registration:
         y = p - (1 - share) * p0 - share * p1
         # where the target is, for all plots alike: at the places of single plots, their errors would be in y and in H,
         # and would tell what nobody can of the biases, as what is common to radars at one place
-        target = p - y / 2
-        J = derivatives(self.origins[other.radar], target, other.v)
+        J = derivatives(self.origins[other.radar], other.xy, other.v)
         w = share[:, :, None]
         v, both = (1 - share) * before.v + share * after.v, (1 - w) * before.R + w * after.R
-        J1 = derivatives(self.origins[after.radar], target, v)
+        J1 = derivatives(self.origins[after.radar], other.xy, v)
         H = np.zeros((len(y), 2, self._cov.shape[0]))
         H[:, :, KINDS * other.radar : KINDS * (other.radar + 1)] = J
         H[:, :, KINDS * after.radar : KINDS * (after.radar + 1)] -= J1
@@ -179,15 +180,15 @@ class Registration:
 
     def _radars_of(self, track: Ints) -> Ints:
         """(N,) how many radars have plots of each track."""
-        own = (
-            np.concatenate([old.track for old in self._taken if old.radar == k] or [[]]) for k in range(len(self.prior))
-        )
-        return np.sum([np.isin(track, tracks) for tracks in own], axis=0)
+        has = np.zeros((len(self.prior), len(track)), bool)
+        for old in self._taken:
+            has[old.radar] |= np.isin(track, old.track)
+        return has.sum(axis=0)
 
     def _place(self, plots: Plotted) -> Floats:
         """(N, 2) positions of plots without the estimated biases."""
         bias = self._bias[plots.radar]
-        return to_cartesian(plots.z - bias[:2]) + plots.v * bias[2] + self.origins[plots.radar]
+        return unbiased(plots.z - bias[:2], plots.R)[0] + plots.v * bias[2] + self.origins[plots.radar]
 
     def _update(self, y: Floats, H: Floats, N: Floats) -> None:
         """Update the biases by differences (N, 2), without those that cannot be of one target."""
