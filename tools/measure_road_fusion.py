@@ -20,7 +20,8 @@ import numpy as np
 from vidtrack import score
 from vidtrack.config.load import load
 from vidtrack.formats import Table
-from vidtrack.radar.network.network import Network, read_feeds
+from vidtrack.radar.network.feed import read_feeds
+from vidtrack.radar.network.network import Network
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.road import ROAD, build_road_tracker, open_camera, road_steps
 from vidtrack.simulate import simulate_road, write_road

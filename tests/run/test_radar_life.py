@@ -7,7 +7,8 @@ import pytest
 
 import vidtrack as vt
 from vidtrack.config.load import load
-from vidtrack.radar.network.network import Network, read_feeds
+from vidtrack.radar.network.feed import read_feeds
+from vidtrack.radar.network.network import Network
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.network import build_network_tracker
 from vidtrack.run.radar_life import radar_life

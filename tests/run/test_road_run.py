@@ -11,7 +11,7 @@ from vidtrack.config.load import load
 from vidtrack.config.settings import SourceSettings
 from vidtrack.errors import ConfigError
 from vidtrack.output.sink import Step
-from vidtrack.radar.network.network import read_feeds
+from vidtrack.radar.network.feed import read_feeds
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.road import (
     ROAD,

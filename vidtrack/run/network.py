@@ -16,7 +16,8 @@ from vidtrack.output.linked import refuse_link
 from vidtrack.output.registration import RegistrationTable
 from vidtrack.output.sink import Sink, Step
 from vidtrack.output.summary import Summary
-from vidtrack.radar.network.network import Feed, Network, read_feeds, warn_if_apart
+from vidtrack.radar.network.feed import Feed, read_feeds, warn_if_apart
+from vidtrack.radar.network.network import Network
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.run.radar import build_point_tracker, radar_sinks, rates
 from vidtrack.run.run import Extras, Pipeline, Run

@@ -18,7 +18,8 @@ from vidtrack.output.linked import refuse_link
 from vidtrack.output.sink import Step
 from vidtrack.output.summary import Summary
 from vidtrack.radar.filters import estimator, motion
-from vidtrack.radar.network.network import Feed, Network, Turn, overlap, read_feeds, warn_if_apart
+from vidtrack.radar.network.feed import Feed, overlap, read_feeds, warn_if_apart
+from vidtrack.radar.network.network import Network, Turn
 from vidtrack.radar.network.radars import Radars, read_radars
 from vidtrack.radar.scans import surveyed
 from vidtrack.run.network import learn_ahead, network_sinks

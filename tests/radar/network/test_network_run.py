@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,12 +13,14 @@ from click.testing import CliRunner
 import vidtrack as vt
 from vidtrack.cli import cli
 from vidtrack.config.load import load
-from vidtrack.formats import read
-from vidtrack.radar.network.network import Network, read_feeds, warn_if_apart
+from vidtrack.formats import read, read_states
+from vidtrack.radar.network.feed import read_feeds, warn_if_apart
+from vidtrack.radar.network.network import Network
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.run.fuse import common_plane, run_fusion
 from vidtrack.run.network import AHEAD_S, build_network_tracker, learn_ahead, run_network
-from vidtrack.simulate.radar_network import simulate_network, write_network
+from vidtrack.score import evaluate
+from vidtrack.simulate.radar_network import NORTH, simulate_network, write_network
 
 
 def finished(folder, names, out, toml="radars.toml", origin=None):
@@ -118,6 +121,44 @@ def test_a_clock_that_is_off_unexpectedly_is_named(biased, tmp_path, caplog):
     finished(tmp_path, ["north", "south"], "late")
     off_s, of = re.search(r"the clock of south seems to be (.*) s ahead of that of (\w+)", caplog.text).groups()
     assert (float(off_s), of) == (pytest.approx(1.0, abs=0.3), "north")
+    assert "and is estimated since it was sure" in caplog.text
+    south = json.loads((tmp_path / "late" / "summary.json").read_text())["radars"]["south"]
+    for name, true in (("time_s", 1.0), ("azimuth_deg", 1.0), ("range_m", 0.0)):
+        assert abs(south[f"bias_{name}"] - true) < 3.5 * south[f"bias_{name.replace('_', '_sigma_')}"]
+    assert abs(south["bias_time_s"] - 1.0) < 0.2
+
+
+def test_of_one_radar_no_bias_is_told(biased):
+    alone = finished(biased, ["north"], "only-north")
+    assert not [name for name in json.loads((alone / "summary.json").read_text())["radars"]["north"] if "bias" in name]
+    assert set(csv.DictReader((alone / "registration.csv").open()).fieldnames) == {"scan", "time_s", "radar"}
+
+
+def test_what_nothing_tells_of_biases_is_in_the_errors_of_tracks(biased, monkeypatch):
+    """Both radars measure one degree too much; at one place they cannot tell each other."""
+    monkeypatch.setattr(
+        "vidtrack.simulate.radar_network.RADARS", {"north": NORTH, "south": replace(NORTH, start_s=1.7)}
+    )
+    there = biased / "one-place"
+    there.mkdir()
+    write_network(simulate_network(501, bias=(0.0, 0.0, 0.0)), there)
+    for name in ("north", "south"):
+        turned(there / f"{name}.csv", 1.0)
+    run = finished(there, ["north", "south"], "run")
+    assert (
+        0.3 < evaluate(read(run), read(there / "truth.csv"), max_distance=3000.0, states=read_states(run))["nees"] < 4
+    )
+    radars = json.loads((run / "summary.json").read_text())["radars"]
+    assert not any(own["bias_azimuth_observed"] for own in radars.values())
+
+
+def turned(table, degrees):
+    """Turn a table's azimuths."""
+    rows = list(csv.DictReader(table.open()))
+    with table.open("w") as file:
+        written = csv.DictWriter(file, rows[0])
+        written.writeheader()
+        written.writerows(row | {"azimuth_deg": (float(row["azimuth_deg"]) + degrees) % 360} for row in rows)
 
 
 def test_tracks_that_a_bias_keeps_apart_are_told_of(biased, tmp_path, caplog):

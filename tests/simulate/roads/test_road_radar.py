@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vidtrack.config.load import load
-from vidtrack.radar.network.network import read_feeds
+from vidtrack.radar.network.feed import read_feeds
 from vidtrack.radar.network.radars import read_radars
 from vidtrack.simulate import simulate_road
 from vidtrack.simulate.roads.radar import TrafficRadar, road_plots, write_road_plots

@@ -54,8 +54,9 @@ class Plotted:
 
     def at(self, rows: Ints) -> Plotted:
         """The plots of these rows."""
-        columns = (self.track, self.t, self.z, self.R, self.xy, self.v)
-        return Plotted(self.radar, *(column[rows] for column in columns))
+        return Plotted(
+            self.radar, self.track[rows], self.t[rows], self.z[rows], self.R[rows], self.xy[rows], self.v[rows]
+        )
 
 
 class Registration:
