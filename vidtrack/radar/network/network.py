@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vidtrack.arrays.types import Floats, Ints
+from vidtrack.arrays.types import Floats
 from vidtrack.radar.coordinates import wrap
 from vidtrack.radar.network.feed import Feed, names
 from vidtrack.radar.network.registration import KINDS, Plotted, Registration
@@ -43,8 +43,8 @@ class Network:
     `scan` makes the scan of a turn, without the biases that are known by then; `learn` learns from what the tracker
     made of it, and `stated` has in the tracks' errors what is not known of the biases.
 
-    A second registration allows an error to each clock that is expected to have none; once it is sure that one is off,
-    it takes over.
+    A second registration allows an error to each clock that is expected to have none. Once it is sure that one is off,
+    it is `registration`, for good: biases that are learnt without the clock are wrong.
     """
 
     def __init__(self, feeds: Sequence[Feed]) -> None:
@@ -59,7 +59,8 @@ class Network:
         unexpected = sigma[:, :2].any(axis=1) & (sigma[:, 2] == 0)
         unexpected[0] = False
         sigma[unexpected, 2] = CLOCK_S
-        self._unexpected, self._with_clocks = np.flatnonzero(unexpected), self._registration(sigma)
+        self._unexpected, self._with_clocks = unexpected, self._registration(sigma)
+        self._off = np.zeros(len(feeds), bool)  # of which it is sure
 
     def _registration(self, sigma: Floats) -> Registration:
         """A registration of all radars with these standard deviations of their biases (S, 3)."""
@@ -112,16 +113,12 @@ class Network:
             turn.station, tracks.id[took], plots.time_s[rows], plots.z[rows, :2], R, tracks.xy[took], tracks.v[took]
         )
         self.registration.learn(turn.span.t, taken)
-        if len(self._unexpected) and self.registration is not self._with_clocks:
+        if self._unexpected.any() and self.registration is not self._with_clocks:
             self._with_clocks.learn(turn.span.t, taken)
-            off = self._off()
-            if len(off) and (np.abs(self._with_clocks.bias[off, 2]) < FARTHEST_S).all():
+            off_s, sigma_s = np.abs(self._with_clocks.bias[:, 2]), self._with_clocks.sigma()[:, 2]
+            self._off = self._unexpected & (off_s > SURE * sigma_s)
+            if self._off.any() and off_s[self._off].max() < FARTHEST_S:
                 self.registration = self._with_clocks
-
-    def _off(self) -> Ints:
-        """The radars whose clocks are off, though no error of them is expected."""
-        off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
-        return self._unexpected[np.abs(off_s[self._unexpected]) > SURE * sigma_s[self._unexpected]]
 
     def learnt_until(self, t: float) -> None:
         """The scans up to t come once more: they have told what they can of the biases."""
@@ -140,13 +137,13 @@ class Network:
                 "directions of %s wrong?", names(self.feeds),
             )  # fmt: skip
         off_s, sigma_s = self._with_clocks.bias[:, 2], self._with_clocks.sigma()[:, 2]
-        for k in self._off().tolist():
+        for k in np.flatnonzero(self._off).tolist():
             _log.warning(
                 "the clock of %s seems to be %s%.2f s %s that of %s (+- %.2f s), which radars.toml does not expect%s: "
                 "give the radar bias_time_s there", self.feeds[k].placed.name,
                 "more than " if abs(off_s[k]) > FARTHEST_S else "", abs(off_s[k]),
                 "ahead of" if off_s[k] > 0 else "behind", self.feeds[0].placed.name, sigma_s[k],
-                ", and is estimated since it was sure" if self.registration is self._with_clocks else "",
+                ", and has been estimated since it was sure" if self.registration is self._with_clocks else "",
             )  # fmt: skip
 
     def as_dict(self) -> dict[str, dict[str, float | bool]]:
