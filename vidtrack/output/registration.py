@@ -23,7 +23,10 @@ class RegistrationTable:
         rows = self._network.as_dict().items()
         self._file.add(
             "".join(
-                f"{step.index},{step.time_s:.6f},{radar},{','.join(f'{values[name]:g}' for name in self._columns)}\n"
+                ",".join(
+                    (str(step.index), f"{step.time_s:.6f}", radar, *(f"{values[name]:g}" for name in self._columns))
+                )
+                + "\n"
                 for radar, values in rows
             )
         )
